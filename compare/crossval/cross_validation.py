@@ -206,12 +206,7 @@ def _sweeps(
     swept = {name: tasks[case, SWEPT] for name, case in cases.items()}
     answers = dict(
         in_stages(
-            sweep_weights,
-            swept,
-            processes=processes,
-            stages=stages,
-            kind="curves",
-            note=lambda *_: "weighed",
+            sweep_weights, swept, processes=processes, stages=stages, kind="curves", note=lambda *_: "weighed"
         )
     )
     found = {case: answers[name] for name, case in cases.items()}  # in this order, whichever ended first

@@ -18,7 +18,7 @@ SCHEMES = {
     RANDOM: "a random third of the markers held out",
     LOAD: "every marker given at the full stroke; other strokes and contacts predicted",
 }
-"""Every scheme and what it holds out."""
+"""Every scheme with the markers or loads that it holds out."""
 
 DRAWS = 10
 """Draws of `RANDOM`, equal for every seed and solver, so that differences are paired."""

@@ -79,7 +79,7 @@ def _fold_rows(results: Mapping[Case, Mapping[str, SeedResults]]) -> Iterator[di
 def _write_pictures(
     out: Path, result: CrossvalResult, sweeps: Mapping[Case, Mapping[str, Sequence[float]]]
 ) -> dict[str, list[Path]]:
-    """Write the pictures of each truth, and remove those of an earlier study from the folder."""
+    """Write the pictures of each truth, and remove pictures of an earlier study."""
     formats = result.study.picture_formats
     pictures = {
         truth: [

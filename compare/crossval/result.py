@@ -56,7 +56,7 @@ class CaseResult:
         scores: By solver and scheme.
         differences: By solver, baseline, scheme and entry of `COMPARED`.
         failed: Error messages of the solvers that have no score.
-        remarks: What speaks against results: solvers that did not converge, and impossible bodies.
+        remarks: Faults of results: solvers that did not converge, and impossible bodies.
     """
 
     source: str
@@ -214,7 +214,7 @@ class CrossvalResult:
 
     @property
     def remarks(self) -> list[str]:
-        """What speaks against results, with truth and layout if there are several."""
+        """Faults of results, with truth and layout if there are several."""
         return [
             ", ".join(filter(None, [case.said_among(self.cases), remark]))
             for case, each in self.cases.items()
@@ -292,7 +292,7 @@ class CrossvalResult:
 
 
 def _remarks(results: Mapping[str, SeedResults]) -> Iterator[str]:
-    """A sentence on each solver against whose results something speaks."""
+    """A sentence on each solver whose results have faults."""
     for label, seeds in results.items():
         every = [found for seed in seeds for found in seed]
         against = [found.message for found in every if found.message]

@@ -70,7 +70,7 @@ class Difference(Interval):
 
 @dataclass(frozen=True)
 class Score:
-    """A solver in one scheme; its last five numbers are means of those of `FoldResult`, None where one is.
+    """A solver in one scheme; its last five numbers are means over `FoldResult`, None if any of them is None.
 
     Attributes:
         in_sample: Errors at markers that it was given, mm, by the names of `MARKERS`; empty if none were.

@@ -203,7 +203,7 @@ class FoldRunner:
         return found
 
     def _fitted(self, observations: Observations, held: tuple[int, ...]) -> Solution:
-        """The solution with the markers that are not held out; folds that hold out the same share it."""
+        """The solution with the markers that are not held out; folds with equal markers share it."""
         if self._fit is None or self._fit[0] != held:
             self._refit = self._refit or refitter(self._solver, self.problem)
             self._fit = held, self._refit(hide_markers(observations, held))
@@ -240,7 +240,7 @@ class FoldRunner:
 
 
 def _kept(path: Path, settings: Mapping[str, Any]) -> dict[Fold, FoldResult]:
-    """The results of an earlier run with the same settings."""
+    """The results of an earlier run with these settings."""
     if not path.exists():
         return {}
     content = _FILE.validate_json(path.read_bytes())

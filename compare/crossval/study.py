@@ -1,4 +1,4 @@
-"""A cross-validation to run: the finger, the solvers, what is held out, and the output folder."""
+"""A cross-validation to run: finger, solvers, held-out markers and loads, and the output folder."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -151,7 +151,7 @@ class CrossvalStudy:
         return "simulated" if self.measurements is None else self.measurements.label
 
     def check(self) -> None:
-        """Raise a `UserError` for what cannot be done, before anything is computed."""
+        """Raise a `UserError` for a study that cannot be done, before anything is computed."""
         if self.layouts and self.measurements:
             raise UserError("layouts: markers that were measured are where they are; name no layouts")
         if tuple(self.truths) != (SLIDING.name,) and self.measurements:

@@ -36,7 +36,7 @@ def all_tables(result: CrossvalResult) -> list[TextTable]:
 
 
 def terminal_tables(result: CrossvalResult) -> list[Table | Text]:
-    """The tables and their captions; with several truths those of solvers by truths alone."""
+    """The tables and their captions; with several truths only the tables of solvers by truths."""
     left = ("solver", "held out", "truth", "layout")
     shown: list[Table | Text] = []
     for table in truth_tables(result) if len(result.truths) > 1 else all_tables(result):
@@ -49,7 +49,7 @@ def terminal_tables(result: CrossvalResult) -> list[Table | Text]:
 def _by_case(
     result: CrossvalResult, row: Callable[[CaseResult, str, str], list[str]], schemes: Sequence[str]
 ) -> list[list[str]]:
-    """The rows of all solvers in all schemes, those of each truth and layout below its name if several."""
+    """The rows of all solvers in all schemes; truths and layouts are named above their rows if several."""
     rows: list[list[str]] = []
     for case, each in result.cases.items():
         own = [row(each, label, scheme) for scheme in schemes for label in each.scores]

@@ -75,7 +75,7 @@ def _contrasts(result: CrossvalResult, given: Sequence[str]) -> list[str]:
 
 
 def _stresses(result: CaseResult, given: Sequence[str]) -> Iterator[str]:
-    """Distances of the fields from the truth, all markers given, beside those of `fem`."""
+    """Distances of the fields from the truth, all markers given, beside the distances of `fem`."""
     if "fem" not in result.scores or not (plain := result.scores["fem"][ALL].fields):
         return
     for label in given:

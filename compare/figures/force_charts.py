@@ -5,13 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from compare.evaluation.force_displacement import ForceCurve, follows_load
-from compare.figures.style import (
-    axes_at,
-    legend_above,
-    legend_height,
-    solver_colour,
-    write_heading,
-)
+from compare.figures.style import axes_at, legend_above, legend_height, solver_colour, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, WIDTH, Figure, figure
 

@@ -108,7 +108,7 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
 
 
 def errors_note(evaluation: Evaluation, observations: Observations) -> str:
-    """Mean absolute errors at the markers in words: held out where the solver tells, else what they are."""
+    """Mean absolute errors at the markers in words: held-out ones if the solver has them."""
     errors, kind = held_out_errors(evaluation, observations), "held out"
     if errors is None:
         errors, kind = marker_errors(evaluation, observations), "training"

@@ -7,13 +7,7 @@ from matplotlib.axes import Axes
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.figures.style import (
-    axes_at,
-    legend_above,
-    legend_height,
-    solver_colour,
-    write_heading,
-)
+from compare.figures.style import axes_at, legend_above, legend_height, solver_colour, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, WIDTH, Figure, figure
 

@@ -25,7 +25,7 @@ def solver_colour(number: int) -> str:
 
 
 def write_heading(drawn: Figure, text: str, note: str = "") -> None:
-    """Title at the top left of a figure, and under it, smaller, what the reader must know."""
+    """Title at the top left of a figure, and under it, smaller, a note."""
     height = drawn.get_figheight()
     drawn.text(0.012, 1 - 0.06 / height, text, va="top", weight="bold", size=9.5, color=INK)
     if note:

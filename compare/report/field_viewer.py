@@ -35,7 +35,7 @@ DISPLACEMENT = FieldQuantity(
 
 
 class Packed:
-    """Arrays in one piece of memory; `add` gives what the browser needs to find and read one."""
+    """Arrays in one piece of memory; `add` gives the place and type by which the browser reads one."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -98,7 +98,7 @@ def viewer(comparison: Comparison) -> dict[str, Any] | None:
 def _solver(
     evaluation: Evaluation, comparison: Comparison, quantities: Sequence[FieldQuantity], packed: Packed
 ) -> dict[str, Any]:
-    """A solver's fields: those of the reference as they are, those of others as differences from it."""
+    """A solver's fields; of a solver that is not the reference, their differences from it."""
     mesh, reference = comparison.mesh, comparison.reference
     is_reference = evaluation is reference
     fields = []

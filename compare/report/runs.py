@@ -1,4 +1,4 @@
-"""Several finished runs side by side: what differs between them, and their numbers in one page and table."""
+"""Several finished runs side by side: their differences and numbers in one page and table."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence

@@ -74,7 +74,7 @@ def millimetres(error: float, printed: bool = False) -> str:
 
 
 def write_table_one(path: Path, comparison: Comparison) -> None:
-    """Write a row a solver, then `printed_rows`; what does not exist is empty."""
+    """Write a row a solver, then `printed_rows`; cells without a number are empty."""
     own = [(each.solver, int(each.converged)) for each in comparison.evaluations]
     printed = printed_rows(comparison.design)
     names: list[tuple[str, Cell]] = [*own, *((row.solver, "") for row in printed)]

@@ -90,7 +90,7 @@ def support_sentence(design: Finger) -> str:
 
 
 def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Provenance as groups of lines; what is not in a mapping comes first, in a group without a title."""
+    """Provenance as groups of lines; single values come first, in a group without a title."""
     groups = {"": {key: value for key, value in provenance.items() if not isinstance(value, Mapping)}}
     groups |= {key: dict(value) for key, value in provenance.items() if isinstance(value, Mapping)}
     return [
@@ -160,7 +160,7 @@ def without_rounding(force: FloatArray) -> tuple[float, float]:
 
 
 def beside(value: float, own: float | None) -> Markup:
-    """A difference and, if there is one, the own error of what it is a difference from, as HTML.
+    """A difference from a reference and, if there is one, the reference's own error, as HTML.
 
     A difference that is smaller than that error is set in grey.
     """

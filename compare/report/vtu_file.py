@@ -57,7 +57,7 @@ def _ascii(text: str) -> str:
 
 
 def write_mesh(path: Path, mesh: TriangleMesh) -> None:
-    """Write the mesh atomically; point data `boundary_NAME` and `marker` (number or 0) say what is where."""
+    """Write the mesh atomically, with point data `boundary_NAME` and `marker` (its number, or 0)."""
     grid = _grid(mesh)
     for name, edges in mesh.boundaries.items():
         grid.point_data[f"boundary_{name}"] = np.isin(np.arange(len(mesh.points)), edges).astype(np.uint8)

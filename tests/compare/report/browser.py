@@ -48,8 +48,7 @@ def opened(browser: Browser, path: Path, *, width: int = 1400, **context: object
     found = Opened(page)
     page.on("pageerror", lambda error: found.complaints.append(str(error)))
     page.on(
-        "console",
-        lambda message: found.complaints.append(message.text) if message.type == "error" else None,
+        "console", lambda message: found.complaints.append(message.text) if message.type == "error" else None
     )
     page.on(
         "request",
