@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 from compare.crossval.folds import ALL, SCHEMES, Fold, SeedResults
 from compare.crossval.scores import (
     BASELINES,
-    COMPARED,
     LEVEL,
     MARKERS,
     Difference,
     Interval,
     Score,
-    difference,
+    differences,
     of_scheme,
     score,
 )
@@ -89,15 +88,10 @@ class CaseResult:
         by_scheme = {
             label: {scheme: of_scheme(each, scheme) for scheme in schemes} for label, each in results.items()
         }
-        differences = {
+        found = {
             label: {
                 baseline: {
-                    scheme: {
-                        what: found
-                        for what in COMPARED
-                        if (found := difference(each[scheme], by_scheme[baseline][scheme], what)) is not None
-                    }
-                    for scheme in schemes
+                    scheme: differences(each[scheme], by_scheme[baseline][scheme]) for scheme in schemes
                 }
                 for baseline in BASELINES
                 if baseline in by_scheme and baseline != label
@@ -109,7 +103,7 @@ class CaseResult:
             for label, each in by_scheme.items()
         }
         remarks = list(_remarks(results))
-        return cls(observations.origin, len(observations.points), folds, scores, differences, failed, remarks)
+        return cls(observations.origin, len(observations.points), folds, scores, found, failed, remarks)
 
     def content(self, variants: Sequence[SolverVariant]) -> dict[str, Any]:
         """The entry of `crossval.json` for this layout."""

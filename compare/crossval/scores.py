@@ -138,10 +138,14 @@ def mean_errors(errors: FloatArray) -> dict[str, float]:
     return {"mae_u": u, "mae_v": v, "mae_sum": u + v, "mae_rss": float(np.hypot(u, v))}
 
 
-def difference(results: SeedResults, baseline: SeedResults, what: str) -> Difference | None:
-    """Difference of a solver's score, one of `COMPARED`, from a baseline's; None if one of them has none."""
-    own, other = (_values(each, what) for each in (results, baseline))
-    return None if own is None or other is None else Difference.bootstrap(own - other)
+def differences(results: SeedResults, baseline: SeedResults) -> dict[str, Difference]:
+    """Differences of a solver's scores in a scheme from a baseline's, by entry of `COMPARED`."""
+    pairs = {what: (_values(results, what), _values(baseline, what)) for what in COMPARED}
+    return {
+        what: Difference.bootstrap(own - other)
+        for what, (own, other) in pairs.items()
+        if own is not None and other is not None
+    }
 
 
 def _values(results: SeedResults, what: str) -> FloatArray | None:

@@ -22,7 +22,7 @@ from compare.crossval.folds import (
     load_cases_of,
 )
 from compare.crossval.result import Case, CaseResult, CrossvalResult
-from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
+from compare.crossval.scores import Difference, Interval, differences, of_scheme, score
 from compare.crossval.study import EVERY_TRUTH, CrossvalStudy, solver_variants
 from compare.crossval.tables import truth_tables
 from compare.crossval.verdicts import verdict_sentences
@@ -121,8 +121,8 @@ def test_the_bootstrap_is_about_as_wide_as_the_mean_is_uncertain():
 def test_differences_are_of_the_same_folds():
     own = [[outcome_of(ONE, (0,), [[1.0, 0.0], [0.0, 0.0]])]]
     other = [[outcome_of(ONE, (0,), [[3.0, 1.0], [0.0, 0.0]])]]
-    assert difference(own, other, "mae_sum").mean == -3.0
-    assert difference(own, other, "von_mises") is None
+    assert differences(own, other)["mae_sum"].mean == -3.0
+    assert list(differences(own, other)) == ["mae_sum"]
     assert of_scheme(own, TIP) == [[]]
 
 
@@ -131,8 +131,8 @@ def test_a_force_that_is_too_small_is_as_wrong_as_one_that_is_too_large():
     low, high = (
         [[outcome_of(ALL, (), [[0.0, 0.0]], force=force)] for _ in range(2)] for force in (-0.5, 0.1)
     )
-    assert difference(low, high, "force").mean == pytest.approx(0.4)
-    assert difference(low, high, "force").verdict == "worse"
+    assert differences(low, high)["force"].mean == pytest.approx(0.4)
+    assert differences(low, high)["force"].verdict == "worse"
 
 
 def test_verdicts_are_said_once_for_all_truths_that_share_them():
