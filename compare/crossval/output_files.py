@@ -11,7 +11,7 @@ from compare.crossval.result import Case, CrossvalResult
 from compare.crossval.tables import all_tables
 from compare.crossval.verdicts import conclusions
 from compare.figures import FORMATS
-from compare.runtime.html import write_page
+from compare.runtime.html import write_html
 from compare.runtime.tables import Cell, write_csv
 from geometry.atomic import write_json
 from geometry.content_hash import file_digest
@@ -44,7 +44,7 @@ def write_results(
         write_csv(out / "l_curve.csv", rows)
     pictures = _write_pictures(out, result, sweeps)
     answers = conclusions(result)
-    write_page(
+    write_html(
         out / "report.html",
         "crossval.html.j2",
         result=result,

@@ -14,7 +14,6 @@ from geometry.arrays import FloatArray
 from geometry.figure import INK
 
 Place = Sequence[float] | FloatArray
-LINE = 0.6
 CENTRE_LINE = (0, (6, 2, 1, 2))
 """Dashes and dots of a line that is no edge."""
 
@@ -74,7 +73,7 @@ class Draughtsman:
         start, end = (float(np.arctan2(direction[1], direction[0])) for direction in (first, second))
         turns = np.linspace(start, end, 65)
         arc = centre[:, None] + radius * np.stack([np.cos(turns), np.sin(turns)])
-        self.axes.plot(*arc, color=INK, linewidth=LINE, zorder=5)
+        self.axes.plot(*arc, color=INK, linewidth=0.6, zorder=5)
         middle = np.asarray(first) + np.asarray(second)
         self.text(
             centre + middle / np.linalg.norm(middle) * (radius + 1.2 * self.em), text, va="top", ha=side
@@ -88,7 +87,7 @@ class Draughtsman:
     def line(self, start: Place, end: Place, style: Any = "-") -> None:
         """A thin line between two points, mm."""
         self.axes.plot(
-            [start[0], end[0]], [start[1], end[1]], color=INK, linewidth=LINE, linestyle=style, zorder=5
+            [start[0], end[0]], [start[1], end[1]], color=INK, linewidth=0.6, linestyle=style, zorder=5
         )
 
     def drawn(self) -> list[shapely.Geometry]:
@@ -102,4 +101,4 @@ class Draughtsman:
         return found
 
     def _arrow(self, tail: Place, head: Place, style: str) -> None:
-        arrow(self.axes, tail, head, style=f"{style},head_width=0.12,head_length=0.3", width=LINE)
+        arrow(self.axes, tail, head, style=f"{style},head_width=0.12,head_length=0.3", width=0.6)

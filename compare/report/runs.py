@@ -10,13 +10,13 @@ from typing import Any
 from compare.evaluation.metrics import MEANS
 from compare.report.metrics_json import SCHEMA
 from compare.report.summary import RunAnswer, answers
-from compare.runtime.html import picture_urls, write_page
+from compare.runtime.html import picture_urls
 from compare.runtime.output_folder import RUN_FILE, check_links
 from compare.runtime.tables import NONE, Cell, TextTable, number, percent, write_csv
 from geometry.errors import UserError
 
 TABLE = "runs.csv"
-PICTURES = {"overlay.png": "Deformed finger", "von_mises.png": "Von Mises stress"}
+SHOWN_PICTURES = {"overlay.png": "Deformed finger", "von_mises.png": "Von Mises stress"}
 """Pictures of a run that stand side by side."""
 
 
@@ -230,10 +230,10 @@ def write_side_by_side(folder: Path, runs: Sequence[Run]) -> tuple[Path, Path]:
             for run in runs
             if (run.folder / "figures" / file).is_file()
         }
-        for file, title in PICTURES.items()
+        for file, title in SHOWN_PICTURES.items()
         if len(runs) <= 12  # so that the page stays small
     }
-    page = write_page(
+    page = write_html(
         folder / "runs.html",
         "runs.html.j2",
         runs=runs,

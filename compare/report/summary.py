@@ -12,7 +12,7 @@ from compare.runtime.tables import NONE, TextTable, number, percent
 Metrics = Mapping[str, Any]
 """`metrics.json`, or a part of it."""
 
-FIELDS = ("displacement", "von Mises stress", "force")
+TRUTH_FIELDS = ("displacement", "von Mises stress", "force")
 """Quantities that are compared with the simulated finger, in the order of `_to_truth`."""
 
 
@@ -137,7 +137,7 @@ def _markers(metrics: Metrics) -> RunAnswer | None:
         columns += [list(column) for column in zip(*map(_held_out_cells, listed.values()), strict=True)]
         better = [name for name, own in told.items() if _held_out(own)[0] < _held_out(plain)[0]]
         nearer.append(f"at held-out {source} markers {_those(better, told)}")
-    for place, field in enumerate(FIELDS if plain["to_truth"] else ()):
+    for place, field in enumerate(TRUTH_FIELDS if plain["to_truth"] else ()):
         found = {name: _to_truth(own)[place] for name, own in listed.items()}
         heads.append(field)
         columns.append([_signed(share, field == "force") for share in found.values()])
@@ -238,7 +238,7 @@ def _to_truth(own: Metrics) -> tuple[float, float, float]:
 
 def _truth_numbers(own: Metrics) -> str:
     return _listed(
-        [_signed(share, field == "force") for share, field in zip(_to_truth(own), FIELDS, strict=True)]
+        [_signed(share, field == "force") for share, field in zip(_to_truth(own), TRUTH_FIELDS, strict=True)]
     )
 
 

@@ -16,7 +16,7 @@ from geometry.finger.finger import Finger
 from solvers.problem import Load
 
 FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"
-LAWS = {
+LAW_WORDS = {
     "linear": "linear elastic (Hooke), infinitesimal strain",
     "neo-hookean": f"neo-Hookean, {FINITE_STRAIN}",
     "st-venant-kirchhoff": f"St Venant-Kirchhoff, {FINITE_STRAIN}",
@@ -32,12 +32,12 @@ def material_rows(comparison: Comparison) -> list[tuple[str, str]]:
     for evaluation in comparison.evaluations:
         solvers.setdefault(evaluation.law, []).append(evaluation.label)
     if len(solvers) == 1:
-        return [("Material", f"{LAWS[next(iter(solvers))]}; {constants}")]
-    rows = [(f"Law of {', '.join(labels)}", LAWS[law]) for law, labels in solvers.items()]
+        return [("Material", f"{LAW_WORDS[next(iter(solvers))]}; {constants}")]
+    rows = [(f"Law of {', '.join(labels)}", LAW_WORDS[law]) for law, labels in solvers.items()]
     return [("Material", constants), *rows]
 
 
-PRESETS = {
+PRESET_WORDS = {
     "fast": "network with random hidden weights, output layer solved exactly (preset fast)",
     "paper": "the paper’s training (preset paper)",
     "trained": "the paper’s networks, all weights trained by Gauss-Newton steps (preset trained)",
@@ -47,7 +47,7 @@ PRESETS = {
 def preset_meanings(settings: Mapping[str, Mapping[str, object]]) -> dict[str, str]:
     """The kind of training of each solver whose preset says it, from all solvers' settings."""
     chosen = {name: str(own.get("preset", "")) for name, own in settings.items()}
-    return {name: PRESETS[preset] for name, preset in chosen.items() if preset in PRESETS}
+    return {name: PRESET_WORDS[preset] for name, preset in chosen.items() if preset in PRESET_WORDS}
 
 
 def load_sentence(load: Load, design: Finger) -> str:

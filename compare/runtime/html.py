@@ -19,7 +19,7 @@ SMALL = 300_000
 """Bytes up to which a picture, as a rule one of lines, is embedded as it is."""
 
 
-def write_page(path: Path, template: str, **values: Any) -> Path:
+def write_html(path: Path, template: str, **values: Any) -> Path:
     """Render a template with values and write the page, atomically.
 
     `designs.html.j2` is a page of tables and pictures: it takes `title`, `sentences`, `tables` (each a

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.runtime.html import write_page
+from compare.runtime.html import write_html
 from compare.runtime.tables import TextTable
 from geometry.atomic import write_text
 from geometry.cache import finger_mesh
@@ -78,7 +78,7 @@ def write_front(
         "growth": (draw_growth(optimum), "Hypervolume of the front over the number of runs."),
     }
     pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
-    page = write_page(
+    page = write_html(
         folder / PAGE,
         "designs.html.j2",
         title=f"Front of {optimum.question.study.name}",

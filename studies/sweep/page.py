@@ -47,7 +47,7 @@ def write_page(
             drawn["sensitivity"] = (draw_sensitivity(found), sensitivity_caption(found))
         pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
     failures = failure_grid(sweep)
-    page = html.write_page(
+    page = html.write_html(
         folder / PAGE,
         "designs.html.j2",
         title=f"Sweep {sweep.study.name}",

@@ -16,7 +16,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
 from compare.figures.gallery import draw
 from compare.report.html_report import write_report
-from compare.runtime.html import write_page
+from compare.runtime.html import write_html
 from compare.runtime.tables import TextTable
 from geometry.mesh.triangle_mesh import TriangleMesh
 from tests.compare.report.browser import SOFTWARE_WEBGL, TIMEOUT, Opened, chromium, opened
@@ -195,7 +195,7 @@ def test_a_table_is_sorted_by_a_key(desk: Opened) -> None:
 def test_rows_are_sorted_below_the_name_of_their_group(browser: Browser, tmp_path: Path) -> None:
     rows = [["front", ""], ["gp", "2"], ["fem", "1"], ["joints", ""], ["gp", "4"], ["fem", "3"]]
     table = TextTable("Errors", ["solver", "error"], rows)
-    page = write_page(
+    page = write_html(
         tmp_path / "page.html",
         "designs.html.j2",
         title="",
