@@ -10,7 +10,7 @@ from typing import Any
 from compare.evaluation.metrics import MEANS
 from compare.report.metrics_json import SCHEMA
 from compare.report.summary import RunAnswer, answers
-from compare.runtime.html import picture_urls
+from compare.runtime.html import picture_urls, write_html
 from compare.runtime.output_folder import RUN_FILE, check_links
 from compare.runtime.tables import NONE, Cell, TextTable, number, percent, write_csv
 from geometry.errors import UserError
