@@ -218,11 +218,7 @@ def _pack(contents: dict[str, bytes], path: Path) -> None:
 
 
 def _unpack(path: Path) -> dict[str, bytes]:
-    """The files in an archive.
-
-    Raises:
-        ValueError: If a name leads out of the folder that they are written to: the cache is somebody else's.
-    """
+    """The files in an archive."""
     with zipfile.ZipFile(path) as archive:
         if any(Path(name).name != name for name in archive.namelist()):
             raise ValueError("a file of another folder")

@@ -24,9 +24,6 @@ def run_task(task: Mapping[str, Any], timeout_s: float) -> Any:
             and `settings` as a dictionary, for "cad" `finger` and `formats`, for a "drawing" its `file` and
             `description`.
         timeout_s: Time limit, s.
-
-    Raises:
-        UserError: One line, if the task fails or takes too long.
     """
     what, memory_gb = str(task["what"]), 0.9 * free_memory_gb()
     limited = {what: {**task, "memory_gb": memory_gb}}

@@ -35,7 +35,7 @@ def test_processes_run_no_module_of_the_working_folder(hostile_folder: Path) -> 
 def test_gmsh_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
     (tmp_path / ".petscrc").write_text(f"-history {tmp_path / 'written'}\n")
     done = subprocess.run(
-        [sys.executable, "-c", "from geometry.mesh.gmsh_model import session\nwith session(): pass"],
+        [sys.executable, "-c", "from geometry.mesh.mesher import session\nwith session(): pass"],
         env=child_environment(os.environ),
         cwd=tmp_path,
         capture_output=True,

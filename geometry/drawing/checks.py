@@ -10,42 +10,31 @@ from scipy.spatial import cKDTree
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import straightened
 from geometry.drawing.formats.drawing import place
-from geometry.drawing.outline import on_curve
+from geometry.drawing.placement import on_curve
 from geometry.errors import UserError
 from geometry.section.loop import Loop
 from geometry.section.section import DEVIATION, Section
 from geometry.section.thickness import inner_normals, wall_thickness
 
-THINNEST = 0.05
-"""Smallest wall, mm."""
-
 APART = 1e-3
 """Smallest distance of two curves, mm."""
 
-CORNER = np.radians(30)
-"""Largest turn of an outline at a place that still has a normal, radians."""
-
-SMALLEST_AREA = 1e-4
-"""Smallest area of a closed curve, mm^2."""
-
 
 def body(loops: Sequence[Loop]) -> Section:
-    """The section between closed curves, mm: the largest is the outline, the others are cavities.
-
-    Raises:
-        UserError: If a curve crosses itself or another, is drawn twice or has no area, a cavity is not inside
-            the outline or is inside another, or a wall is thinner than `THINNEST`.
-    """
+    """The section between closed curves, mm: the largest is the outline, the others are cavities."""
     for loop in loops:
         _check_simple(loop)
     ordered = sorted(loops, key=lambda loop: -abs(loop.area))
-    outline, *cavities = [_directed(straightened(loop), number == 0) for number, loop in enumerate(ordered)]
+    outline, *cavities = [
+        loop if (loop.area > 0) == (number == 0) else loop.reversed()
+        for number, loop in enumerate(map(straightened, ordered))
+    ]
     _check_apart(outline, cavities)
     section = Section(outline, tuple(cavities))
     thickness, where = thinnest_wall(section)
-    if thickness < THINNEST:
+    if thickness < 0.05:
         raise UserError(
-            f"the wall at {place(where)} is {thickness:.3g} mm thin; make every wall at least {THINNEST:g} mm"
+            f"the wall at {place(where)} is {thickness:.3g} mm thin; make every wall at least 0.05 mm"
         )
     return section
 
@@ -61,18 +50,14 @@ def thinnest_wall(section: Section) -> tuple[float, FloatArray]:
 
 
 def check_contact(outline: Loop, contact: FloatArray) -> tuple[int, float]:
-    """The piece of the outline, and the fraction of its length, that the contact's middle is on.
-
-    Raises:
-        UserError: If it is not on the outline, on the clamp or on a corner.
-    """
+    """The piece of the outline, and the fraction of its length, that the contact's middle is on."""
     which, fraction = on_curve(outline, contact, "contact")
     if outline.names[which] == "base":
         raise UserError(
             f"the contact at {place(contact)} is on the clamp; move it to a free part of the outline"
         )
     beside = which if fraction == 0 else which + 1 if fraction == 1 else None
-    if beside is not None and abs(_bend(outline, beside % len(outline.points))) > CORNER:
+    if beside is not None and abs(_bend(outline, beside % len(outline.points))) > np.radians(30):
         raise UserError(f"the contact at {place(contact)} is on a corner, which has no normal; move it along")
     return which, fraction
 
@@ -105,12 +90,8 @@ def _bend(outline: Loop, corner: int) -> float:
     return float(np.arctan2(into[0] * out[1] - into[1] * out[0], into @ out))
 
 
-def _directed(loop: Loop, left: bool) -> Loop:
-    return loop if (loop.area > 0) == left else loop.reversed()
-
-
 def _check_simple(loop: Loop) -> None:
-    if abs(loop.area) < SMALLEST_AREA and float(np.ptp(loop.bounds, axis=0).min()) < APART:
+    if abs(loop.area) < 1e-4 and float(np.ptp(loop.bounds, axis=0).min()) < APART:
         raise UserError(f"the closed curve at {place(loop.points[0])} encloses no area; delete it")
     ring = shapely.Polygon(loop.flattened(DEVIATION)[0])
     if not ring.is_valid:

@@ -1,18 +1,17 @@
 """Clamp, contact and markers of a drawn finger: a small TOML file beside the drawing, or lines of one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator
 
 from geometry.errors import UserError
 from geometry.finger.parameters import CheckedModel, bounded
 from geometry.text_files import parse_toml, read_toml
 
 Point = tuple[float, float]
-"""X and y in the file's coordinates."""
 
 
 class Description(CheckedModel):
@@ -52,16 +51,35 @@ class Description(CheckedModel):
     )
     depth: float | None = bounded(None, 1e-6, 2000, "", "", "Depth of the extrusion, in the file's unit")
 
-    @model_validator(mode="before")
+    @field_validator("clamp", mode="before")
     @classmethod
-    def _read_points(cls, values: Any) -> Any:
-        if not isinstance(values, Mapping):
-            return values
-        read = dict(values)
-        for key, meaning in _READ.items():
-            if read.get(key) is not None:
-                read[key] = meaning(read[key])
-        return read
+    def _read_clamp(cls, value: Any) -> Any:
+        if value is None or isinstance(value, str):
+            return value
+        pairs = [value] if _are_points(value, 2) else value
+        if not (isinstance(pairs, list | tuple) and pairs and all(_are_points(pair, 2) for pair in pairs)):
+            raise ValueError(
+                "no pair of points; write clamp = [[0, 0], [0, -30]], several such pairs, or a label"
+            )
+        return tuple(tuple((float(x), float(y)) for x, y in pair) for pair in pairs)
+
+    @field_validator("contact", mode="before")
+    @classmethod
+    def _read_contact(cls, value: Any) -> Any:
+        if not (value is None or isinstance(value, str) or _are_points([value])):
+            raise ValueError("no point; write contact = [35, 0] or a label of the file")
+        return value
+
+    @field_validator("markers", mode="before")
+    @classmethod
+    def _read_markers(cls, value: Any) -> Any:
+        if isinstance(value, int) and not isinstance(value, bool) and not 1 <= value <= 200:
+            raise ValueError("outside its range, 1 to 200")
+        if value is None or type(value) in (str, int) or _are_points(value):
+            return value
+        raise ValueError(
+            "no points; write markers = [[10, -1], [20, -1]], their number, or a label of the file"
+        )
 
 
 def description_beside(drawing: Path) -> Path | None:
@@ -92,63 +110,12 @@ def load_description(path: Path | None, lines: Sequence[str] = ()) -> Descriptio
         raise UserError(f"description {path.name}: {error}" if path else str(error)) from None
 
 
-def _points(value: Any) -> tuple[Point, ...]:
-    if isinstance(value, list | tuple) and all(_is_point(point) for point in value):
-        return tuple((float(x), float(y)) for x, y in value)
-    raise TypeError
-
-
-def _is_point(value: Any) -> bool:
+def _are_points(value: Any, count: int | None = None) -> bool:
+    """Whether a value is a list of pairs of finite numbers, `count` of them if it is given."""
     return (
         isinstance(value, list | tuple)
-        and len(value) == 2
-        and all(isinstance(number, int | float) and not isinstance(number, bool) for number in value)
-        and all(isfinite(number) for number in value)
+        and len(value) > 0
+        and count in (None, len(value))
+        and all(isinstance(point, list | tuple) and len(point) == 2 for point in value)
+        and all(type(number) in (int, float) and isfinite(number) for point in value for number in point)
     )
-
-
-def _clamp(value: Any) -> Any:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, list | tuple) and len(value) == 2 and all(_is_point(point) for point in value):
-        value = [value]
-    try:
-        pairs = tuple(_points(pair) for pair in value)
-    except TypeError:
-        pairs = ()
-    if not pairs or any(len(pair) != 2 for pair in pairs):
-        raise UserError(
-            f"clamp = {value!r} is no pair of points; write clamp = [[0, 0], [0, -30]], several such pairs, "
-            "or a label of the file"
-        )
-    return pairs
-
-
-def _contact(value: Any) -> Any:
-    if isinstance(value, str):
-        return value
-    if not _is_point(value):
-        raise UserError(f"contact = {value!r} is no point; write contact = [35, 0] or a label of the file")
-    return float(value[0]), float(value[1])
-
-
-def _markers(value: Any) -> Any:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int) and not isinstance(value, bool):
-        if not 1 <= value <= 200:
-            raise UserError(f"markers = {value} is outside its range, 1 to 200")
-        return value
-    try:
-        points = _points(value)
-    except TypeError:
-        points = ()
-    if not points:
-        raise UserError(
-            f"markers = {value!r} are no points; write markers = [[10, -1], [20, -1]], their number, or a "
-            "label of the file"
-        )
-    return points
-
-
-_READ = {"clamp": _clamp, "contact": _contact, "markers": _markers}

@@ -167,11 +167,7 @@ class DrawnFinger:
 
     @classmethod
     def from_definition(cls, definition: Mapping[str, Any]) -> Self:
-        """The finger of a `definition`, without the file's own mesh, or with it if the arrays are there.
-
-        Raises:
-            UserError: If it is none of a drawn finger.
-        """
+        """The finger of a `definition`, without the file's own mesh, or with it if the arrays are there."""
         values = dict(definition)
         if values.pop("kind", None) != KIND:
             raise UserError("this is no definition of a finger from a drawing")

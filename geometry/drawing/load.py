@@ -15,8 +15,7 @@ from geometry.drawing.description import Description, description_beside, load_d
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.drawing.formats.chain import straightened
 from geometry.drawing.formats.drawing import LABELS, Drawing, label_of, place
-from geometry.drawing.outline import renamed, with_part
-from geometry.drawing.placement import placed
+from geometry.drawing.placement import placed, renamed, with_part
 from geometry.drawing.ready_mesh import ready_mesh
 from geometry.errors import UserError
 from geometry.section.loop import Loop
@@ -62,9 +61,6 @@ def read_drawing(path: Path, units: str | None = None, plane: str | None = None)
         path: The file.
         units: Unit of its coordinates; None means the file's own, or mm.
         plane: Plane in which a solid is cut, such as `z = 6`.
-
-    Raises:
-        UserError: If there is no such file, its format is unknown, or it cannot be read.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:

@@ -19,52 +19,24 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.drawing.outline import renamed
+from geometry.drawing.placement import renamed
 from geometry.section.loop import Loop
 from geometry.section.section import Section
 from geometry.section.thickness import boundary_samples, inner_normals, through
 
 MARKERS = 9
-MARKER_DIAMETER = 1.6
-"""Largest diameter of a proposed marker, mm."""
-
-MARKER_SHARE = 0.8
-"""Largest diameter of a proposed marker as a share of the wall's thickness."""
-
-DEEPEST = 2.0
-"""Largest depth of a proposed marker's centre below the outline, mm."""
-
-CONTACT_WIDTH = 2.0
-"""Largest length of a proposed contact, mm."""
-
-NARROW = 0.25
-"""Least room of a proposed marker as a share of the median's."""
-
-FINE = 400
-"""Number of places that are tried where some have no room."""
-
 SIDEWAYS = np.cos(np.radians(45))
-LONG = 1.5
-"""Least length over width of a long body."""
-
 ON_HULL = 1e-3
 """Largest distance of a piece from the hull on which it lies, mm."""
 
 
-class End(NamedTuple):
-    """A flat end of a body.
+class FlatSide(NamedTuple):
+    """A straight side of a body's convex hull."""
 
-    Attributes:
-        pieces: Numbers of its pieces in the outline.
-        normal: Outer unit normal, shape (2,).
-        width: Distance of its outermost corners, mm.
-        x: Of its middle, mm.
-    """
-
-    pieces: tuple[int, ...]
-    normal: FloatArray
-    width: float
-    x: float
+    pieces: tuple[int, ...]  # of the outline
+    normal: FloatArray  # outer unit normal (2,)
+    width: float  # distance of its outermost corners, mm
+    x: float  # of its middle, mm
 
 
 def with_clamp(outline: Loop) -> Loop:
@@ -99,7 +71,10 @@ def contact_point(section: Section) -> FloatArray:
     free = [which for which in free if outline.lengths[which] >= 0.3 * extent]
     if not free:
         return _contact_on_curve(outline, middle, normal)
-    scores = {which: _sideways_length(outline, which, normal) for which in free}
+    scores = {
+        which: outline.lengths[which] * (1 - (inner_normals(outline, which, 0.5)[0] @ normal) ** 2)
+        for which in free
+    }
     best = [which for which in free if scores[which] >= 0.99 * max(scores.values())]
     chosen = max(best, key=lambda which: round(float(-inner_normals(outline, which, 0.5)[0, 1]), 6))
     return _mid_span(section, chosen, middle)
@@ -122,11 +97,11 @@ def _along(section: Section, run: list[int], count: int) -> FloatArray:
     total = float(section.outline.lengths[run].sum())
     places = _below(section, run, total * np.arange(1, count + 1) / (count + 1))
     room = section.clearance(places)
-    if (room >= NARROW * np.median(room)).all():
+    if (room >= 0.25 * np.median(room)).all():
         return places
-    steps = total * (np.arange(FINE) + 0.5) / FINE  # a sharp tip has no room: leave such stretches out
+    steps = total * (np.arange(400) + 0.5) / 400  # a sharp tip has no room: leave such stretches out
     room = section.clearance(_below(section, run, steps))
-    wide = steps[room >= NARROW * np.median(room)]
+    wide = steps[room >= 0.25 * np.median(room)]
     return _below(section, run, wide[len(wide) * np.arange(1, count + 1) // (count + 1)])
 
 
@@ -148,12 +123,12 @@ def _deepest(section: Section, point: FloatArray, normal: FloatArray) -> float:
     """Largest depth of a marker below a point of the outline, mm; in a solid part not halfway through."""
     crossing = through(section, point, normal)
     solid = crossing.pieces[0] < len(section.outline.points)
-    return min(DEEPEST, float(crossing.lengths[0]) / 4) if solid else DEEPEST
+    return min(2.0, float(crossing.lengths[0]) / 4) if solid else 2.0
 
 
 def marker_diameter(section: Section, places: FloatArray) -> float:
     """A proposed diameter of markers with centres (m, 2) in the body, mm; in steps of 0.01 mm above that."""
-    largest = min(MARKER_DIAMETER, MARKER_SHARE * 2 * float(section.clearance(places).min()))
+    largest = min(1.6, 0.8 * 2 * float(section.clearance(places).min()))
     return float(np.floor(100 * largest + 1e-6) / 100 or largest)
 
 
@@ -161,7 +136,7 @@ def contact_width(outline: Loop, middle: float) -> float:
     """A proposed extent of the contact around an abscissa, mm, on an outline with a front."""
     front = np.concatenate([outline.ends[which][:, 0] for which in outline.pieces("front")])
     beside = min(middle - front.min(), front.max() - middle)
-    widest = min(CONTACT_WIDTH, float(np.ptp(front)) / 5)
+    widest = min(2.0, float(np.ptp(front)) / 5)
     return min(widest, 2 * float(beside)) if beside > 1e-3 else widest  # at the very end the check refuses it
 
 
@@ -171,13 +146,14 @@ def _principal_axis(outline: Loop) -> FloatArray:
     return np.array([1.0, 0.0]) if values[0] > 0.9 * values[1] else np.asarray(vectors[:, 1])
 
 
-def _flat_sides(outline: Loop) -> Iterator[End]:
+def _flat_sides(outline: Loop) -> Iterator[FlatSide]:
     """Sides of the convex hull on which straight pieces lie."""
     corners, _ = outline.flattened(1e-4)
+    normals = {which: -inner_normals(outline, which, 0.5)[0] for which in outline.straight.tolist()}
     left = {
-        which: -inner_normals(outline, which, 0.5)[0]
-        for which in outline.straight.tolist()
-        if _on_hull(outline, which, corners)
+        which: normal
+        for which, normal in normals.items()
+        if (corners @ normal).max() <= (outline.ends[which] @ normal).min() + ON_HULL
     }
     while left:
         first, normal = next(iter(left.items()))
@@ -189,13 +165,8 @@ def _flat_sides(outline: Loop) -> Iterator[End]:
         ]
         ends = outline.ends[group].reshape(-1, 2)
         along = ends @ np.array([-normal[1], normal[0]])
-        yield End(tuple(group), normal, float(np.ptp(along)), float(ends[:, 0].mean()))
+        yield FlatSide(tuple(group), normal, float(np.ptp(along)), float(ends[:, 0].mean()))
         left = {which: other for which, other in left.items() if which not in group}
-
-
-def _on_hull(outline: Loop, which: int, corners: FloatArray) -> bool:
-    normal = -inner_normals(outline, which, 0.5)[0]
-    return bool((corners @ normal).max() <= (outline.ends[which] @ normal).min() + ON_HULL)
 
 
 def _with_lowest_part(outline: Loop) -> Loop:
@@ -226,17 +197,12 @@ def _clamp_frame(outline: Loop) -> tuple[FloatArray, FloatArray]:
     return weights @ middles / weights.sum(), normal / max(float(np.linalg.norm(normal)), 1e-12)
 
 
-def _sideways_length(outline: Loop, which: int, normal: FloatArray) -> float:
-    side = inner_normals(outline, which, 0.5)[0]
-    return float(outline.lengths[which] * (1 - (side @ normal) ** 2))
-
-
 def _contact_on_curve(outline: Loop, clamp: FloatArray, normal: FloatArray) -> FloatArray:
     """Halfway along the upper side of a long body, else its point farthest from the clamp."""
     points, normals, _ = _samples(outline)
     away = points - clamp
     along, across = -away @ normal, away @ np.array([-normal[1], normal[0]])
-    if along.max() < LONG * np.ptp(across):
+    if along.max() < 1.5 * np.ptp(across):
         return np.asarray(points[int(np.round(np.linalg.norm(away, axis=1), 6).argmax())])
     beside = (np.abs(normals @ normal) <= SIDEWAYS) & (normals[:, 1] < 0)
     beside = beside if beside.any() else np.ones(len(along), dtype=bool)

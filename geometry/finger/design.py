@@ -89,11 +89,7 @@ def _in_words(value: object, unit: str) -> str:
 
 
 def by_parameter_name(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values with the paper's symbols replaced by names.
-
-    Raises:
-        UserError: If a parameter is given by name and by symbol.
-    """
+    """The values with the paper's symbols replaced by names."""
     named: dict[str, Any] = {}
     for key, value in values.items():
         name = SYMBOLS.get(key, key)

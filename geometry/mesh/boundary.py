@@ -6,20 +6,10 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 
 CORNER_ANGLE = np.radians(10.0)
 """Minimum turn of the boundary at a corner."""
-ARC_ANGLE = np.radians(60.0)
-"""Maximum turn at a point of an arc."""
-FACING = -0.9
-"""Maximum cosine of the angle between the normals of two edges that face each other across a gap."""
-PARALLEL = -np.cos(np.radians(15.0))
-"""Maximum cosine for two edges of one closed boundary on both sides of a wall; sides of a taper are none."""
-CURVED = 1e-6
-"""Deviation of a face from the line through its ends, relative to its length, from which on it is curved."""
-LIKE = 0.5
-"""Least turn of the neighbours of a point of an arc, relative to its own."""
 
 
 def boundary_edges(triangles: IntArray) -> IntArray:
@@ -29,6 +19,23 @@ def boundary_edges(triangles: IntArray) -> IntArray:
     keys = low * (int(triangles.max()) + 1) + high  # many times faster than unique pairs
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     return np.asarray(directed[np.sort(first[count == 1])], dtype=np.int64)
+
+
+def are_among(edges: IntArray, others: IntArray) -> BoolArray:
+    """Mask of the edges (k, 2) that are among others (m, 2), whichever way both run."""
+    first, second = (
+        each[:, 0] * 2**32 + each[:, 1]
+        for each in (np.sort(edges.astype(np.int64), axis=1), np.sort(others, axis=1))
+    )
+    return np.isin(first, second)
+
+
+def counter_clockwise(points: FloatArray, triangles: IntArray) -> IntArray:
+    """The triangles (t, 3), those that ran clockwise turned round."""
+    turned = triangles.copy()
+    clockwise = signed_areas(points, triangles) < 0
+    turned[clockwise] = turned[clockwise][:, [0, 2, 1]]
+    return turned
 
 
 def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
@@ -86,14 +93,14 @@ def _facing_distance(edges: FloatArray, loop_of: IntArray, reach: float) -> Floa
     pairs = tree.query_pairs(reach + 0.5 * float(lengths.max()), output_type="ndarray")
     one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     cosine = (normals[one] * normals[other]).sum(axis=1)
-    kept = (loop_of[one] == loop_of[other]) & (cosine < FACING)
+    kept = (loop_of[one] == loop_of[other]) & (cosine < -0.9)
     one, other, cosine = one[kept], other[kept], cosine[kept]
     # middle + t normal = start + s along
     offset = start[other] - middles[one]
     determinant = _cross(normals[one], along[other])
     t = _cross(offset, along[other]) / determinant
     s = _cross(offset, normals[one]) / determinant
-    through_body = (t < -1e-9) & (cosine < PARALLEL)
+    through_body = (t < -1e-9) & (cosine < -np.cos(np.radians(15.0)))  # the sides of a taper are no wall
     hit = (s >= 0) & (s <= 1) & ((t > 1e-9) | through_body)
     found = np.full(len(edges), np.inf)
     np.minimum.at(found, one[hit], np.abs(t[hit]))
@@ -113,8 +120,8 @@ def singular_points(mesh: TriangleMesh) -> FloatArray:
 def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Re-entrant corners and ends of the base's pieces (s, 2), points of re-entrant arcs (a, 2), their radii.
 
-    All in mm, the radii of shape (a,). A point of an arc is one whose neighbour turns too. Arcs in finer
-    steps than `CORNER_ANGLE` count where their radius is below the mean thickness.
+    All in mm. A point of an arc is one whose neighbour turns too. Arcs in finer steps than `CORNER_ANGLE`
+    count where their radius is below the mean thickness.
     """
     edges = boundary_edges(mesh.triangles)
     follows = dict(edges.tolist())
@@ -128,9 +135,9 @@ def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, Float
     beside = np.array([[row[a], row[b]] for a, b in zip(after.tolist(), before.tolist(), strict=True)])
     lengths = 0.5 * (np.linalg.norm(into, axis=1) + np.linalg.norm(out, axis=1))
     bent = turn > CORNER_ANGLE
-    arc = bent & (turn < ARC_ANGLE) & bent[beside].any(axis=1)
+    arc = bent & (turn < np.radians(60.0)) & bent[beside].any(axis=1)
     radii = lengths / np.where(turn > 0, turn, np.nan)
-    tight = ~bent & (radii < mean_thickness(mesh)) & (turn[beside].min(axis=1) > LIKE * turn)
+    tight = ~bent & (radii < mean_thickness(mesh)) & (turn[beside].min(axis=1) > 0.5 * turn)
     base, times = np.unique(mesh.boundary("base"), return_counts=True)
     sharp = np.concatenate([mesh.points[nodes[bent & ~arc]], mesh.points[base[times == 1]]])
     return sharp, mesh.points[nodes[arc | tight]], radii[arc | tight]
@@ -143,8 +150,7 @@ def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
     the base and the one that reaches farthest are base and tip, the others are ribs.
 
     Returns:
-        Masks of shape (t,), without any triangle where the finger has no such part, as without cavities or
-        without a boundary called `back`.
+        Masks of shape (t,), empty where the finger has no such part: no cavities, or no boundary `back`.
     """
     inner = [mesh.points[loop] for loop in boundary_loops(mesh)[1:]]
     none = np.zeros(len(mesh.triangles), dtype=bool)
@@ -171,8 +177,7 @@ def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
 def elements_through_thickness(mesh: TriangleMesh) -> int:
     """The number of elements through the thinnest wall or rib.
 
-    Each wall lies between the outline and a cavity and each rib between two cavities: this is the least
-    number of element edges on a path from one closed boundary to another.
+    It is the least number of element edges on a path from one closed boundary to another.
     """
     loop_of = np.full(len(mesh.points), -1)
     for number, loop in enumerate(boundary_loops(mesh)):
@@ -198,7 +203,7 @@ def _distance(mesh: TriangleMesh, face: str, points: FloatArray) -> FloatArray:
     nodes = mesh.points[mesh.boundary(face).ravel()]
     start, end = nodes[nodes[:, 0].argmin()], nodes[nodes[:, 0].argmax()]
     along = (end - start) / np.linalg.norm(end - start)
-    if np.abs(_cross(along, nodes - start)).max() > CURVED * np.linalg.norm(end - start):
+    if np.abs(_cross(along, nodes - start)).max() > 1e-6 * np.linalg.norm(end - start):
         return np.asarray(cKDTree(nodes).query(points)[0])
     return np.asarray(np.abs(_cross(along, points - start)))
 

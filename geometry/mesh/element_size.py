@@ -3,15 +3,11 @@
 Walls and ribs are found by rays through the material, so that any section will do.
 """
 
-from collections.abc import Iterable
-from pathlib import Path
-
 import numpy as np
 import shapely
 from scipy.ndimage import distance_transform_edt
 
 from geometry.arrays import FloatArray
-from geometry.atomic import write_bytes
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.section.section import Section
@@ -73,49 +69,6 @@ def size_field(
         away = np.maximum(distance_transform_edt(near, sampling=spacing) - reach, 0)
         np.minimum(field, fine + settings.growth * away, out=field)
     return field, origin, spacing
-
-
-def set_sizes(
-    field: tuple[FloatArray, FloatArray, float],
-    points: Iterable[tuple[FloatArray, float]],
-    settings: MeshSettings,
-    folder: Path,
-) -> None:
-    """Set the size field of the current Gmsh model.
-
-    Args:
-        field: That of `size_field`.
-        points: Points, each of shape (k, 2), mm, from which elements of a size, mm, grow.
-        settings: Element sizes.
-        folder: For the file that Gmsh reads.
-    """
-    import gmsh  # the rest of this module is for estimates in processes that do without
-
-    sizes, origin, spacing = field
-    path = folder / "sizes.bin"
-    grid = np.array([*origin, 0.0, spacing, spacing, 1.0]), np.array([*sizes.shape, 1], dtype=np.int32)
-    write_bytes(path, b"".join(array.tobytes() for array in (*grid, sizes)))
-    model = gmsh.model.mesh.field
-    fields = [model.add("Structured")]
-    model.setString(fields[0], "FileName", str(path))
-    largest = settings.size * settings.coarsening
-    for places, fine in points:
-        tags = [gmsh.model.geo.addPoint(x, y, 0) for x, y in places]
-        gmsh.model.geo.synchronize()
-        distance, threshold = model.add("Distance"), model.add("Threshold")
-        model.setNumbers(distance, "PointsList", tags)
-        for option, value in (
-            ("InField", distance),
-            ("SizeMin", fine),
-            ("SizeMax", largest),
-            ("DistMin", 0.0),
-            ("DistMax", max(largest - fine, 1e-9) / settings.growth),
-        ):
-            model.setNumber(threshold, option, value)
-        fields.append(threshold)
-    smallest = model.add("Min")
-    model.setNumbers(smallest, "FieldsList", fields)
-    model.setAsBackgroundMesh(smallest)
 
 
 def _fine_parts(

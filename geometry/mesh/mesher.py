@@ -1,29 +1,41 @@
-"""The mesh of a finger: its section goes to Gmsh directly, without CAD."""
+"""The mesh of a finger by Gmsh: its section goes there directly, without CAD."""
 
 import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
+import gmsh
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
+from geometry.atomic import write_bytes
 from geometry.errors import UserError
 from geometry.finger.contact import CONTACT, outline_with_contact
 from geometry.finger.finger import Finger
-from geometry.mesh.boundary import boundary_edges, elements_through_thickness
-from geometry.mesh.element_size import TRIES, contact_points, set_sizes, size_field
-from geometry.mesh.gmsh_model import Triangulation, add_section, session, triangulate
+from geometry.mesh.boundary import (
+    are_among,
+    boundary_edges,
+    counter_clockwise,
+    elements_through_thickness,
+)
+from geometry.mesh.element_size import TRIES, contact_points, size_field
 from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.section.loop import Loop
 from geometry.section.section import Section
 
 MIN_ELEMENTS = 3
 """Least number of elements through the thickness of every wall and rib."""
 
-TOLERANCE = 1e-7
-"""Maximum distance of a node from a position that it has, mm."""
 
-RE_ENTRANT = np.radians(10)
-"""Least turn of the boundary at a re-entrant corner."""
+class Triangulation(NamedTuple):
+    """Nodes (n, 2), mm, triangles (t, 3) counter-clockwise, and edges (k, 2) on the pieces of each name."""
+
+    points: FloatArray
+    triangles: IntArray
+    edges: Mapping[str, IntArray]
 
 
 def build_mesh(finger: Finger, settings: MeshSettings) -> TriangleMesh:
@@ -32,15 +44,8 @@ def build_mesh(finger: Finger, settings: MeshSettings) -> TriangleMesh:
     The contact's ends and middle are nodes of the front face and every marker is a node. Boundary edges have
     the body on their left. The result depends on the arguments and on Gmsh's version only.
 
-    Args:
-        finger: The finger.
-        settings: Element sizes.
-
     Returns:
         The mesh with the boundaries `base`, `front`, `contact` and every other name of the outline's pieces.
-
-    Raises:
-        UserError: If some wall or rib cannot get three elements across.
     """
     for elements in TRIES:
         mesh = _named(finger, _triangulation(finger, settings, elements))
@@ -61,7 +66,7 @@ def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> T
     with tempfile.TemporaryDirectory() as folder, session():
         try:
             curves = add_section((outline_with_contact(finger), *section.cavities), finger.markers)
-            set_sizes(field, grown, settings, Path(folder))
+            _set_sizes(field, grown, settings, Path(folder))
             return triangulate(curves)
         except (OSError, MemoryError):
             raise
@@ -82,22 +87,18 @@ def _corners(section: Section) -> FloatArray:
         angle, half = np.arctan2(along[:, 1], along[:, 0]), 2 * np.arctan(loop.bulges)
         turn = (angle - half) - np.roll(angle + half, 1)
         turn = (turn + np.pi) % (2 * np.pi) - np.pi
-        found.append(loop.points[turn < -RE_ENTRANT])
+        found.append(loop.points[turn < -np.radians(10)])
     return np.concatenate(found)
 
 
 def _named(finger: Finger, found: Triangulation) -> TriangleMesh:
     """The mesh with its boundaries, markers and contact."""
-    triangles, points = found.triangles.copy(), found.points.copy()
-    clockwise = signed_areas(points, triangles) < 0
-    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+    points = found.points.copy()
+    triangles = counter_clockwise(points, found.triangles)
     edges = boundary_edges(triangles)
-    keys = _keys(edges, len(points))
     names = {name: list(nodes) for name, nodes in found.edges.items() if name}
     names["front"] = [*names.get("front", []), *names[CONTACT]]
-    boundaries = {
-        name: edges[np.isin(keys, _keys(np.array(nodes), len(points)))] for name, nodes in names.items()
-    }
+    boundaries = {name: edges[are_among(edges, np.array(nodes))] for name, nodes in names.items()}
     middle = finger.section.front_point(finger.contact_abscissa)[None]
     contact_node = int(_nodes_at(points, middle, "middle of the contact")[0])
     return TriangleMesh(
@@ -110,16 +111,125 @@ def _named(finger: Finger, found: Triangulation) -> TriangleMesh:
     )
 
 
-def _keys(edges: IntArray, count: int) -> IntArray:
-    """One number for each edge, shape (k, 2), of a mesh of `count` nodes, whichever way it runs."""
-    ordered = np.sort(edges, axis=1)
-    return np.asarray(ordered[:, 0] * count + ordered[:, 1], dtype=np.int64)
-
-
 def _nodes_at(points: FloatArray, wanted: FloatArray, what: str) -> IntArray:
     """The nodes at positions (m, 2), mm, moved there to the last digit."""
     nodes = np.array([((points - position) ** 2).sum(axis=1).argmin() for position in wanted], dtype=np.int64)
-    if np.abs(points[nodes] - wanted).max(initial=0) > TOLERANCE:
+    if np.abs(points[nodes] - wanted).max(initial=0) > 1e-7:
         raise UserError(f"the mesh has no node at a {what}; this is a fault of the mesher, please report it")
     points[nodes] = wanted
     return nodes
+
+
+def _set_sizes(
+    field: tuple[FloatArray, FloatArray, float],
+    points: Iterable[tuple[FloatArray, float]],
+    settings: MeshSettings,
+    folder: Path,
+) -> None:
+    """Give the current Gmsh model a size field, and points (k, 2), mm, from which elements of a size grow."""
+    sizes, origin, spacing = field
+    path = folder / "sizes.bin"
+    grid = np.array([*origin, 0.0, spacing, spacing, 1.0]), np.array([*sizes.shape, 1], dtype=np.int32)
+    write_bytes(path, b"".join(array.tobytes() for array in (*grid, sizes)))
+    model = gmsh.model.mesh.field
+    fields = [model.add("Structured")]
+    model.setString(fields[0], "FileName", str(path))
+    largest = settings.size * settings.coarsening
+    for places, fine in points:
+        tags = [gmsh.model.geo.addPoint(x, y, 0) for x, y in places]
+        gmsh.model.geo.synchronize()
+        distance, threshold = model.add("Distance"), model.add("Threshold")
+        model.setNumbers(distance, "PointsList", tags)
+        for option, value in (
+            ("InField", distance),
+            ("SizeMin", fine),
+            ("SizeMax", largest),
+            ("DistMin", 0.0),
+            ("DistMax", max(largest - fine, 1e-9) / settings.growth),
+        ):
+            model.setNumber(threshold, option, value)
+        fields.append(threshold)
+    smallest = model.add("Min")
+    model.setNumbers(smallest, "FieldsList", fields)
+    model.setAsBackgroundMesh(smallest)
+
+
+@contextmanager
+def session() -> Iterator[None]:
+    """Gmsh with this project's options: silent, one thread, the same random numbers every time.
+
+    The PETSc in it would take options from a `.petscrc` in the working folder, which may be of others: it
+    could load a library. Gmsh warns of the option against that, which is not its own, unless it is quiet.
+    """
+    gmsh.initialize(argv=["gmsh", "-v", "0", "-skip_petscrc"], readConfigFiles=False, interruptible=False)
+    try:
+        for option, value in (
+            ("General.Verbosity", 5),
+            ("General.Terminal", 0),
+            ("General.NumThreads", 1),
+            ("Mesh.Algorithm", 6),
+            ("Mesh.RandomSeed", 1),
+            ("Mesh.Smoothing", 1),
+            ("Mesh.MeshSizeExtendFromBoundary", 0),
+            ("Mesh.MeshSizeFromPoints", 0),
+            ("Mesh.MeshSizeFromCurvature", 0),
+        ):
+            gmsh.option.setNumber(option, value)
+        yield
+    finally:
+        gmsh.finalize()
+
+
+def add_section(loops: tuple[Loop, ...], inner: FloatArray) -> dict[str, list[int]]:
+    """Add a surface between curves with nodes at points (m, 2), mm; return the curves' tags by name."""
+    geo = gmsh.model.geo
+    named: dict[str, list[int]] = {}
+    tags = []
+    for loop in loops:
+        pieces = _without_long_arcs(loop)
+        corners = [geo.addPoint(x, y, 0) for x, y in pieces.points]
+        curves = []
+        for which, (start, name) in enumerate(zip(corners, pieces.names, strict=True)):
+            end = corners[(which + 1) % len(corners)]
+            if which in pieces.straight:
+                curves.append(geo.addLine(start, end))
+            else:
+                centre, _ = pieces.circle(which)
+                curves.append(geo.addCircleArc(start, geo.addPoint(*centre, 0), end))
+            named.setdefault(name, []).append(curves[-1])
+        tags.append(geo.addCurveLoop(curves))
+    surface = geo.addPlaneSurface(tags)
+    points = [geo.addPoint(x, y, 0) for x, y in inner]
+    geo.synchronize()
+    gmsh.model.mesh.embed(0, points, 2, surface)
+    return named
+
+
+def triangulate(named: Mapping[str, list[int]]) -> Triangulation:
+    """Mesh the current model; `named` are the curves that `add_section` gave."""
+    gmsh.model.mesh.generate(2)
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    _, connectivity = gmsh.model.mesh.getElementsByType(2)
+    triangles = connectivity.reshape(-1, 3)
+    used = np.unique(triangles)
+    number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    order = np.argsort(tags)
+    position = order[np.searchsorted(tags, used, sorter=order)]
+    edges = {
+        name: number[np.concatenate([gmsh.model.mesh.getElementsByType(1, tag)[1] for tag in curves])]
+        for name, curves in named.items()
+    }
+    return Triangulation(
+        points=coordinates.reshape(-1, 3)[position, :2].copy(),
+        triangles=number[triangles],
+        edges={name: nodes.reshape(-1, 2) for name, nodes in edges.items()},
+    )
+
+
+def _without_long_arcs(loop: Loop) -> Loop:
+    """The curve with its arcs cut into equal parts of less than half a circle, the longest that Gmsh has."""
+    parts = np.maximum(np.ceil(np.abs(4 * np.arctan(loop.bulges)) / (0.9 * np.pi)).astype(int), 1)
+    for which in np.flatnonzero(parts > 1)[::-1]:
+        loop = loop.split(int(which), list(np.arange(1, parts[which]) / parts[which]))
+    return loop

@@ -28,10 +28,6 @@ def closed_loops(pieces: Sequence[Piece], markings: frozenset[str] = frozenset()
     """Closed curves from pieces in any order and direction, mm.
 
     Pieces labelled as one of `markings` may be part of a curve, or lie on top of it and only name it.
-
-    Raises:
-        UserError: If there is none, the extent suggests another unit, a curve stays open, is drawn twice, or
-            more than two pieces meet at an end; with the place and the size of the gap.
     """
     _check_extent(pieces)
     labels = sorted({piece.label for piece in pieces if piece.label in markings})
@@ -96,11 +92,7 @@ def _nearest_fraction(loop: Loop, which: int, point: FloatArray) -> float:
 
 
 def _chained(loose: Sequence[Piece]) -> tuple[Loop, ...]:
-    """Closed curves of pieces that are all part of one.
-
-    Raises:
-        UserError: As `closed_loops`.
-    """
+    """Closed curves of pieces that are all part of one."""
     pieces, nodes, places = _joined(loose)
     _check_twice(pieces, nodes, places)
     _check_ends(nodes, places)
@@ -126,11 +118,7 @@ def _chained(loose: Sequence[Piece]) -> tuple[Loop, ...]:
 
 
 def _joined(pieces: Sequence[Piece]) -> tuple[list[Piece], IntArray, FloatArray]:
-    """Pieces with length, the nodes at their ends (p, 2), and the nodes' places (n, 2).
-
-    Raises:
-        UserError: If a curve is no larger than `JOIN`.
-    """
+    """Pieces with length, the nodes at their ends (p, 2), and the nodes' places (n, 2)."""
     ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
     pairs = cKDTree(ends).query_pairs(JOIN, output_type="ndarray")
     links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))

@@ -33,9 +33,6 @@ def read_dxf(path: Path, units: str | None = None) -> Drawing:
     Args:
         path: The file.
         units: Unit of its coordinates; None means the header's, or mm if the header has none.
-
-    Raises:
-        UserError: If it cannot be read, holds other entities, or its curves do not close.
     """
     try:
         document = ezdxf.filemanagement.readfile(path)

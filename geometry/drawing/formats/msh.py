@@ -17,7 +17,7 @@ from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile,
 from geometry.drawing.formats.pieces import line
 from geometry.drawing.formats.planes import axes_across, plane_text
 from geometry.errors import UserError
-from geometry.mesh.gmsh_model import session
+from geometry.mesh.mesher import session
 
 CORNERS = {2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 9: 3, 10: 4, 11: 4, 12: 8, 13: 6, 14: 5, 16: 4, 17: 8, 18: 6}
 """Number of corners by Gmsh's types of elements, of first and second order."""
@@ -65,9 +65,6 @@ def read_msh(path: Path, units: str | None = None) -> Drawing:
     Args:
         path: The file.
         units: Unit of its coordinates; None means mm.
-
-    Raises:
-        UserError: If it cannot be read, or is neither plane nor of an extruded body.
     """
     unit = UNITS[units or "mm"]
     raw = _raw(path, unit)

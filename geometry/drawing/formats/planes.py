@@ -24,11 +24,7 @@ def axes_across(normal: FloatArray) -> FloatArray:
 
 
 def plane_of(text: str) -> tuple[FloatArray, float]:
-    """Unit normal, shape (3,), and offset of a plane given as `z = 6`.
-
-    Raises:
-        UserError: If the text gives no plane.
-    """
+    """Unit normal, shape (3,), and offset of a plane given as `z = 6`."""
     found = re.fullmatch(r"\s*([xyz])\s*=\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*", text)
     if not found:
         raise UserError(f'cannot read the plane {text!r}; write such as "z = 6"')

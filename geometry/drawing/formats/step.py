@@ -44,9 +44,6 @@ def read_step(path: Path, units: str | None = None, plane: str | None = None) ->
         path: The file.
         units: What the file's mm really are; None means mm.
         plane: Plane of the cut, such as `z = 6`; None means across an extruded solid.
-
-    Raises:
-        UserError: If it cannot be read, holds several bodies, or a solid is not extruded and no plane given.
     """
     bodies, markers = _parts(path)
     if len(bodies) != 1:

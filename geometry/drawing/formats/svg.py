@@ -36,9 +36,6 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     Args:
         path: The file.
         units: Unit of the user space; None means by `width`, `height` and `viewBox`, or pixels without them.
-
-    Raises:
-        UserError: If it cannot be read or its curves do not close.
     """
     try:
         root = ET.parse(path).getroot()
