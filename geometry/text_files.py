@@ -1,6 +1,6 @@
-"""TOML and JSON files that people give: every way in which one cannot be read is a line.
+"""Reads TOML and JSON files of users and refuses an unreadable one in one line.
 
-A byte order mark, as editors of Windows write it, is no fault.
+A byte order mark, which editors of Windows write, is accepted.
 """
 
 import json

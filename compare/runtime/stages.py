@@ -6,7 +6,7 @@ from contextlib import ExitStack, closing, contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import (
@@ -20,12 +20,9 @@ from rich.progress import (
 from rich.table import Column
 
 from compare.runtime.provenance import cores, machine
-from geometry.processes import Pool, ProcessFailed
+from geometry.processes import Input, Output, Pool, ProcessFailed
 from solvers.solver import Progress as Report
 from solvers.solver import UnsupportedProblemError
-
-Input = TypeVar("Input")
-Output = TypeVar("Output")
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 

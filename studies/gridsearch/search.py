@@ -1,8 +1,7 @@
 """The paper's grid search: a sweep over two settings of its network, ranked by the distance from `fem`."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from math import inf
+from dataclasses import asdict
 
 from rich.table import Table
 
@@ -13,44 +12,13 @@ from geometry.atomic import write_json
 from geometry.cache import finger_mesh
 from geometry.drawing.drawn_finger import finger_from
 from solvers.problem import Problem
-from studies.sweep.measurement import Measurement
+from studies.gridsearch.chart import draw_grid
+from studies.gridsearch.training_run import GridPoint, TrainingRun, best_of
 from studies.sweep.quantities import TRAINING, heading
 from studies.sweep.study import Range, Study, Value, load_of, material_of
 from studies.sweep.sweep import SweepJob, run_sweep
 
 SOLVER = "pinn-std"
-TRAINED, DIVERGED, FAILED = "trained", "diverged", "failed"
-
-
-@dataclass(frozen=True)
-class GridPoint:
-    """A learning rate of the optimiser and a weight of the boundary conditions, MPa/mm²."""
-
-    learning_rate: float
-    bc_weight: float
-
-
-@dataclass(frozen=True)
-class TrainingRun:
-    """The end of the training at a point of the grid: the quantities of `TRAINING`, None unless trained."""
-
-    point: GridPoint
-    status: str
-    message: str
-    measured: Mapping[str, float] | None = None
-
-    @classmethod
-    def of(cls, point: GridPoint, ended: Measurement) -> "TrainingRun":
-        """The run of a sample."""
-        if measured := {name: ended.values[name] for name in TRAINING if name in ended.values}:
-            measured["epochs"] = int(measured["epochs"])
-            return cls(point, TRAINED, ended.message, measured)
-        return cls(point, DIVERGED if ended.state == "not converged" else FAILED, ended.message)
-
-    @property
-    def distance(self) -> float:
-        """Relative L2 difference of the displacement from `fem`; infinite unless trained."""
-        return self.measured["rel_l2_displacement"] if self.measured else inf
 
 
 def grid_study(
@@ -98,8 +66,6 @@ def search_grid(
     Raises:
         UserError: If the search cannot be done, or the folder holds something else.
     """
-    from studies.gridsearch.chart import draw_grid
-
     stages = stages or Stages(quiet=True)
     task = job.maker().task(0, {})
     finger, material, load = finger_from(task.definition), material_of(task), load_of(task)
@@ -126,11 +92,6 @@ def search_grid(
     }
     write_json(job.out / "gridsearch.json", content)
     return runs
-
-
-def best_of(runs: Sequence[TrainingRun]) -> TrainingRun | None:
-    """The run nearest to `fem`; None if none was trained."""
-    return min((run for run in runs if run.measured), key=lambda run: run.distance, default=None)
 
 
 def _row(rank: int, run: TrainingRun) -> dict[str, Cell]:

@@ -51,7 +51,8 @@ def gridsearch(
         out: Output folder; default out/gridsearch-DESIGN.
     """
     from compare.runtime.stages import Stages
-    from studies.gridsearch.search import FAILED, best_of, grid_study, runs_table, search_grid
+    from studies.gridsearch.search import grid_study, runs_table, search_grid
+    from studies.gridsearch.training_run import FAILED, best_of
     from studies.sweep.sweep import SweepJob
 
     design, mesh = finger.read(options.preset)

@@ -3,7 +3,7 @@
 from matplotlib.patches import Rectangle
 
 from studies.gridsearch.chart import draw_grid
-from studies.gridsearch.search import DIVERGED, TRAINED, GridPoint, TrainingRun
+from studies.gridsearch.training_run import DIVERGED, TRAINED, GridPoint, TrainingRun
 from studies.sweep.quantities import TRAINING
 from tests.compare.figures.drawn_pages import page_of
 

@@ -24,16 +24,8 @@ from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 from solvers.solution import DisplacementField, Solution
 from solvers.solver import TrainingDiverged
-from studies.gridsearch.search import (
-    DIVERGED,
-    FAILED,
-    TRAINED,
-    GridPoint,
-    TrainingRun,
-    best_of,
-    grid_study,
-    search_grid,
-)
+from studies.gridsearch.search import grid_study, search_grid
+from studies.gridsearch.training_run import DIVERGED, FAILED, TRAINED, GridPoint, TrainingRun, best_of
 from studies.sweep.measurement import Measurement, measured
 from studies.sweep.quantities import TRAINING, training
 from studies.sweep.study import Study, Task
