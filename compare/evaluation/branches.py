@@ -46,10 +46,6 @@ def with_branches(evaluations: Sequence[Evaluation], problem: Problem) -> tuple[
     on from each on the finite elements of `fem-nonlinear`. If it ends in several stable equilibria, their
     energies there say which one is the least; the prescribed motion does no other work. A found contact, a
     body in three dimensions and solvers that were given markers are left out.
-
-    Args:
-        evaluations: Sampled on the problem's mesh.
-        problem: What was solved; each evaluation knows its own law.
     """
     judged, remarks = {evaluation.solver: evaluation for evaluation in evaluations}, []
     comparable = [

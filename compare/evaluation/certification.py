@@ -37,15 +37,11 @@ REGIONS = {
 
 
 def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
-    """Certify the evaluations of the linear law and judge their convergence.
+    """Certify the evaluations of the linear law, sampled on the problem's mesh, and judge their convergence.
 
     The least energy settles the question for the linear law only, whose energy is quadratic. It does not
     judge a solver that was given observations, which pays energy for them, a body in three dimensions, nor a
     found contact. Without DOLFINx there are no certificates, and a warning says so.
-
-    Args:
-        evaluations: Sampled on the problem's mesh.
-        problem: What was solved; each evaluation knows its own law.
     """
 
     def certifiable(evaluation: Evaluation) -> bool:

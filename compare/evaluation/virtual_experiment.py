@@ -103,13 +103,7 @@ def no_displacements(problem: Problem, marker_radius: float, reason: str) -> Obs
 def simulate(
     problem: Problem, progress: Progress = silent, truth: Truth = SLIDING, **settings: object
 ) -> Solution:
-    """Solve the problem of `virtual_experiment` anew.
-
-    Args:
-        problem: The finger, with the walls of the truth, and its load.
-        progress: Called with the fraction of the simulation.
-        truth: Gives law and kind of load.
-        settings: Of the solver that simulates it.
+    """Solve the problem of `virtual_experiment` anew, on a mesh with the walls of the truth.
 
     Raises:
         UserError: If it cannot be run.

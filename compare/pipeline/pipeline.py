@@ -81,12 +81,7 @@ def run(job: Job, stages: Stages) -> Comparison:
 
 
 def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
-    """Mesh, solve and evaluate, without pictures and report.
-
-    Args:
-        job: Checked, with its film tracked.
-        stages: Shows the progress.
-        folder: For solutions and checkpoints as they are finished, from which a resumed run goes on.
+    """Mesh, solve and evaluate a checked job without film; solutions and checkpoints go into the folder.
 
     Raises:
         UserError: If the mesh, the virtual experiment or a solver refuses.

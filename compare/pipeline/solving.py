@@ -64,13 +64,8 @@ def solve_all(
 ) -> Outcome:
     """Solve the problem with every solver, or take over the results of an earlier run.
 
-    Args:
-        job: The comparison.
-        solvers: The solvers of the job that support the problem, in their order.
-        problem: Without the marker displacements, which only some solvers are given.
-        observations: The marker displacements.
-        folder: For solutions and checkpoints as they are finished.
-        stages: Shows the progress.
+    Solutions and checkpoints go into the folder as they are finished. Only some solvers are given the
+    observations.
 
     Raises:
         UserError: If a solver refuses, the reference fails, or all fail.

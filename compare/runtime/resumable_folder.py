@@ -20,15 +20,7 @@ from solvers.problem import Load, Material
 def job_definition(
     design: Finger, mesh: MeshSettings, material: Material, load: Load, module: str
 ) -> dict[str, Any]:
-    """Everything that the result of a job on a finger depends on.
-
-    Args:
-        design: The finger.
-        mesh: Element sizes.
-        material: The elastic law.
-        load: The prescribed displacement of the contact.
-        module: Name of the module that makes the result.
-    """
+    """Everything that the result of a job on a finger depends on, if the module of this name makes it."""
     return {
         "schema": 1,
         "design": design.definition(),
