@@ -69,7 +69,8 @@ class Said:
         pass
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """The program; its classes must not be of `__main__`, which other processes do not know."""
     solving.LARGE = 0
     solvers = Ending("waiting", laws=("linear",)), Ending(sys.argv[2])
     with interruptible():

@@ -20,11 +20,13 @@ from compare.pipeline.job import Job
 from compare.pipeline.solving import Outcome, solve_all
 from compare.runtime.stages import Stages
 from geometry.errors import UserError
+from geometry.processes import Pool
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from tests.compare.pipeline.endings import DESIGN, MARKERS, PROBLEM, Ending
 
 ROOT = Path(__file__).parents[3]
+PROGRAM = "from tests.compare.pipeline.endings import main; main()"
 
 
 @pytest.fixture
@@ -46,11 +48,12 @@ def solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tupl
 def in_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Both parts in this process: quicker, where no test looks at processes."""
 
-    def here(work, tasks, *, processes, report):
-        for name, task in tasks.items():
-            yield name, work(task, partial(report, name))
+    class Here(Pool):
+        def answers(self, work, tasks, *, report):
+            for name, task in tasks.items():
+                yield name, work(task, partial(report, name))
 
-    monkeypatch.setattr(solving, "in_processes", here)
+    monkeypatch.setattr(solving, "Pool", Here)
     monkeypatch.setattr(solving, "end_with_parent", lambda: None)
 
 
@@ -118,7 +121,7 @@ def test_the_end_of_a_second_process_is_one_line_of_the_first(solve, name, messa
 )
 def test_no_process_outlives_the_run(tmp_path, name, ending):
     program = subprocess.Popen(
-        [sys.executable, "-m", "tests.compare.pipeline.endings", str(tmp_path), name],
+        [sys.executable, "-c", PROGRAM, str(tmp_path), name],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
