@@ -1,9 +1,8 @@
 """The boundary-value problem: the argument of every solver."""
 
 from dataclasses import dataclass
-from math import cos, inf, radians, sin
-from numbers import Real
-from typing import Literal, Self
+from math import cos, radians, sin
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -29,14 +28,24 @@ LEAST_TRAVEL = 1e-9
 """Smallest displacement of an indenter that moves, mm: a hundredth of an atom's size."""
 
 
+def _number(default: float | None, low: float, high: float, unit: str, meaning: str, **limits: Any) -> Any:
+    """A number with its unit, the ends of the range that a study may span, and the limits of pydantic."""
+    return Field(
+        default=default,
+        description=meaning,
+        json_schema_extra={"unit": unit, "low": low, "high": high},
+        **limits,
+    )
+
+
 class Material(CheckedModel):
     """An isotropic elastic material; by default the paper's, Agilus30 and VeroUltra mixed to Shore 85A.
 
     A `UserError` says that a constant is out of its range, or that the law is not given for plane stress.
     """
 
-    young: float = Field(default=11.4, gt=0, description="Young's modulus, MPa")
-    poisson: float = Field(default=0.45, gt=-1, lt=0.5, description="Poisson's ratio")
+    young: float = _number(11.4, 1e-6, 1e7, "MPa", "Young's modulus", gt=0)
+    poisson: float = _number(0.45, -0.99, 0.4999, "", "Poisson's ratio", gt=-1, lt=0.5)
     #: Plane "strain" (thick finger) or plane "stress" (the equations that the paper prints)
     plane: Literal["strain", "stress"] = "strain"
     law: LawName = "linear"  #: "linear" is Hooke's law; the others are of finite strain
@@ -112,44 +121,6 @@ class Load(CheckedModel):
             raise ValueError("the cylinder does not move; prescribe a displacement (mm)")
         return self
 
-    @classmethod
-    def of_travel(
-        cls,
-        kind: LoadKind = "mean",
-        *,
-        stroke: float = 10.0,
-        direction: float = 0.0,
-        slide: bool = False,
-        radius: float | None = None,
-    ) -> Self:
-        """The load of an indenter that travels in one direction.
-
-        Args:
-            kind: See the class.
-            stroke: Travel, mm.
-            direction: Of the travel, degrees: 0 into the finger, 90 along it to the tip.
-            slide: Whether the contact slides along the finger: u is free.
-            radius: Of a cylinder, mm; None means `RADIUS`.
-
-        Raises:
-            UserError: If the indenter does not press, or a value is no number or does not go with the kind.
-        """
-        for name, value in (("stroke", stroke), ("direction", direction)):
-            if not isinstance(value, Real):
-                raise UserError(f"{name} {value!r} is no number")
-        if not 0 < stroke < inf:
-            raise UserError(f"stroke {stroke:g}: the indenter presses; give its travel, above 0 mm")
-        if not -90 < direction < 90:
-            raise UserError(f"direction {direction:g}: give an angle between -90 and 90 degrees")
-        if slide and direction:
-            raise UserError("slide leaves the travel along the finger free, so that direction says nothing")
-        along, into = sin(radians(direction)), cos(radians(direction))
-        return cls(
-            kind=kind,
-            displacement=(None if slide else stroke * along, -stroke * into),
-            radius=RADIUS if kind == "cylinder" and radius is None else radius,
-        )
-
     @property
     def prescribed(self) -> list[int]:
         """The components (0 for u, 1 for v) that are prescribed."""
@@ -159,6 +130,44 @@ class Load(CheckedModel):
     def values(self) -> FloatArray:
         """The prescribed components' displacements, shape (1,) or (2,), mm."""
         return np.array([value for value in self.displacement if value is not None], dtype=np.float64)
+
+
+class Physics(Material):
+    """Material and load by the names that options, files and studies share.
+
+    The load is that of an indenter that travels in one direction.
+
+    Raises:
+        UserError: If the indenter does not press, or a value does not go with the kind of load.
+    """
+
+    load: LoadKind = "mean"  #: See `Load`
+    stroke: float = _number(10.0, 1e-6, 1e4, "mm", "Travel of the indenter")
+    #: 0 into the finger, 90 along it to the tip
+    direction: float = _number(0.0, -89, 89, "deg", "Direction of the travel")
+    slide: bool = False  #: Whether the contact slides along the finger: u is free
+    radius: float | None = _number(None, 1e-6, 1e4, "mm", "Radius of a cylinder; none means 5 mm")
+
+    @model_validator(mode="after")
+    def _presses(self) -> Self:
+        if self.stroke <= 0:
+            raise ValueError(f"stroke {self.stroke:g}: the indenter presses; give its travel, above 0 mm")
+        if not -90 < self.direction < 90:
+            raise ValueError(f"direction {self.direction:g}: give an angle between -90 and 90 degrees")
+        if self.slide and self.direction:
+            raise ValueError("slide leaves the travel along the finger free, so that direction says nothing")
+        return self
+
+    @property
+    def parts(self) -> tuple[Material, Load]:
+        """Material and load."""
+        along, into = sin(radians(self.direction)), cos(radians(self.direction))
+        load = Load(
+            kind=self.load,
+            displacement=(None if self.slide else self.stroke * along, -self.stroke * into),
+            radius=RADIUS if self.load == "cylinder" and self.radius is None else self.radius,
+        )
+        return Material(**self.model_dump(include=set(Material.model_fields))), load
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,9 @@ from hypothesis.strategies import SearchStrategy
 
 from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.presets import load_design, preset_names
+from geometry.mesh.settings import MeshSettings
 from solvers.registry import make_solver
-from studies.sweep.study import LOAD, MATERIAL, PHYSICS, Task, parameter_limits
+from studies.sweep.study import PHYSICS, Task, parameter_limits
 
 WILD: tuple[Any, ...] = (
     *(nan, inf, -inf, -1.0, 0, -0.0, 1e-300, 5e-324, 1e300, 2**63, 10**400, True, None, "", "2 mm", "nan"),
@@ -142,10 +143,8 @@ def inputs(draw: st.DrawFn, solver: str = "fem") -> Given:
     if not gentle and draw(st.booleans()):
         name = draw(st.sampled_from([*(NAMES if definition else ()), *PHYSICS]))
         (physics if name in PHYSICS else definition)[name] = draw(st.sampled_from(WILD))
-    material = {name: physics[name] for name in MATERIAL if name in physics}
-    load = {"kind" if name == "load" else name: physics[name] for name in LOAD if name in physics}
-    size, density = draw(st.sampled_from((2.0, 4.0, 8.0, 20.0))), draw(st.floats(1e-3, 30))
-    return Given(Task(0, definition, size, material, load, solver, settings, density), sketch)
+    mesh, density = MeshSettings(size=draw(st.sampled_from((2.0, 4.0, 8.0, 20.0)))), draw(st.floats(1e-3, 30))
+    return Given(Task(0, definition, mesh, physics, solver, settings, density), sketch)
 
 
 def _definition(draw: st.DrawFn, gentle: bool) -> dict[str, Any]:

@@ -4,9 +4,8 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
@@ -21,7 +20,7 @@ from geometry.mesh.settings import MeshSettings
 from geometry.text_files import parse_toml
 from pinnray.options.preset_jobs import job_defaults
 from solvers.elasticity import LawName
-from solvers.problem import Load, LoadKind, Material
+from solvers.problem import Load, LoadKind, Material, Physics
 from solvers.registry import PRESETS, make_solver
 from solvers.solver import Solver
 
@@ -164,23 +163,10 @@ class PhysicsOptions:
     slide: Flag = False
 
     def read(self, preset: str | None = None) -> tuple[Material, Load]:
-        """The material and the load; a preset of the solvers may choose the kind of load."""
-        if self.young == inf:
-            raise UserError("--young inf: a rigid finger does not bend; give a finite Young's modulus, MPa")
-        kind = self.load or job_defaults(preset).load
-        try:
-            load = Load.of_travel(
-                kind, stroke=self.stroke, direction=self.direction, slide=self.slide, radius=self.radius
-            )
-        except UserError as error:
-            known = ("stroke", "direction", "slide")
-            raise UserError(f"--{error}" if str(error).startswith(known) else str(error)) from None
-        material = Material(
-            young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"
-        )
-        return material, load
+        """Material and load; a preset of the solvers may choose the kind of load."""
+        return Physics(**self.values(preset)).parts
 
-    def values(self, preset: str | None = None) -> dict[str, bool | float | str]:
+    def values(self, preset: str | None = None) -> dict[str, Any]:
         """Material and load by the names of a study."""
         given = {**asdict(self), "load": self.load or job_defaults(preset).load}
         return {name: value for name, value in given.items() if value is not None}

@@ -14,7 +14,7 @@ from geometry.finger.section import cavity_ends, rib_feet, rib_pitch
 from geometry.finger.validation import broken_rule
 from solvers.problem import Load, Material
 from studies.emulator.frame import Frame
-from studies.sweep.study import LOAD, MATERIAL, PHYSICS, WHOLE, Range, Study, Value, unit_of
+from studies.sweep.study import PHYSICS, WHOLE, Range, Study, Value, physics_of, unit_of
 
 WIDE = 1.8
 """Ratio of a range's ends from which the logarithm of the parameter is taken."""
@@ -92,10 +92,7 @@ class Inputs:
 
     def physics(self, finger: Mapping[str, Value]) -> tuple[Material, Load]:
         """Material and load of a finger."""
-        values = {**self.study.fixed, **finger}
-        material = {name: values[name] for name in MATERIAL if name in values}
-        load = {"kind" if name == "load" else name: values[name] for name in LOAD if name in values}
-        return Material.model_validate(material), Load.of_travel(**load)  # type: ignore[arg-type]
+        return physics_of({**self.study.fixed, **finger})
 
     def numbers(self, fingers: Sequence[Mapping[str, Value]], shapes: Sequence[Parameters]) -> Numbers:
         """The numbers of fingers and their parameters."""

@@ -15,7 +15,7 @@ from solvers.problem import Problem
 from studies.gridsearch.chart import draw_grid
 from studies.gridsearch.training_run import GridPoint, TrainingRun, best_of
 from studies.sweep.quantities import TRAINING, heading
-from studies.sweep.study import Range, Study, Value, load_of, material_of
+from studies.sweep.study import Range, Study, Value, physics_of
 from studies.sweep.sweep import SweepJob, run_sweep
 
 SOLVER = "pinn-std"
@@ -68,7 +68,7 @@ def search_grid(
     """
     stages = stages or Stages(quiet=True)
     task = job.maker().task(0, {})
-    finger, material, load = finger_from(task.definition), material_of(task), load_of(task)
+    finger, (material, load) = finger_from(task.definition), physics_of(task.physics)
     sweep = run_sweep(job, stages)
     problem = Problem(finger_mesh(finger, settings=task.mesh), material, load)
     points = [GridPoint(*map(float, sample.values())) for sample in sweep.samples]

@@ -21,7 +21,7 @@ from solvers.solver import solved, with_law
 from studies.optimum.pictures import draw_front, draw_front_fingers, draw_growth
 from studies.optimum.search import Optimum
 from studies.sweep.quantities import QUANTITIES, heading
-from studies.sweep.study import Task, TaskMaker, load_of, material_of, title
+from studies.sweep.study import Task, TaskMaker, physics_of, title
 
 PAGE = "front.html"
 
@@ -148,8 +148,8 @@ def _solved(task: Task) -> Solution:
     finger = finger_from(task.definition)
     mesh = finger_mesh(finger, settings=task.mesh)
     solver = make_solver(task.solver, **task.settings)
-    material = with_law(material_of(task), solver)
-    return solved(solver, Problem(mesh, material, load_of(task), finger=finger))
+    material, load = physics_of(task.physics)
+    return solved(solver, Problem(mesh, with_law(material, solver), load, finger=finger))
 
 
 def _write_design(task: Task, path: Path) -> Path:

@@ -17,7 +17,7 @@ from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solver import Solver, TrainedSolver, TrainingContext, TrainingDiverged
 from studies.sweep.quantities import FRACTIONS, quantities
-from studies.sweep.study import Task, load_of, material_of
+from studies.sweep.study import Task, physics_of
 
 State = Literal["done", "not converged", "refused", "failed"]
 """`refused`: the design breaks a rule or the solver does not take it; `failed`: an error of the program."""
@@ -62,7 +62,7 @@ def measured(task: Task) -> Measurement:
         if "section" not in task.definition and (fault := broken_rule(Parameters(**task.definition))):
             return ended("refused", fault)
         finger = finger_from(task.definition)
-        material, load = material_of(task), load_of(task)
+        material, load = physics_of(task.physics)
         mesh = finger_mesh(finger, settings=task.mesh, keep=task.checkpoints is not None)
         problem = Problem(mesh, material, load, finger=finger)
         solver: Solver = make_solver(task.solver, **task.settings)

@@ -23,14 +23,12 @@ from geometry.finger.parameters import (
 from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
 from geometry.text_files import read_toml
-from solvers.problem import Load, LoadKind, Material
+from solvers.problem import Load, Material, Physics
 from solvers.registry import make_solver
 from solvers.solver import Solver, Traits, check_load
 
-MATERIAL = ("young", "poisson", "plane", "law")
-LOAD = ("load", "stroke", "direction", "slide", "radius")
-PHYSICS = (*MATERIAL, *LOAD)
-"""Parameters of material and load, by the names of the options of `compare`."""
+PHYSICS = tuple(Physics.model_fields)
+"""Parameters of material and load."""
 
 DRAWN = ("depth", "contact", "contact_width")
 """Parameters of a drawing that a study can change."""
@@ -173,8 +171,7 @@ class Task:
         number: Of the sample in its study.
         definition: Of the finger; rules are checked by the worker.
         mesh: Element sizes.
-        material: Values of `Material`.
-        load: Arguments of `Load.of_travel`.
+        physics: Values of `Physics`.
         solver: Name of the solver.
         settings: Its settings.
         density: Of the material, g/cm^3.
@@ -184,8 +181,7 @@ class Task:
     number: int
     definition: dict[str, Any]
     mesh: MeshSettings
-    material: dict[str, Any]
-    load: dict[str, Any]
+    physics: dict[str, Any]
     solver: str
     settings: dict[str, Value]
     density: float
@@ -238,7 +234,7 @@ class TaskMaker:
         )
         kinds = study.varied["load"].values if "load" in study.varied else None
         for kind in kinds or (study.fixed.get("load", "mean"),):
-            check_load(study.made_solver(), Load.of_travel(_kind(kind)))
+            check_load(study.made_solver(), physics_of({"load": kind})[1])
 
     def task(self, number: int, sample: Mapping[str, Value]) -> Task:
         """The task of a sample."""
@@ -247,8 +243,6 @@ class TaskMaker:
         values = {
             name: value for name, value in values.items() if not name.startswith(f"{self._study.solver}.")
         }
-        material = {name: values[name] for name in MATERIAL if name in values}
-        load = {"kind" if name == "load" else name: values[name] for name in LOAD if name in values}
         shape = {name: value for name, value in values.items() if name not in PHYSICS}
         if "section" in shape:
             definition = self._drawing(shape)
@@ -260,8 +254,7 @@ class TaskMaker:
             number,
             definition,
             self.mesh,
-            material,
-            load,
+            {name: value for name, value in values.items() if name in PHYSICS},
             self._study.solver,
             {**self._study.settings, **settings},
             self._study.density,
@@ -282,14 +275,13 @@ class TaskMaker:
         return self._drawn[key]
 
 
-def material_of(task: Task) -> Material:
-    """The material of a task."""
-    return Material(**task.material)
+def physics_of(values: Mapping[str, Any]) -> tuple[Material, Load]:
+    """Material and load of a sample, from its values of `PHYSICS` among others.
 
-
-def load_of(task: Task) -> Load:
-    """The load of a task."""
-    return Load.of_travel(**task.load)
+    Raises:
+        UserError: If they do not go together.
+    """
+    return Physics(**{name: value for name, value in values.items() if name in PHYSICS}).parts
 
 
 def title(name: str) -> str:
@@ -300,18 +292,7 @@ def title(name: str) -> str:
 
 def unit_of(name: str) -> str:
     """Unit of a parameter; empty where it has none."""
-    physics = {"young": "MPa", "stroke": "mm", "direction": "deg", "radius": "mm"}
-    if name in Parameters.model_fields:
-        return str(parameter_info(name, "unit"))
-    return physics.get(name, "")
-
-
-def _kind(value: Value) -> LoadKind:
-    known: tuple[LoadKind, ...] = ("mean", "point", "patch", "cylinder")
-    for kind in known:
-        if value == kind:
-            return kind
-    raise UserError(f"load = {value!r}: give one of {', '.join(known)}")
+    return str(parameter_info(name, "unit") or parameter_info(name, "unit", Physics))
 
 
 def _check_name(name: str, *, drawn: bool) -> None:
@@ -349,7 +330,5 @@ def _check_range(name: str, values: Range, sampling: str) -> None:
 
 def parameter_limits(name: str) -> tuple[float, float]:
     """Smallest and largest value of a parameter that is a number."""
-    if name in Parameters.model_fields:
-        return float(parameter_info(name, "low")), float(parameter_info(name, "high"))
-    limits = {"young": (1e-6, 1e7), "poisson": (-0.99, 0.4999), "direction": (-89.0, 89.0)}
-    return limits.get(name, (1e-6, 1e4))
+    model = Parameters if name in Parameters.model_fields else Physics
+    return float(parameter_info(name, "low", model)), float(parameter_info(name, "high", model))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from solvers.problem import Load, Material, Problem, contact_ends, contact_functional, contact_nodes
+from solvers.problem import Load, Material, Physics, Problem, contact_ends, contact_functional, contact_nodes
 
 
 def test_the_mean_is_weighted_by_a_raised_cosine(coarse_mesh):
@@ -76,8 +76,11 @@ def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):
     [
         (lambda: Material(young=-1.0), "young = -1.0: input should be greater than 0"),
         (lambda: Material(young=1e300), r"young = 1e\+300: no solid has this Young's modulus"),
-        (lambda: Material(young=True), "young = 'true' is not a finite number$"),
-        (lambda: Material(young=np.ones(99)), r"young = array\(.* is not a finite number$"),  # many lines
+        (lambda: Material(young=True), "young = 'true' is not a finite number; give one from"),
+        (
+            lambda: Material(young=np.ones(99)),
+            r"young = array\(.* is not a finite number; give",
+        ),  # many lines
         (lambda: Material(poisson=0.5), "poisson = 0.5: .* less than 0.5"),  # no displacement formulation
         (lambda: Material(law="gent", plane="stress"), "the gent law is given for plane strain only"),
         (lambda: Material(youngs=1), "unknown parameter 'youngs'; did you mean young"),
@@ -104,5 +107,5 @@ def test_impossible_materials_and_loads_are_one_line(make, message):
 @pytest.mark.parametrize("value", [[1.0], (1, 2), "ten", None, 1j])
 @pytest.mark.parametrize("name", ["stroke", "direction"])
 def test_a_travel_is_a_number(name: str, value: object) -> None:
-    with pytest.raises(UserError, match=f"{name} .* is no number"):
-        Load.of_travel(**{name: value})
+    with pytest.raises(UserError, match=f"{name} = .* is not a finite number"):
+        Physics(**{name: value})

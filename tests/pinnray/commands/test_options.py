@@ -1,11 +1,14 @@
 """Options of every command: --quiet, defaults in its help, completion in a shell."""
 
 import re
+from dataclasses import fields
 
 import pytest
 
 from pinnray.cli import main
 from pinnray.commands.app import pinnray
+from pinnray.options.shared import PhysicsOptions
+from solvers.problem import Physics
 
 NAMES = [name for name in pinnray if not name.startswith("-")]
 
@@ -80,3 +83,9 @@ def test_a_shell_completes_commands_and_options(tmp_path):
     assert main(["--install-completion", "--shell", "bash", "--output", str(script)]) == 0
     text = script.read_text(encoding="utf-8")
     assert all(word in text for word in (*NAMES, "--mesh-size", "--seed"))
+
+
+def test_options_of_material_and_load_have_the_names_and_the_defaults_of_the_schema() -> None:
+    """But for law and load, whose default is the solver's or the preset's."""
+    own = {field.name: field.default for field in fields(PhysicsOptions)}
+    assert own | {"law": "linear", "load": "mean"} == Physics().model_dump()

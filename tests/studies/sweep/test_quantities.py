@@ -12,7 +12,7 @@ from geometry.finger.section import rib_pitch
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
+from solvers.problem import Load, Material, Physics, Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution, Status
 from studies.sweep.quantities import (
@@ -129,7 +129,7 @@ def test_walls_and_gaps_of_a_finger_with_known_ones() -> None:
 
 @pytest.mark.slow
 def test_a_cylinder_at_finite_strain_has_every_quantity() -> None:
-    pressed = replace(PROBLEM, load=Load.of_travel("cylinder"))
+    pressed = replace(PROBLEM, load=Physics(load="cylinder").parts[1])
     solution, found = quantities(FINGER, pressed, make_solver("fem-nonlinear"), density=1.2)
     assert solution.status.converged
     assert np.isfinite(list(found.values())).all()

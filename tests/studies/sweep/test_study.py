@@ -6,7 +6,7 @@ import pytest
 
 from geometry.errors import UserError
 from studies.sweep.sampling import samples
-from studies.sweep.study import TaskMaker, load_of, load_study
+from studies.sweep.study import TaskMaker, load_study, physics_of
 
 GOOD = 'sampling = "sobol"\nsamples = 4\n[varied]\nrib_thickness = {from = 1, to = 2}\n'
 
@@ -94,8 +94,9 @@ def test_a_task_has_the_fixed_and_the_sampled_values(tmp_path: Path) -> None:
     task = TaskMaker(study, tmp_path).task(1, samples(study)[1])
     assert task.definition["rib_count"] == 3
     assert task.definition["rib_thickness"] == samples(study)[1]["rib_thickness"]
-    assert task.material == {"young": 5.0}
-    assert load_of(task).displacement == pytest.approx((2.0, -4.0 * 0.75**0.5))
+    material, load = physics_of(task.physics)
+    assert material.young == 5.0
+    assert load.displacement == pytest.approx((2.0, -4.0 * 0.75**0.5))
 
 
 def test_a_design_beside_the_study_is_meant_from_there(tmp_path: Path) -> None:

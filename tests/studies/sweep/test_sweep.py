@@ -78,9 +78,9 @@ def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
     assert "ribs" in refused.message
     task = maker.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
     assert measured(task).state == "done"
-    pressed = measured(replace(task, load={**task.load, "stroke": 60.0}))
+    pressed = measured(replace(task, physics={**task.physics, "stroke": 60.0}))
     assert (pressed.state, pressed.through_itself) == ("done", True)
-    soft = measured(replace(task, load={**task.load, "stroke": 0.001}))
+    soft = measured(replace(task, physics={**task.physics, "stroke": 0.001}))
     assert "this looks like metres" in soft.message
     remarks = Sweep(study, [{}] * 2, [pressed, replace(soft, number=0)]).remarks
     assert [remark.partition(";")[0] for remark in remarks] == [
