@@ -218,7 +218,7 @@ BAD = [
     ("solve fem --out folder.vtu", "--out folder.vtu: this is a folder; name a file that ends in .vtu"),
     ("design --design finger.toml --formats svg --out .", "this would overwrite finger.toml, which is read"),
     ("design --section beam.svg --set depth=5 --set depth=6", "depth is set twice"),
-    ("design --section beam.svg --clamp '[[nan, 0], [0, -10]]'", r"clamp = \[\[nan, .* is no pair of points"),
+    ("design --section beam.svg --clamp '[[nan, 0], [0, -10]]'", r"clamp = \[\[nan, .*no pair of points"),
     ("fiducials --marker-plane nan", "workspace: marker_plane: Input should be a finite number"),
     ("fiducials --marker-plane 1e9", "workspace: marker_plane: Input should be less than or equal to 1000"),
     ("fiducials --square 1e9", "a square of 1e[+]09 mm; its side must be 0.2 to 1000 mm"),
