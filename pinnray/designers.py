@@ -33,15 +33,16 @@ def sweep(study: str | Path, *, out: str | Path, processes: int | None = None) -
     Raises:
         UserError: If the study cannot be run, or the folder holds another one.
     """
+    from studies.sweep.job import StudyJob
     from studies.sweep.study import load_study
-    from studies.sweep.sweep import SweepJob, run_sweep
-    from studies.sweep.tables import table
+    from studies.sweep.sweep import run_sweep
+    from studies.sweep.tables import sample_table
 
     file = Path(study)
-    done = run_sweep(SweepJob(load_study(file), file.parent, Path(out), processes or cores()))
+    done = run_sweep(StudyJob(load_study(file), file.parent, Path(out), processes or cores()))
     for remark in done.remarks:
         warnings.warn(remark, stacklevel=2)
-    return table(done)
+    return sample_table(done)
 
 
 def predict(sweep: str | Path, fingers: Sequence[Mapping[str, object]]) -> "pd.DataFrame":
@@ -58,15 +59,15 @@ def predict(sweep: str | Path, fingers: Sequence[Mapping[str, object]]) -> "pd.D
     Raises:
         UserError: If the sweep has too few samples, or a finger is outside its ranges.
     """
+    from studies.emulator.emulator import prediction_table
     from studies.emulator.store import emulator_of
-    from studies.emulator.tables import table
 
     emulator = emulator_of(Path(sweep))
-    read = [emulator.read({name: str(value) for name, value in each.items()}) for each in fingers]
+    read = [emulator.inputs.read({name: str(value) for name, value in each.items()}) for each in fingers]
     for place, finger in enumerate(read):
-        if fault := emulator.fault(finger):
+        if fault := emulator.inputs.fault(finger):
             raise UserError(f"finger {place}: {fault}")
-    return table(emulator, read, emulator.predict(read))
+    return prediction_table(emulator, read, emulator.predict(read))
 
 
 def optimise(question: str | Path, *, out: str | Path, processes: int | None = None) -> "Optimum":
@@ -81,7 +82,8 @@ def optimise(question: str | Path, *, out: str | Path, processes: int | None = N
         UserError: If the question cannot be asked, the folder holds another one, or nothing is allowed.
     """
     from studies.optimum.question import load_question
-    from studies.optimum.search import OptimumJob, search_front
+    from studies.optimum.search import search_front
+    from studies.sweep.job import StudyJob
 
     file = Path(question)
-    return search_front(OptimumJob(load_question(file), file.parent, Path(out), processes or cores()))
+    return search_front(StudyJob(load_question(file), file.parent, Path(out), processes or cores()))

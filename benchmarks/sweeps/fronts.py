@@ -19,10 +19,10 @@ from compare.runtime.tables import terminal_table
 from geometry.arrays import FloatArray
 from studies.optimum.front import hypervolume, reference_point
 from studies.optimum.question import Limit, Question
-from studies.optimum.search import OptimumJob, search_front
+from studies.optimum.search import search_front
+from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement, measured
-from studies.sweep.sampling import value_at
-from studies.sweep.study import Study, TaskMaker
+from studies.sweep.sampling import sample_at
 
 RUNS, GENERATION = 120, 20
 SEEDS = (0, 1, 2)
@@ -38,16 +38,13 @@ VARIED = {
 
 def question(seed: int) -> Question:
     """Most wrap and most force, printable and not overstressed."""
-    study = Study(
+    return Question(
         name="fronts",
         mesh_size=1.0,
         samples=RUNS // 3,
         seed=seed,
         fixed={"marker_diameter": 0.4, "contact_position": 35.0},
         varied=VARIED,
-    )
-    return Question(
-        study=study,
         objectives={"wrap": "largest", "force": "largest"},
         constraints={"von_mises": Limit(at_most=1.5), "narrowest_gap": Limit(at_least=0.8)},
         runs=RUNS,
@@ -60,7 +57,7 @@ def main() -> Table:
     for seed in SEEDS:
         asked = question(seed)
         with tempfile.TemporaryDirectory() as folder:
-            ours = search_front(OptimumJob(asked, Path(folder), Path(folder) / "out", 2)).measurements
+            ours = search_front(StudyJob(asked, Path(folder), Path(folder) / "out", 2)).measurements
         results[seed] = _costs(asked, ours), _costs(asked, by_nsga2(asked))
     reference = reference_point(np.concatenate([costs for pair in results.values() for costs in pair]))
     rows = []
@@ -73,16 +70,14 @@ def main() -> Table:
 
 def by_nsga2(asked: Question) -> list[Measurement]:
     """Every run of NSGA-II; a finger that cannot be made counts as a run, as it does there."""
-    maker = TaskMaker(asked.study, Path())
+    job = StudyJob(asked, Path(), Path() / "out")
     runs: list[Measurement] = []
 
     class Solved(Problem):  # type: ignore[misc] # pymoo has no annotations
         def _evaluate(self, places: FloatArray, out: dict[str, Any], *_: object, **__: object) -> None:
             costs, excess = [], []
             for row in places:
-                pairs = zip(asked.study.varied.items(), row, strict=True)
-                finger = {name: value_at(name, values, float(at)) for (name, values), at in pairs}
-                found = measured(maker.task(len(runs), finger))
+                found = measured(job.task(len(runs), sample_at(asked, row)))
                 runs.append(found)
                 done = found.state == "done"
                 costs.append(asked.costs(found.values) if done else [1e9] * len(asked.objectives))
@@ -90,7 +85,7 @@ def by_nsga2(asked: Question) -> list[Measurement]:
             out["F"], out["G"] = np.array(costs), np.array(excess)
 
     problem = Solved(n_var=len(VARIED), n_obj=2, n_ieq_constr=3, xl=0.0, xu=1.0)
-    minimize(problem, NSGA2(pop_size=GENERATION), ("n_eval", RUNS), seed=asked.study.seed)
+    minimize(problem, NSGA2(pop_size=GENERATION), ("n_eval", RUNS), seed=asked.seed)
     return runs
 
 

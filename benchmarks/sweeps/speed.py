@@ -12,8 +12,9 @@ from pathlib import Path
 from rich.table import Table
 
 from compare.runtime.tables import terminal_table
+from studies.sweep.job import StudyJob
 from studies.sweep.study import Study
-from studies.sweep.sweep import SweepJob, run_sweep
+from studies.sweep.sweep import run_sweep
 
 VARIED = {
     "height": {"from": 80, "to": 110},
@@ -58,5 +59,5 @@ def _seconds(count: int, processes: int) -> float:
     study = Study(name="rate", samples=count, fixed={"marker_diameter": 0.4}, varied=VARIED)
     with tempfile.TemporaryDirectory() as folder:
         started = time.perf_counter()
-        run_sweep(SweepJob(study, Path(folder), Path(folder) / "out", processes))
+        run_sweep(StudyJob(study, Path(folder), Path(folder) / "out", processes))
         return time.perf_counter() - started

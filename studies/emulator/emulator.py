@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
@@ -13,8 +14,8 @@ from geometry.finger.section import finger_section
 from geometry.section.section import Section
 from studies.emulator.gaussian_process import GaussianProcess
 from studies.emulator.inputs import Inputs, Numbers
-from studies.sweep.quantities import QUANTITIES, narrowest_gap, thinnest_wall
-from studies.sweep.study import Study, Value
+from studies.sweep.quantities import QUANTITIES, heading, narrowest_gap, thinnest_wall
+from studies.sweep.study import Study, Value, title
 from studies.sweep.sweep import Sweep
 
 FEWEST = 60
@@ -95,21 +96,13 @@ class Emulator:
         """The quantities that it predicts."""
         return tuple(name for name in QUANTITIES if name in {*self.learnt, *self.ratios, *EXACT})
 
-    def read(self, settings: Mapping[str, str]) -> dict[str, Value]:
-        """A finger from texts by name or symbol; a `UserError` where one is no value of its parameter."""
-        return self.inputs.read(settings)
-
-    def fault(self, finger: Mapping[str, Value]) -> str | None:
-        """The reason why it does not predict a finger: range, unknown or missing parameter, broken rule."""
-        return self.inputs.fault(finger)
-
     def predict(
         self, fingers: Sequence[Mapping[str, Value]], names: Sequence[str] | None = None
     ) -> Predictions:
         """Predict quantities of fingers given by the study's varied parameters.
 
         Args:
-            fingers: Values of every varied parameter; see `fault`, which is not asked again.
+            fingers: Values of every varied parameter; see `Inputs.fault`, which is not asked again.
             names: Quantities; None means all. Those that follow from the section alone (`area`, `mass`,
                 `thinnest_wall`, `narrowest_gap`) are exact, and take most of the time.
         """
@@ -163,6 +156,22 @@ def fitted(sweep: Sweep, inputs: Inputs, stages: Stages | None = None, *, fewest
             learnt[name] = _learnt(known[name], name, numbers)
         progress(1.0, f"{len(order)} samples")
     return Emulator(inputs, learnt, ratios, len(order))
+
+
+def prediction_table(
+    emulator: Emulator, fingers: Sequence[Mapping[str, Value]], found: Predictions
+) -> pd.DataFrame:
+    """A row for every finger: its varied parameters, and each quantity with the ends of its interval.
+
+    A quantity that is exact for every finger has no columns for the ends.
+    """
+    columns = {title(name): [finger[name] for finger in fingers] for name in emulator.study.varied}
+    for place, name in enumerate(found.names):
+        low, high = found.low[:, place], found.high[:, place]
+        columns[heading(name)] = found.values[:, place].tolist()
+        if (low != high).any():
+            columns |= {f"{heading(name)}_low": low.tolist(), f"{heading(name)}_high": high.tolist()}
+    return pd.DataFrame(columns)
 
 
 def _learnt(values: FloatArray, name: str, numbers: Numbers) -> Learnt:

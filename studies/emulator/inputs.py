@@ -130,7 +130,7 @@ class Inputs:
         if chosen.values is not None and not _is_number(chosen):
             places = np.array([chosen.values.index(value) for value in values])
             return np.asarray(2.0 * np.eye(len(chosen.values))[places])
-        low, high = _ends(chosen)
+        low, high = chosen.ends
         numbers = np.array(values, dtype=np.float64)
         if low > 0 and high / low >= WIDE:
             low, high, numbers = np.log(low), np.log(high), np.log(numbers)
@@ -180,23 +180,13 @@ def _is_number(values: Range) -> bool:
     return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values.values or ())
 
 
-def _ends(values: Range) -> tuple[float, float]:
-    """Smallest and largest value of a range, or of choices that are numbers."""
-    if values.values is not None:
-        numbers = [float(each) for each in values.values]
-        return min(numbers), max(numbers)
-    assert values.low is not None
-    assert values.high is not None
-    return float(values.low), float(values.high)
-
-
 def _contains(name: str, values: Range, value: Value) -> bool:
     """Whether the sweep had the value within its range or among its choices."""
     if values.values is not None:
         return value in values.values
     if isinstance(value, bool | str):
         return False
-    low, high = _ends(values)
+    low, high = values.ends
     return low <= value <= high and (name not in WHOLE or float(value).is_integer())
 
 
@@ -219,7 +209,7 @@ def _read(name: str, values: Range, text: str) -> Value:
 def _in_words(name: str, values: Range) -> str:
     if values.values is not None:
         return f"one of {', '.join(map(_text, values.values))}"
-    low, high = _ends(values)
+    low, high = values.ends
     kind = "a whole number from " if name in WHOLE else ""
     return f"{kind}{low:g} to {high:g} {unit_of(name)}".rstrip()
 

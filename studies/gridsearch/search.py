@@ -14,9 +14,10 @@ from geometry.drawing.drawn_finger import finger_from
 from solvers.problem import Problem
 from studies.gridsearch.chart import draw_grid
 from studies.gridsearch.training_run import GridPoint, TrainingRun, best_of
+from studies.sweep.job import StudyJob
 from studies.sweep.quantities import TRAINING, heading
 from studies.sweep.study import Range, Study, Value, physics_of
-from studies.sweep.sweep import SweepJob, run_sweep
+from studies.sweep.sweep import run_sweep
 
 SOLVER = "pinn-std"
 
@@ -51,7 +52,7 @@ def grid_study(
 
 
 def search_grid(
-    job: SweepJob, stages: Stages | None = None, formats: Sequence[str] = ()
+    job: StudyJob[Study], stages: Stages | None = None, formats: Sequence[str] = ()
 ) -> list[TrainingRun]:
     """Train at every point of the grid that has no result yet, and write tables and picture.
 
@@ -67,7 +68,7 @@ def search_grid(
         UserError: If the search cannot be done, or the folder holds something else.
     """
     stages = stages or Stages(quiet=True)
-    task = job.maker().task(0, {})
+    task = job.task(0, {})
     finger, (material, load) = finger_from(task.definition), physics_of(task.physics)
     sweep = run_sweep(job, stages)
     problem = Problem(finger_mesh(finger, settings=task.mesh), material, load)

@@ -1,7 +1,6 @@
 """The page of a search: the front, its fingers, and a design file for each."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +18,11 @@ from solvers.registry import make_solver
 from solvers.solution import Solution
 from solvers.solver import solved, with_law
 from studies.optimum.pictures import draw_front, draw_front_fingers, draw_growth
+from studies.optimum.question import Question
 from studies.optimum.search import Optimum
+from studies.sweep.job import StudyJob, Task
 from studies.sweep.quantities import QUANTITIES, heading
-from studies.sweep.study import Task, TaskMaker, physics_of, title
+from studies.sweep.study import physics_of, title
 
 PAGE = "front.html"
 
@@ -34,32 +35,26 @@ DRAWN = 6
 """Largest number of fingers that are drawn."""
 
 
-@dataclass(frozen=True)
-class FrontFiles:
-    """Files of a search.
-
-    Attributes:
-        paths: Page and pictures.
-        designs: A design file for each run on the front.
-    """
-
-    paths: list[Path]
-    designs: list[Path]
-
-
 def write_front(
-    optimum: Optimum, maker: TaskMaker, folder: Path, record: dict[str, Any], formats: Collection[str] = ()
-) -> FrontFiles:
-    """Write the table, design files, pictures and page of a front, and return the paths.
+    optimum: Optimum,
+    job: StudyJob[Question],
+    folder: Path,
+    record: dict[str, Any],
+    formats: Collection[str] = (),
+) -> tuple[list[Path], list[Path]]:
+    """Write the table, design files, pictures and page of a front.
 
     Args:
         optimum: The search.
-        maker: Makes the tasks of its fingers.
+        job: The job that made it.
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
         formats: Of the pictures besides PNG.
+
+    Returns:
+        Page, table and pictures, and a design file for each run on the front.
     """
-    tasks = {run: maker.task(run, optimum.fingers[run]) for run in optimum.front}
+    tasks = {run: job.task(run, optimum.fingers[run]) for run in optimum.front}
     designs = [
         _write_design(task, folder / "front" / f"{place:02d}.toml")
         for place, task in enumerate(tasks.values(), start=1)
@@ -81,33 +76,33 @@ def write_front(
     page = write_html(
         folder / PAGE,
         "designs.html.j2",
-        title=f"Front of {optimum.question.study.name}",
-        sentences=summary(optimum),
+        title=f"Front of {optimum.question.name}",
+        sentences=front_sentences(optimum),
         tables=[grid],
         pictures=pictures,
         note=f"Files beside this page: {FILES}. Started {record['started']}.",
     )
-    return FrontFiles([page, folder / "front.csv", *pictures], designs)
+    return [page, folder / "front.csv", *pictures], designs
 
 
-def summary(optimum: Optimum) -> list[str]:
+def front_sentences(optimum: Optimum) -> list[str]:
     """The search in sentences."""
-    question, study = optimum.question, optimum.question.study
+    question = optimum.question
     senses = " and ".join(f"{sense} {name}" for name, sense in question.objectives.items())
     limits = []
     for name, limit in question.constraints.items():
         bounds = (("at least", limit.at_least), ("at most", limit.at_most))
         words = " and ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
         limits.append(f"{name} {words} {QUANTITIES[name].unit}".rstrip())
-    load = {name: value for name, value in study.fixed.items() if name in ("load", "stroke", "radius", "law")}
-    said = ", ".join(f"{name} = {value}" for name, value in load.items())
+    load = [name for name in question.fixed if name in ("load", "stroke", "radius", "law")]
+    said = ", ".join(f"{name} = {question.fixed[name]}" for name in load)
     allowed = f", with {', '.join(limits)}" if limits else ""
     crossed = sum(each.through_itself for each in optimum.measurements)
     itself = f" {crossed} runs do not count: the finger goes through itself." if crossed else ""
     return [
         f"Wanted: {senses}{allowed}. {len(optimum.front)} of {len(optimum.measurements)} runs of "
-        f"{study.solver} ({said + ', ' if said else ''}elements of {study.mesh_size:g} mm) are on the front: "
-        f"none of them is beaten in every objective by another run.{itself} "
+        f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are on the "
+        f"front: none of them is beaten in every objective by another run.{itself} "
         "An emulator proposed fingers; all numbers here are the solver's.",
         "A finger of the table: compare --design front/01.toml, or pinnray design --design front/01.toml for "
         "its CAD files.",
@@ -116,7 +111,7 @@ def summary(optimum: Optimum) -> list[str]:
 
 def front_grid(optimum: Optimum) -> TextTable:
     """A row for each run on the front: parameters and quantities."""
-    varied, first = list(optimum.question.study.varied), optimum.question.names
+    varied, first = list(optimum.question.varied), optimum.question.names
     others = [name for name in QUANTITIES if name not in first]
     rows: list[tuple[str, ...]] = []
     for place, run in enumerate(optimum.front, start=1):

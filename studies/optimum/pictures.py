@@ -21,7 +21,7 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
     first, second, *third = optimum.question.objectives
     with figure(3.9) as drawn:
         senses = ", ".join(f"{sense} {name}" for name, sense in optimum.question.objectives.items())
-        solver = optimum.question.study.solver
+        solver = optimum.question.solver
         rest = f"the third objective, {third[0]}, is not drawn" if third else "every point is a run"
         note = f"{len(optimum.measurements)} runs of {solver}; {rest}"
         write_heading(drawn, f"Pareto front: {senses}", note)

@@ -12,7 +12,7 @@ from geometry.arrays import FloatArray
 from studies.emulator.emulator import Emulator
 from studies.optimum.front import hypervolume, unbeaten
 from studies.optimum.question import Question
-from studies.sweep.sampling import place_of, value_at
+from studies.sweep.sampling import places_of, sample_at
 from studies.sweep.study import Value
 
 POPULATION, GENERATIONS = 60, 25
@@ -46,7 +46,7 @@ def proposals(
         count: Number of fingers.
         seed: Of NSGA-II.
     """
-    before = np.array([_places(question, finger) for finger in tried])
+    before = np.array([places_of(question, finger) for finger in tried])
     random = np.random.default_rng(seed).random((POPULATION, before.shape[1]))
     first = np.concatenate([before[-POPULATION // 2 :], random])[:POPULATION]
     found = minimize(
@@ -80,10 +80,10 @@ def proposals(
         if (
             number not in chosen
             and apart(number)
-            and emulator.fault(_finger(question, places[number])) is None
+            and emulator.inputs.fault(sample_at(question, places[number])) is None
         ):
             chosen.append(number)
-    return [_finger(question, places[number]) for number in chosen]
+    return [sample_at(question, places[number]) for number in chosen]
 
 
 class _Emulated(Problem):  # type: ignore[misc] # pymoo has no annotations
@@ -92,7 +92,7 @@ class _Emulated(Problem):  # type: ignore[misc] # pymoo has no annotations
     def __init__(self, question: Question, emulator: Emulator) -> None:
         self._question, self._emulator = question, emulator
         super().__init__(
-            n_var=len(question.study.varied),
+            n_var=len(question.varied),
             n_obj=len(question.objectives),
             n_ieq_constr=1 + len(question.constraints),
             xl=0.0,
@@ -100,8 +100,8 @@ class _Emulated(Problem):  # type: ignore[misc] # pymoo has no annotations
         )
 
     def _evaluate(self, places: FloatArray, out: dict[str, Any], *_: object, **__: object) -> None:
-        fingers = [_finger(self._question, row) for row in places]
-        sound = np.array([self._emulator.fault(finger) is None for finger in fingers])
+        fingers = [sample_at(self._question, row) for row in places]
+        sound = np.array([self._emulator.inputs.fault(finger) is None for finger in fingers])
         costs = np.full((len(fingers), self.n_obj), 1e9)
         excess = np.full((len(fingers), self.n_ieq_constr), 1e9)
         if sound.any():
@@ -119,16 +119,3 @@ class _Emulated(Problem):  # type: ignore[misc] # pymoo has no annotations
                 rows_excess.append([0.0, *self._question.excesses(values)])
             costs[sound], excess[sound] = rows_costs, rows_excess
         out["F"], out["G"] = costs, excess
-
-
-def _finger(question: Question, places: FloatArray) -> dict[str, Value]:
-    """The finger at places in the unit cube, shape (d,)."""
-    varied = question.study.varied.items()
-    return {
-        name: value_at(name, values, float(at)) for (name, values), at in zip(varied, places, strict=True)
-    }
-
-
-def _places(question: Question, finger: Mapping[str, Value]) -> list[float]:
-    """The places of a finger in the unit cube."""
-    return [place_of(name, values, finger[name]) for name, values in question.study.varied.items()]

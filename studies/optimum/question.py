@@ -42,17 +42,15 @@ class Limit(CheckedModel):
         return max(over, under)
 
 
-class Question(CheckedModel):
-    """Objectives and constraints over the parameters of a study.
+class Question(Study):
+    """A study with objectives and constraints; its samples are those that the search starts from.
 
     Attributes:
-        study: Parameters and solver; its samples are those that the search starts from.
         objectives: Two or three quantities, each to be the least or the largest.
         constraints: Limits of quantities.
         runs: Number of runs of the solver in all.
     """
 
-    study: Study
     objectives: dict[str, Sense] = Field(min_length=2, max_length=3)
     constraints: dict[str, Limit] = Field(default_factory=dict)
     runs: int = bounded(120, FEWEST, 100_000, "", "", "Number of runs of the solver")
@@ -62,7 +60,7 @@ class Question(CheckedModel):
         for name in (*self.objectives, *self.constraints):
             if name not in QUANTITIES:
                 raise ValueError(f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}")
-        if "section" in {*self.study.fixed, *self.study.varied}:
+        if "section" in {*self.fixed, *self.varied}:
             raise ValueError("a drawing has no parameters to optimise; give a design")
         return self
 
@@ -93,7 +91,9 @@ def load_question(path: Path) -> Question:
         UserError: If it cannot be read, or something in it is wrong.
     """
     content: dict[str, Any] = read_toml(path, "question")
-    own = {name: content.pop(name) for name in ("objectives", "constraints", "runs") if name in content}
+    own: dict[str, Any] = {
+        name: content.pop(name) for name in ("objectives", "constraints", "runs") if name in content
+    }
     try:
         if given := [name for name in ("sampling", "samples") if name in content]:
             raise UserError(f"{given[0]} belongs to a study; the search chooses its samples: give runs")
@@ -103,8 +103,8 @@ def load_question(path: Path) -> Question:
         own["constraints"] = {name: _limit(name, entry) for name, entry in limits.items()}
         runs = own.get("runs", 120)
         start = max(runs // 3, 2) if isinstance(runs, int) else 2
-        study = Study(**{"name": path.stem, **content, "sampling": "sobol", "samples": start})
-        return Question(study=study, **own)
+        chosen: dict[str, Any] = {**content, **own, "sampling": "sobol", "samples": start}
+        return Question(**{"name": path.stem, **chosen})
     except UserError as error:
         raise UserError(f"question {path}: {error}") from None
 

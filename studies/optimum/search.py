@@ -3,18 +3,15 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from compare.runtime.output_folder import locked
-from compare.runtime.provenance import package_versions
 from compare.runtime.resumable_folder import check_resumable_folder
 from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json
-from geometry.content_hash import sources_digest
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.validation import broken_rule
@@ -22,10 +19,11 @@ from studies.emulator.emulator import fitted
 from studies.emulator.inputs import Inputs
 from studies.optimum.front import hypervolume, reference_point, unbeaten
 from studies.optimum.question import Question
+from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement
 from studies.sweep.sampling import samples
 from studies.sweep.store import Journal, opened
-from studies.sweep.study import Study, TaskMaker, Value
+from studies.sweep.study import Value
 from studies.sweep.sweep import JOURNAL, Sweep, finish
 from studies.sweep.workers import Workers
 
@@ -39,25 +37,6 @@ ENOUGH = 12
 
 CANDIDATES = 64
 """Samples that are drawn at most for each that the search starts from, because some break a rule."""
-
-
-@dataclass(frozen=True)
-class OptimumJob:
-    """A search to run, and its output folder.
-
-    Attributes:
-        question: Objectives, constraints and parameters.
-        folder: Folder from which paths in the question are meant.
-        out: Output folder; runs that an earlier start finished there are kept.
-        processes: Worker processes on this machine.
-        scheduler: Address of a Dask scheduler whose workers are used instead.
-    """
-
-    question: Question
-    folder: Path
-    out: Path
-    processes: int
-    scheduler: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +64,7 @@ class Optimum:
         return 1 + self.front.index(run)
 
 
-def search_front(job: OptimumJob, stages: Stages | None = None) -> Optimum:
+def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optimum:
     """Search for the Pareto front with a given number of runs of the solver.
 
     A third of the runs are samples of a Sobol sequence. Then rounds follow: the emulator is fitted to all
@@ -95,9 +74,13 @@ def search_front(job: OptimumJob, stages: Stages | None = None) -> Optimum:
     Raises:
         UserError: If the question cannot be asked, the folder holds another one, or nothing is allowed.
     """
-    stages, question = stages or Stages(quiet=True), job.question
-    maker = TaskMaker(question.study, job.folder)
-    definition = _definition(question, maker)
+    stages, question = stages or Stages(quiet=True), job.study
+    definition = {
+        **job.definition(samples(question)[0], __name__),
+        "objectives": dict(question.objectives),
+        "constraints": {name: limit.model_dump() for name, limit in question.constraints.items()},
+        "runs": question.runs,
+    }
     check_resumable_folder(job.out / QUESTION_FILE, definition, job="search")
     job.out.mkdir(parents=True, exist_ok=True)
     with (
@@ -108,14 +91,14 @@ def search_front(job: OptimumJob, stages: Stages | None = None) -> Optimum:
         write_json(job.out / QUESTION_FILE, definition)
         journal.forget("failed")
         fingers = _known_fingers(job.out / FINGERS_FILE)
-        start = len(samples(question.study))
+        start = len(samples(question))
         if not fingers:
-            fingers = starting_fingers(question, maker, start)
+            fingers = starting_fingers(job, start)
             _keep_fingers(job.out / FINGERS_FILE, fingers)
         done = 0
         while True:
             with stages.stage(f"runs {done + 1} to {len(fingers)}") as progress:
-                tasks = {n: maker.task(n, finger) for n, finger in enumerate(fingers)}
+                tasks = {n: job.task(n, finger) for n, finger in enumerate(fingers)}
                 finish(tasks, journal, workers, progress)
             done = len(fingers)
             if done >= question.runs:
@@ -123,21 +106,21 @@ def search_front(job: OptimumJob, stages: Stages | None = None) -> Optimum:
             count = min(-(-(question.runs - start) // ROUNDS), question.runs - done)
             with stages.stage(f"proposals after {done}") as progress:
                 progress(0.0, "the emulator is fitted and searched")
-                fingers = fingers + _proposed(question, maker, fingers, journal, count)
+                fingers = fingers + _proposed(job, fingers, journal, count)
             _keep_fingers(job.out / FINGERS_FILE, fingers)
 
 
-def starting_fingers(question: Question, maker: TaskMaker, count: int) -> list[dict[str, Value]]:
+def starting_fingers(job: StudyJob[Question], count: int) -> list[dict[str, Value]]:
     """The first samples of the Sobol sequence that break no rule.
 
     Raises:
         UserError: If nearly all break one.
     """
-    many = question.study.model_copy(update={"samples": CANDIDATES * count})
+    many = job.study.model_copy(update={"samples": CANDIDATES * count})
     found: list[dict[str, Value]] = []
     fault: str | None = None
     for number, finger in enumerate(samples(many)):
-        why = broken_rule(Parameters(**maker.task(number, finger).definition))
+        why = broken_rule(Parameters(**job.task(number, finger).definition))
         fault = why or fault
         if why is None:
             found.append(finger)
@@ -150,15 +133,15 @@ def starting_fingers(question: Question, maker: TaskMaker, count: int) -> list[d
 
 
 def _proposed(
-    question: Question, maker: TaskMaker, fingers: list[dict[str, Value]], journal: Journal, count: int
+    job: StudyJob[Question], fingers: list[dict[str, Value]], journal: Journal, count: int
 ) -> list[dict[str, Value]]:
     """The next fingers; random ones if the emulator has none that are apart from the others."""
     from studies.optimum.proposals import proposals
 
-    measured = journal.measurements()
-    inputs = Inputs(question.study, maker.task(0, fingers[0]).definition)
+    question, measured = job.study, journal.measurements()
+    inputs = Inputs(question, job.task(0, fingers[0]).definition)
     with threadpool_limits(1):  # the same sums, whatever the number of cores
-        emulator = fitted(Sweep(question.study, fingers, measured), inputs, fewest=ENOUGH)
+        emulator = fitted(Sweep(question, fingers, measured), inputs, fewest=ENOUGH)
         costs = _allowed_costs(question, measured)
         every = np.array([question.costs(each.values) for each in measured if each.state == "done"])
         found = proposals(
@@ -168,9 +151,9 @@ def _proposed(
             fingers,
             reference_point(every),
             count=count,
-            seed=question.study.seed + len(fingers),
+            seed=question.seed + len(fingers),
         )
-    more = starting_fingers(question, maker, len(fingers) + count)[len(fingers) :]
+    more = starting_fingers(job, len(fingers) + count)[len(fingers) :]
     return found + more[: count - len(found)]
 
 
@@ -209,22 +192,6 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
     signs = [1.0 if sense == "least" else -1.0 for sense in question.objectives.values()]
     point = dict(zip(question.objectives, map(float, reference * signs), strict=True))
     return Optimum(question, fingers, measured, on_front, np.array(volumes), point)
-
-
-def _definition(question: Question, maker: TaskMaker) -> dict[str, Any]:
-    """The question, and everything else on which its results depend."""
-    study: Study = question.study
-    first = maker.task(0, samples(study)[0]).definition
-    return {
-        "schema": 1,
-        "study": study.model_dump(mode="json", by_alias=True, exclude_none=True),
-        "objectives": dict(question.objectives),
-        "constraints": {name: limit.model_dump() for name, limit in question.constraints.items()},
-        "runs": question.runs,
-        "finger": {name: value for name, value in first.items() if name not in study.varied},
-        "versions": package_versions(),
-        "program_sha256": sources_digest(__name__, type(study.made_solver()).__module__),
-    }
 
 
 def _known_fingers(file: Path) -> list[dict[str, Value]]:

@@ -16,8 +16,9 @@ from geometry.finger.validation import broken_rule
 from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solver import Solver, TrainedSolver, TrainingContext, TrainingDiverged
+from studies.sweep.job import Task
 from studies.sweep.quantities import FRACTIONS, quantities
-from studies.sweep.study import Task, physics_of
+from studies.sweep.study import physics_of
 
 State = Literal["done", "not converged", "refused", "failed"]
 """`refused`: the design breaks a rule or the solver does not take it; `failed`: an error of the program."""

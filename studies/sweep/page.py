@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from compare.runtime import html
+from studies.sweep.job import StudyJob
 from studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs, draw_sensitivity
 from studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
-from studies.sweep.study import TaskMaker
+from studies.sweep.study import Study
 from studies.sweep.sweep import Sweep
 from studies.sweep.tables import failure_grid, quantity_grid
 
@@ -22,13 +23,13 @@ SAMPLED = {"grid": "on a grid", "latin": "of a Latin hypercube", "sobol": "of a 
 
 
 def write_page(
-    sweep: Sweep, maker: TaskMaker, folder: Path, record: dict[str, Any], formats: Collection[str] = ()
+    sweep: Sweep, job: StudyJob[Study], folder: Path, record: dict[str, Any], formats: Collection[str] = ()
 ) -> list[Path]:
     """Write the pictures and the page, and return the paths.
 
     Args:
         sweep: The sweep.
-        maker: Makes the fingers of its samples.
+        job: The job that ran it.
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
         formats: Of the pictures besides PNG.
@@ -39,7 +40,7 @@ def write_page(
         drawn = {
             "pairs": (draw_pairs(sweep), "Quantities over the varied parameters, a dot for each finger."),
             "fingers": (
-                draw_fingers(sweep, maker),
+                draw_fingers(sweep, job),
                 "The fingers with the least, the median and the largest value of a quantity, to one scale.",
             ),
         }
@@ -51,7 +52,7 @@ def write_page(
         folder / PAGE,
         "designs.html.j2",
         title=f"Sweep {sweep.study.name}",
-        sentences=summary(sweep),
+        sentences=sweep_sentences(sweep),
         tables=[quantity_grid(sweep), *([failures] if failures.rows else [])],
         pictures=pictures,
         note=f"Files beside this page: {FILES}. Started {record['started']}.",
@@ -59,18 +60,15 @@ def write_page(
     return [page, *pictures]
 
 
-def summary(sweep: Sweep) -> list[str]:
+def sweep_sentences(sweep: Sweep) -> list[str]:
     """The sweep in sentences."""
     study = sweep.study
-    how = {"grid": "on a grid", "latin": "of a Latin hypercube", "sobol": "of a Sobol sequence"}[
-        study.sampling
-    ]
     found, good = len(sweep.measurements), len(sweep.good)
     varied = ", ".join(f"{name} ({_range(values)})" for name, values in study.varied.items())
     fixed = ", ".join(f"{name} = {value}" for name, value in study.fixed.items())
     sentences = [
-        f"{found} of {len(sweep.samples)} samples {how} were run; {good} have a converged result by "
-        f"{study.solver} with elements of {study.mesh_size:g} mm.",
+        f"{found} of {len(sweep.samples)} samples {SAMPLED[study.sampling]} were run; {good} have a "
+        f"converged result by {study.solver} with elements of {study.mesh_size:g} mm.",
         f"Varied: {varied}. The rest is that of the design {study.design}"
         + (f", with {fixed}." if fixed else "."),
     ]

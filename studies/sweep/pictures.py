@@ -14,9 +14,10 @@ from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.finger.picture import draw_section
 from geometry.mesh.boundary import boundary_edges
 from solvers.solution import Solution
+from studies.sweep.job import StudyJob
 from studies.sweep.quantities import QUANTITIES, kink_points, turn
 from studies.sweep.sensitivity import TRUSTED, Sensitivity
-from studies.sweep.study import TaskMaker, unit_of
+from studies.sweep.study import Study, unit_of
 from studies.sweep.sweep import Sweep
 
 SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
@@ -103,14 +104,14 @@ def draw_sensitivity(found: Mapping[str, Sensitivity]) -> Figure:
     return drawn
 
 
-def draw_fingers(sweep: Sweep, maker: TaskMaker) -> Figure:
+def draw_fingers(sweep: Sweep, job: StudyJob[Study]) -> Figure:
     """Draw, to one scale, the fingers with the least, the median and the largest value of each quantity."""
     names = [name for name in SHOWN[:4] if _varies(sweep, name)]
     chosen = []
     for name in names:
         ranked = sorted(sweep.good, key=lambda each: each.values[name])
         for each in (ranked[0], ranked[len(ranked) // 2], ranked[-1]):
-            finger = finger_from(maker.task(each.number, sweep.samples[each.number]).definition)
+            finger = finger_from(job.task(each.number, sweep.samples[each.number]).definition)
             chosen.append((finger, each.number, name, each.values[name]))
     low = np.min([finger.section.bounds[0] for finger, *_ in chosen], axis=0)
     high = np.max([finger.section.bounds[1] for finger, *_ in chosen], axis=0)

@@ -1,7 +1,7 @@
 """The samples of a study: a grid, a Latin hypercube or a Sobol sequence over its varied parameters."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from math import prod
 
@@ -28,10 +28,7 @@ def samples(study: Study) -> list[dict[str, Value]]:
             raise UserError(f"the grid has {count:,} samples; at most {MOST:,} can be run")
         return [dict(zip(names, values, strict=True)) for values in product(*axes)]
     places = unit_points(study.sampling, len(names), study.samples or 0, study.seed)
-    return [
-        {name: value_at(name, study.varied[name], float(at)) for name, at in zip(names, row, strict=True)}
-        for row in places
-    ]
+    return [sample_at(study, row) for row in places]
 
 
 def unit_points(sampling: str, dimensions: int, count: int, seed: int) -> FloatArray:
@@ -44,11 +41,22 @@ def unit_points(sampling: str, dimensions: int, count: int, seed: int) -> FloatA
         return np.asarray(qmc.Sobol(dimensions, scramble=True, rng=random).random(count))
 
 
+def sample_at(study: Study, places: FloatArray) -> dict[str, Value]:
+    """The sample at places from 0 to 1 of the varied parameters' ranges, shape (d,)."""
+    pairs = zip(study.varied.items(), places, strict=True)
+    return {name: value_at(name, values, float(at)) for (name, values), at in pairs}
+
+
+def places_of(study: Study, sample: Mapping[str, Value]) -> list[float]:
+    """The places of a sample: the inverse of `sample_at`."""
+    return [place_of(name, values, sample[name]) for name, values in study.varied.items()]
+
+
 def value_at(name: str, values: Range, place: float) -> Value:
     """The value of a parameter at a place from 0 to 1 of its range."""
     if values.values is not None:
         return values.values[min(int(place * len(values.values)), len(values.values) - 1)]
-    low, high = _ends(values)
+    low, high = values.ends
     if name in WHOLE:
         return min(int(low + place * (high - low + 1)), int(high))
     return low + place * (high - low)
@@ -58,7 +66,7 @@ def place_of(name: str, values: Range, value: Value) -> float:
     """The place from 0 to 1 of a value in a parameter's range: the inverse of `value_at`."""
     if values.values is not None:
         return (values.values.index(value) + 0.5) / len(values.values)
-    low, high = _ends(values)
+    low, high = values.ends
     if name in WHOLE:
         return (float(value) - low + 0.5) / (high - low + 1)
     return (float(value) - low) / (high - low)
@@ -68,14 +76,8 @@ def grid_values(name: str, values: Range) -> Sequence[Value]:
     """The values of a parameter on a grid."""
     if values.values is not None:
         return values.values
-    low, high = _ends(values)
+    low, high = values.ends
     if name in WHOLE:
         count = values.count or int(high - low) + 1
         return sorted({round(value) for value in np.linspace(low, high, count)})
     return [float(value) for value in np.linspace(low, high, values.count or 2)]
-
-
-def _ends(values: Range) -> tuple[float, float]:
-    assert values.low is not None
-    assert values.high is not None
-    return float(values.low), float(values.high)

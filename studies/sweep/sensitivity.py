@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from geometry.arrays import FloatArray, IntArray
-from studies.sweep.sampling import place_of
+from studies.sweep.sampling import places_of
 from studies.sweep.sweep import Sweep
 
 DEGREES = (1, 2, 3, 4, 5)
@@ -50,7 +50,8 @@ def sensitivities(sweep: Sweep, names: Sequence[str]) -> dict[str, Sensitivity]:
         names: Of the quantities.
     """
     parameters = list(sweep.study.varied)
-    places = unit_places(sweep)
+    rows = [places_of(sweep.study, sweep.samples[each.number]) for each in sweep.good]
+    places = np.array(rows).reshape(-1, len(parameters))
     found = {}
     for name in names:
         values = np.array([each.values[name] for each in sweep.good])
@@ -60,16 +61,6 @@ def sensitivities(sweep: Sweep, names: Sequence[str]) -> dict[str, Sensitivity]:
         if np.ptp(values[known]) > 1e-9 * np.abs(values[known]).max():
             found[name] = _indices(places[known], values[known], parameters)
     return found
-
-
-def unit_places(sweep: Sweep) -> FloatArray:
-    """Places of the converged samples in the unit cube of the varied parameters, shape (n, d)."""
-    varied = sweep.study.varied
-    rows = [
-        [place_of(name, values, sweep.samples[each.number][name]) for name, values in varied.items()]
-        for each in sweep.good
-    ]
-    return np.array(rows).reshape(-1, len(varied))
 
 
 def _indices(places: FloatArray, values: FloatArray, parameters: Sequence[str]) -> Sensitivity:

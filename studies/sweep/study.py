@@ -1,17 +1,13 @@
 """A parameter study as its file describes it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from geometry.cache import drawn_finger
-from geometry.drawing.description import description_beside, load_description
 from geometry.errors import UserError
-from geometry.finger.finger import Finger
 from geometry.finger.parameters import (
     SYMBOLS,
     CheckedModel,
@@ -20,12 +16,10 @@ from geometry.finger.parameters import (
     parameter_info,
     unknown_parameter,
 )
-from geometry.finger.presets import load_design
-from geometry.mesh.settings import MeshSettings
 from geometry.text_files import read_toml
 from solvers.problem import Load, Material, Physics
 from solvers.registry import make_solver
-from solvers.solver import Solver, Traits, check_load
+from solvers.solver import Solver, Traits
 
 PHYSICS = tuple(Physics.model_fields)
 """Parameters of material and load."""
@@ -57,6 +51,12 @@ class Range(CheckedModel):
     high: float | None = Field(default=None, alias="to")
     count: int | None = bounded(None, 2, MOST, "", "", "Number of values on a grid")
     values: tuple[Value, ...] | None = Field(default=None, min_length=1)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest value, of numbers."""
+        numbers = [float(each) for each in self.values or (self.low, self.high) if each is not None]
+        return min(numbers), max(numbers)
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -163,31 +163,6 @@ class Study(CheckedModel):
         return solver
 
 
-@dataclass(frozen=True)
-class Task:
-    """One sample as a worker gets it.
-
-    Attributes:
-        number: Of the sample in its study.
-        definition: Of the finger; rules are checked by the worker.
-        mesh: Element sizes.
-        physics: Values of `Physics`.
-        solver: Name of the solver.
-        settings: Its settings.
-        density: Of the material, g/cm^3.
-        checkpoints: Folder of a training that can be resumed; None for none.
-    """
-
-    number: int
-    definition: dict[str, Any]
-    mesh: MeshSettings
-    physics: dict[str, Any]
-    solver: str
-    settings: dict[str, Value]
-    density: float
-    checkpoints: Path | None = None
-
-
 def load_study(path: Path) -> Study:
     """The study in a TOML file.
 
@@ -199,80 +174,6 @@ def load_study(path: Path) -> Study:
         return Study(**{"name": path.stem, **content})
     except UserError as error:
         raise UserError(f"study {path}: {error}") from None
-
-
-class TaskMaker:
-    """Makes tasks of samples; reads the design and the drawings of a study once.
-
-    Args:
-        study: The study.
-        folder: Folder from which paths in the study are meant.
-        finger: The finger from which the samples differ, in place of the study's design.
-        mesh: Element sizes, in place of the study's size.
-        checkpoints: Folder of trainings that can be resumed, if only settings of the solver are varied.
-
-    Raises:
-        UserError: If a file cannot be read, or the solver does not take the load.
-    """
-
-    def __init__(
-        self,
-        study: Study,
-        folder: Path,
-        finger: Finger | None = None,
-        mesh: MeshSettings | None = None,
-        checkpoints: Path | None = None,
-    ) -> None:
-        self._study = study
-        self._folder = folder
-        self.mesh = mesh or MeshSettings(size=study.mesh_size)
-        self._checkpoints = checkpoints
-        self._drawn: dict[tuple[str, ...], dict[str, Any]] = {}
-        near = folder / study.design
-        self._base = finger or load_design(
-            near if near.suffix == ".toml" and near.is_file() else study.design
-        )
-        kinds = study.varied["load"].values if "load" in study.varied else None
-        for kind in kinds or (study.fixed.get("load", "mean"),):
-            check_load(study.made_solver(), physics_of({"load": kind})[1])
-
-    def task(self, number: int, sample: Mapping[str, Value]) -> Task:
-        """The task of a sample."""
-        settings = self._study.settings_of(sample)
-        values = {**self._study.fixed, **sample}
-        values = {
-            name: value for name, value in values.items() if not name.startswith(f"{self._study.solver}.")
-        }
-        shape = {name: value for name, value in values.items() if name not in PHYSICS}
-        if "section" in shape:
-            definition = self._drawing(shape)
-        elif self._study.settings_alone:
-            definition = {**self._base.definition(), **shape}
-        else:
-            definition = {**self._base.definition(), **shape, "name": f"{self._study.name}-{number}"}
-        return Task(
-            number,
-            definition,
-            self.mesh,
-            {name: value for name, value in values.items() if name in PHYSICS},
-            self._study.solver,
-            {**self._study.settings, **settings},
-            self._study.density,
-            self._checkpoints / "_".join(f"{key}-{value}" for key, value in settings.items())
-            if self._checkpoints and self._study.settings_alone
-            else None,
-        )
-
-    def _drawing(self, shape: Mapping[str, Value]) -> dict[str, Any]:
-        """The definition of a drawn finger."""
-        lines = tuple(f"{name} = {value}" for name, value in shape.items() if name != "section")
-        key = (str(shape["section"]), *lines)
-        if key not in self._drawn:
-            file = self._folder / key[0]
-            self._drawn[key] = drawn_finger(
-                file, load_description(description_beside(file), lines)
-            ).definition()
-        return self._drawn[key]
 
 
 def physics_of(values: Mapping[str, Any]) -> tuple[Material, Load]:

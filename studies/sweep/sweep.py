@@ -4,60 +4,27 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from compare.evaluation.deformed_body import ADVICE
 from compare.evaluation.plausibility import LOOKS_LIKE
 from compare.runtime.output_folder import check_links, locked
-from compare.runtime.provenance import package_versions
 from compare.runtime.resumable_folder import check_resumable_folder
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
-from geometry.content_hash import sources_digest
 from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
 from geometry.text_files import read_json
 from solvers.solver import Progress, silent
+from studies.sweep.job import StudyJob, Task
 from studies.sweep.measurement import Measurement
 from studies.sweep.sampling import samples
 from studies.sweep.store import Journal, opened
-from studies.sweep.study import Study, Task, TaskMaker, Value
+from studies.sweep.study import Study, Value
 from studies.sweep.workers import Workers
 
 STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
 
 FEW = 5
 """Samples that a remark names."""
-
-
-@dataclass(frozen=True)
-class SweepJob:
-    """A sweep to run, and its output folder.
-
-    Attributes:
-        study: The study.
-        folder: Folder from which paths in the study are meant.
-        out: Output folder; samples that an earlier start finished there are kept.
-        processes: Worker processes on this machine.
-        scheduler: Address of a Dask scheduler whose workers are used instead.
-        finger: The finger of all samples, in place of the study's design.
-        mesh: Its element sizes, in place of the study's size.
-        kind: What messages call the job.
-    """
-
-    study: Study
-    folder: Path
-    out: Path
-    processes: int
-    scheduler: str | None = None
-    finger: Finger | None = None
-    mesh: MeshSettings | None = None
-    kind: str = "sweep"
-
-    def maker(self) -> TaskMaker:
-        """The maker of the samples' tasks."""
-        return TaskMaker(self.study, self.folder, self.finger, self.mesh, self.out / "runs")
 
 
 @dataclass(frozen=True)
@@ -91,7 +58,7 @@ class Sweep:
         return found
 
 
-def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
+def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
     """Run every sample of a study that has no result yet, and keep each result at once.
 
     Samples that failed by an error of the program are tried again; refused ones are not, because the same
@@ -102,9 +69,8 @@ def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
     """
     stages = stages or Stages(quiet=True)
     all_samples = samples(job.study)
-    maker = job.maker()
-    tasks = {number: maker.task(number, sample) for number, sample in enumerate(all_samples)}
-    definition = _definition(job, tasks[0])
+    tasks = {number: job.task(number, sample) for number, sample in enumerate(all_samples)}
+    definition = {**job.definition(all_samples[0], __name__), "mesh": job.mesh and job.mesh.model_dump()}
     free = {"study.samples"} if job.study.sampling == "sobol" else set()  # which may be continued
     if trainings := job.study.settings_alone:
         free = {"study.varied"}  # the trainings of another grid go on from their checkpoints
@@ -138,18 +104,6 @@ def finish(
         journal.add(answer)
         known.add(answer.number)
         progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
-
-
-def _definition(job: SweepJob, first: Task) -> dict[str, Any]:
-    """The study, and everything else on which its results depend."""
-    return {
-        "schema": 1,
-        "study": job.study.model_dump(mode="json", by_alias=True, exclude_none=True),
-        "finger": {name: of for name, of in first.definition.items() if name not in job.study.varied},
-        "mesh": job.mesh and job.mesh.model_dump(),
-        "versions": package_versions(),
-        "program_sha256": sources_digest(__name__, type(job.study.made_solver()).__module__),
-    }
 
 
 def load_sweep(folder: Path) -> Sweep:

@@ -17,7 +17,7 @@ FEW = 5
 """Numbers of samples that the table of failures lists for a reason."""
 
 
-def table(sweep: Sweep) -> pd.DataFrame:
+def sample_table(sweep: Sweep) -> pd.DataFrame:
     """A row for every finished sample: number, varied parameters, state, quantities, time and message."""
     rows = []
     for each in sweep.measurements:
@@ -31,7 +31,7 @@ def table(sweep: Sweep) -> pd.DataFrame:
 
 def write_tables(sweep: Sweep, folder: Path) -> list[Path]:
     """Write `samples.parquet` and `samples.csv`, and return the paths."""
-    frame = table(sweep)
+    frame = sample_table(sweep)
     buffer = BytesIO()
     frame.to_parquet(buffer, engine="pyarrow", index=False)
     write_bytes(folder / "samples.parquet", buffer.getvalue())

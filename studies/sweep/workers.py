@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Self
 
 from geometry.errors import UserError
 from geometry.processes import Pool, ProcessFailed
+from studies.sweep.job import Task
 from studies.sweep.measurement import Measurement, measured
-from studies.sweep.study import Task
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -53,7 +53,7 @@ def gridsearch(
     from compare.runtime.stages import Stages
     from studies.gridsearch.search import grid_study, runs_table, search_grid
     from studies.gridsearch.training_run import FAILED, best_of
-    from studies.sweep.sweep import SweepJob
+    from studies.sweep.job import StudyJob
 
     design, mesh = finger.read(options.preset)
     finger.check_cost(design, mesh, ["fem"])
@@ -63,7 +63,7 @@ def gridsearch(
         design.name, read_settings(options, epochs), physics.values(options.preset), rates, weights
     )
     physics.check_law([study.made_solver()])
-    job = SweepJob(
+    job = StudyJob(
         study,
         Path(),
         out or Path("out") / f"gridsearch-{design.name}",

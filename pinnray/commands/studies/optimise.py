@@ -32,25 +32,24 @@ def optimise(
     from compare.runtime.tables import terminal_table
     from studies.optimum.page import front_grid, write_front
     from studies.optimum.question import load_question
-    from studies.optimum.search import OptimumJob, search_front
-    from studies.sweep.study import TaskMaker
+    from studies.optimum.search import search_front
+    from studies.sweep.job import StudyJob
 
     formats = read_formats(pictures)
     read = load_question(question)
-    folder = out or Path("out") / f"optimum-{read.study.name}"
-    job = OptimumJob(read, question.parent, folder, read_processes(processes), scheduler)
+    folder = out or Path("out") / f"optimum-{read.name}"
+    job = StudyJob(read, question.parent, folder, read_processes(processes), scheduler)
     try:
         with Stages() as stages:
             found = search_front(job, stages)
             with stages.stage("pictures"):
-                maker = TaskMaker(read.study, question.parent)
-                files = write_front(found, maker, folder, stages.record(), formats)
+                paths, designs = write_front(found, job, folder, stages.record(), formats)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {folder} keeps") from None
     grid = front_grid(found)
     columns = [0, *range(2, 2 + len(read.objectives))]  # the table in the file is too wide for a terminal
     rows = [[row[column] for column in columns] for row in grid.rows]
     Console().print(terminal_table(grid.title, [grid.headings[column] for column in columns], rows))
-    for path in [*files.paths, files.designs[0], files.designs[-1]]:
+    for path in [*paths, designs[0], designs[-1]]:
         print(path)
     return 0

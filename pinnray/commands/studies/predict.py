@@ -37,8 +37,8 @@ def predict(
     """
     from compare.runtime.stages import Stages
     from geometry.atomic import write_text
+    from studies.emulator.emulator import prediction_table
     from studies.emulator.store import emulator_of
-    from studies.emulator.tables import table
 
     if bool(set) == (csv is not None):
         raise UserError(
@@ -47,7 +47,7 @@ def predict(
     if out is not None and csv is None:
         raise UserError("--out is for the predictions of --csv")
     existing(csv)
-    rows = read_rows(csv) if csv else [read_settings(set)]
+    rows = read_rows(csv) if csv else [finger_given(set)]
     with Stages() as stages:
         emulator = emulator_of(sweep, refit=refit, stages=stages)
     fingers = [read_finger(emulator, row, f"{csv}, row {place}: " if csv else "") for place, row in rows]
@@ -56,12 +56,12 @@ def predict(
         print_table(emulator, found)
         return 0
     path = out or csv.with_name(f"{csv.stem}-predicted.csv")
-    write_text(path, table(emulator, fingers, found).to_csv(index=False, lineterminator="\n"))
+    write_text(path, prediction_table(emulator, fingers, found).to_csv(index=False, lineterminator="\n"))
     print(path)
     return 0
 
 
-def read_settings(settings: tuple[str, ...]) -> tuple[int, dict[str, str]]:
+def finger_given(settings: tuple[str, ...]) -> tuple[int, dict[str, str]]:
     """The finger of the option --set."""
     from geometry.finger.parameters import SYMBOLS
 
@@ -104,8 +104,8 @@ def read_rows(file: Path) -> list[tuple[int, dict[str, str]]]:
 def read_finger(emulator: "Emulator", settings: dict[str, str], where: str) -> "dict[str, Value]":
     """A finger that the emulator predicts; else a `UserError`."""
     try:
-        finger = emulator.read(settings)
-        if fault := emulator.fault(finger):
+        finger = emulator.inputs.read(settings)
+        if fault := emulator.inputs.fault(finger):
             raise UserError(fault)
     except UserError as error:
         raise UserError(f"{where}{error}") from None

@@ -30,21 +30,22 @@ def sweep(
     """
     from compare.runtime.stages import Stages
     from compare.runtime.tables import terminal_table
+    from studies.sweep.job import StudyJob
     from studies.sweep.page import write_page
-    from studies.sweep.study import TaskMaker, load_study
-    from studies.sweep.sweep import SweepJob, run_sweep
+    from studies.sweep.study import load_study
+    from studies.sweep.sweep import run_sweep
     from studies.sweep.tables import failure_grid, quantity_grid, write_tables
 
     formats = read_formats(pictures)
     read = load_study(study)
     folder = out or Path("out") / f"sweep-{read.name}"
-    job = SweepJob(read, study.parent, folder, read_processes(processes), scheduler)
+    job = StudyJob(read, study.parent, folder, read_processes(processes), scheduler)
     try:
         with Stages() as stages:
             done = run_sweep(job, stages)
             written = write_tables(done, folder)
             with stages.stage("pictures"):
-                written += write_page(done, TaskMaker(read, study.parent), folder, stages.record(), formats)
+                written += write_page(done, job, folder, stages.record(), formats)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {folder} keeps") from None
     quantities, failures = quantity_grid(done), failure_grid(done)

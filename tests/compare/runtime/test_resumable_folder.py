@@ -8,8 +8,9 @@ from compare.runtime.resumable_folder import check_resumable_folder
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from studies.sweep import sweep
+from studies.sweep.job import StudyJob
 from studies.sweep.study import Range, Study
-from studies.sweep.sweep import SweepJob, run_sweep
+from studies.sweep.sweep import run_sweep
 
 
 class Killed(BaseException):
@@ -50,5 +51,5 @@ def test_a_sweep_killed_before_its_definition_is_there_leaves_no_file(tmp_path, 
     study = Study(name="ribs", samples=2, varied={"rib_angle": Range(**{"from": 0, "to": 10})})
     monkeypatch.setattr(sweep, "write_json", killed)
     with pytest.raises(Killed):
-        run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+        run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert list((tmp_path / "out").iterdir()) == []

@@ -5,10 +5,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from geometry.atomic import write_json
+from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
-from studies.sweep.study import Study, TaskMaker, Value, load_study
+from studies.sweep.study import Study, Value, load_study
 from studies.sweep.sweep import JOURNAL, STUDY_FILE
 
 DATA = Path(__file__).parents[2] / "data" / "sweep"
@@ -41,7 +42,7 @@ def synthetic_sweep(
 def kept(folder: Path, study: Study, done: list[Measurement]) -> Path:
     """A sweep's folder with a study and its results."""
     folder.mkdir(parents=True, exist_ok=True)
-    first = TaskMaker(study, folder).task(0, samples(study)[0]).definition
+    first = StudyJob(study, folder, folder / "out").task(0, samples(study)[0]).definition
     write_json(
         folder / STUDY_FILE,
         {

@@ -158,7 +158,7 @@ def test_choices_are_learnt_apart(tmp_path: Path) -> None:
     finger = {"rib_thickness": 1.3, "front_thickness": 1.1}
     found = emulator.predict([{**finger, "rib_reference": each} for each in ("front", "base")], ["force"])
     assert found.values[1, 0] / found.values[0, 0] == pytest.approx(3, rel=0.02)
-    assert emulator.fault({**finger, "rib_reference": "tip"}) == (
+    assert emulator.inputs.fault({**finger, "rib_reference": "tip"}) == (
         "rib_reference = tip is outside the sweep: one of front, base"
     )
 
@@ -175,13 +175,13 @@ def test_choices_are_learnt_apart(tmp_path: Path) -> None:
     ],
 )
 def test_what_it_cannot_predict_is_told(emulator: Emulator, change: dict[str, Value], words: str) -> None:
-    assert emulator.fault(FINGER) is None
-    assert words in str(emulator.fault({**FINGER, **change}))
+    assert emulator.inputs.fault(FINGER) is None
+    assert words in str(emulator.inputs.fault({**FINGER, **change}))
 
 
 def test_a_missing_parameter_is_told(emulator: Emulator) -> None:
     finger = {name: value for name, value in FINGER.items() if name != "tip_length"}
-    assert emulator.fault(finger) == "tip_length is missing; give 14 to 26 mm"
+    assert emulator.inputs.fault(finger) == "tip_length is missing; give 14 to 26 mm"
 
 
 def test_more_samples_fit_it_again(tmp_path: Path) -> None:

@@ -26,10 +26,10 @@ from solvers.solution import DisplacementField, Solution
 from solvers.solver import TrainingDiverged
 from studies.gridsearch.search import grid_study, search_grid
 from studies.gridsearch.training_run import DIVERGED, FAILED, TRAINED, GridPoint, TrainingRun, best_of
+from studies.sweep.job import StudyJob, Task
 from studies.sweep.measurement import Measurement, measured
 from studies.sweep.quantities import TRAINING, training
-from studies.sweep.study import Study, Task
-from studies.sweep.sweep import SweepJob
+from studies.sweep.study import Study
 from studies.sweep.workers import Workers
 
 TINY = {"preset": "paper", "epochs": 2, "width": 4, "layers": 1, "base_points": 5}
@@ -41,9 +41,9 @@ def study(settings: Mapping[str, Any] = TINY, **physics: Any) -> Study:
 
 
 @pytest.fixture
-def wanted(tmp_path: Path) -> SweepJob:
+def wanted(tmp_path: Path) -> StudyJob:
     mesh = MeshSettings(size=1.0)
-    return SweepJob(study(), Path(), tmp_path / "search", 2, finger=Design(), mesh=mesh, kind="grid search")
+    return StudyJob(study(), Path(), tmp_path / "search", 2, finger=Design(), mesh=mesh, kind="grid search")
 
 
 def point_of(task: Task) -> GridPoint:
@@ -139,7 +139,7 @@ def test_a_run_without_a_solution_says_why(wanted, monkeypatch, error, state):
         raise error
 
     monkeypatch.setattr("solvers.pinn.paper.solver.PaperPinnSolver.solve", refused)
-    ended = measured(wanted.maker().task(0, {"pinn-std.learning_rate": 1e-2, "pinn-std.bc_weight": 1.0}))
+    ended = measured(wanted.task(0, {"pinn-std.learning_rate": 1e-2, "pinn-std.bc_weight": 1.0}))
     assert (ended.state, ended.message, ended.values) == (state, str(error), {})
 
 

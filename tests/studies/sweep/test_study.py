@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from geometry.errors import UserError
+from studies.sweep.job import StudyJob
 from studies.sweep.sampling import samples
-from studies.sweep.study import TaskMaker, load_study, physics_of
+from studies.sweep.study import load_study, physics_of
 
 GOOD = 'sampling = "sobol"\nsamples = 4\n[varied]\nrib_thickness = {from = 1, to = 2}\n'
 
@@ -84,14 +85,14 @@ def test_a_wrong_study_is_refused_in_one_line(tmp_path: Path, text: str, message
 def test_a_load_that_the_solver_does_not_take_is_refused(tmp_path: Path) -> None:
     study = load_study(written(tmp_path, GOOD + '[fixed]\nload = "cylinder"\n'))
     with pytest.raises(UserError, match="fem takes the loads mean, point, patch, not 'cylinder'"):
-        TaskMaker(study, tmp_path)
+        StudyJob(study, tmp_path, tmp_path / "out").task(0, samples(study)[0])
 
 
 def test_a_task_has_the_fixed_and_the_sampled_values(tmp_path: Path) -> None:
     study = load_study(
         written(tmp_path, GOOD + "[fixed]\nN = 3\nyoung = 5.0\nstroke = 4.0\ndirection = 30\n")
     )
-    task = TaskMaker(study, tmp_path).task(1, samples(study)[1])
+    task = StudyJob(study, tmp_path, tmp_path / "out").task(1, samples(study)[1])
     assert task.definition["rib_count"] == 3
     assert task.definition["rib_thickness"] == samples(study)[1]["rib_thickness"]
     material, load = physics_of(task.physics)
@@ -102,13 +103,16 @@ def test_a_task_has_the_fixed_and_the_sampled_values(tmp_path: Path) -> None:
 def test_a_design_beside_the_study_is_meant_from_there(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text("height = 77\n", encoding="utf-8")
     study = load_study(written(tmp_path, 'design = "own.toml"\n' + GOOD))
-    assert TaskMaker(study, tmp_path).task(0, samples(study)[0]).definition["height"] == 77
+    assert StudyJob(study, tmp_path, tmp_path / "out").task(0, samples(study)[0]).definition["height"] == 77
 
 
 def test_settings_of_the_solver_are_varied_like_parameters(tmp_path: Path) -> None:
     text = 'sampling = "grid"\n[varied]\n"fem.degree" = {values = [1, 2]}\nrib_count = {values = [3, 4]}\n'
     study = load_study(written(tmp_path, text))
-    tasks = [TaskMaker(study, tmp_path).task(number, each) for number, each in enumerate(samples(study))]
+    tasks = [
+        StudyJob(study, tmp_path, tmp_path / "out").task(number, each)
+        for number, each in enumerate(samples(study))
+    ]
     assert [(task.settings["degree"], task.definition["rib_count"]) for task in tasks] == [
         (1, 3),
         (1, 4),

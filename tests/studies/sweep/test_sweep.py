@@ -22,13 +22,14 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from pinnray.cli import main
 from solvers.solution import Solution
+from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement, measured
 from studies.sweep.quantities import quantities
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
-from studies.sweep.study import Study, TaskMaker, load_study
-from studies.sweep.sweep import JOURNAL, Sweep, SweepJob, load_sweep, run_sweep
-from studies.sweep.tables import failure_grid, table
+from studies.sweep.study import Study, load_study
+from studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
+from studies.sweep.tables import failure_grid, sample_table
 from studies.sweep.workers import Workers
 from tests.pinnray.commands.programs import COMMAND
 
@@ -72,11 +73,11 @@ def test_a_damaged_journal_is_told_in_one_line(tmp_path: Path) -> None:
 
 def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path, 1))
-    maker = TaskMaker(study, tmp_path)
-    refused = measured(maker.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
+    job = StudyJob(study, tmp_path, tmp_path / "out")
+    refused = measured(job.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
     assert (refused.state, refused.values) == ("refused", {})
     assert "ribs" in refused.message
-    task = maker.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
+    task = job.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
     assert measured(task).state == "done"
     pressed = measured(replace(task, physics={**task.physics, "stroke": 60.0}))
     assert (pressed.state, pressed.through_itself) == ("done", True)
@@ -100,7 +101,9 @@ def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr("studies.sweep.measurement.quantities", without_stress)
     sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
-    found = measured(TaskMaker(load_study(study_file(tmp_path, 1)), tmp_path).task(1, sample))
+    found = measured(
+        StudyJob(load_study(study_file(tmp_path, 1)), tmp_path, tmp_path / "out").task(1, sample)
+    )
     assert (found.state, found.message.partition(";")[0]) == ("not converged", "von_mises cannot be computed")
 
 
@@ -164,7 +167,7 @@ def test_a_second_start_goes_on_and_does_nothing_twice(swept: Path, tmp_path: Pa
     before = load_sweep(out).measurements
     study = load_study(study_file(tmp_path, 8))
     study = study.model_copy(update={"name": "ribs"})
-    after = run_sweep(SweepJob(study, tmp_path, out, 1)).measurements
+    after = run_sweep(StudyJob(study, tmp_path, out, 1)).measurements
     assert after[:6] == before
     assert [each.number for each in after] == list(range(8))
 
@@ -184,13 +187,13 @@ def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(
     monkeypatch.setattr("studies.sweep.workers._measured", die_at_one)
     monkeypatch.setattr("studies.sweep.workers.DEATHS", 2)
     study = load_study(study_file(tmp_path, 4))
-    sweep = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+    sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", "failed", "done", "done"]
     assert sweep.measurements[1].message == "its worker process died 2 times"
     assert failure_grid(sweep).rows == [("failed", "1", "its worker process died", "1")]
-    assert list(table(sweep)["state"]) == ["done", "failed", "done", "done"]
+    assert list(sample_table(sweep)["state"]) == ["done", "failed", "done", "done"]
     monkeypatch.setattr("studies.sweep.workers._measured", answered)
-    again = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+    again = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
 
 
@@ -297,7 +300,7 @@ def test_a_journal_of_others_removes_no_file(tmp_path: Path) -> None:
 def test_the_same_study_has_the_same_results(swept: Path, tmp_path: Path) -> None:
     study = load_study(swept / "ribs.toml")
     first = load_sweep(swept / "out").measurements[0]
-    again = measured(TaskMaker(study, tmp_path).task(0, samples(study)[0]))
+    again = measured(StudyJob(study, tmp_path, tmp_path / "out").task(0, samples(study)[0]))
     assert again.values == first.values
     assert isinstance(study, Study)
 
@@ -313,8 +316,8 @@ def test_drawings_are_samples_too(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     study = load_study(path)
-    maker = TaskMaker(study, tmp_path)
-    found = [measured(maker.task(number, sample)) for number, sample in enumerate(samples(study))]
+    job = StudyJob(study, tmp_path, tmp_path / "out")
+    found = [measured(job.task(number, sample)) for number, sample in enumerate(samples(study))]
     assert [each.state for each in found] == ["done"] * 4
     areas = [Design(rib_count=ribs).section.area for ribs in (2, 2, 6, 6)]
     assert [each.values["area"] for each in found] == pytest.approx(areas, rel=1e-6)

@@ -1,0 +1,134 @@
+"""A study to run: where it is read and written, and its samples as tasks for workers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from compare.runtime.provenance import package_versions
+from geometry.cache import drawn_finger
+from geometry.content_hash import sources_digest
+from geometry.drawing.description import description_beside, load_description
+from geometry.finger.finger import Finger
+from geometry.finger.presets import load_design
+from geometry.mesh.settings import MeshSettings
+from solvers.solver import check_load
+from studies.sweep.study import PHYSICS, Study, Value, physics_of
+
+
+@dataclass(frozen=True)
+class Task:
+    """One sample as a worker gets it.
+
+    Attributes:
+        number: Of the sample in its study.
+        definition: Of the finger; rules are checked by the worker.
+        mesh: Element sizes.
+        physics: Values of `Physics`.
+        solver: Name of the solver.
+        settings: Its settings.
+        density: Of the material, g/cm^3.
+        checkpoints: Folder of a training that can be resumed; None for none.
+    """
+
+    number: int
+    definition: dict[str, Any]
+    mesh: MeshSettings
+    physics: dict[str, Any]
+    solver: str
+    settings: dict[str, Value]
+    density: float
+    checkpoints: Path | None = None
+
+
+S = TypeVar("S", bound=Study, covariant=True)
+
+
+@dataclass(frozen=True)
+class StudyJob(Generic[S]):
+    """A study to run, and its output folder; reads the design and the drawings of the study once.
+
+    Attributes:
+        study: The study.
+        folder: Folder from which paths in the study are meant.
+        out: Output folder; samples that an earlier start finished there are kept.
+        processes: Worker processes on this machine.
+        scheduler: Address of a Dask scheduler whose workers are used instead.
+        finger: The finger from which the samples differ, in place of the study's design.
+        mesh: Element sizes, in place of the study's size.
+        kind: What messages call the job.
+    """
+
+    study: S
+    folder: Path
+    out: Path
+    processes: int = 1
+    scheduler: str | None = None
+    finger: Finger | None = None
+    mesh: MeshSettings | None = None
+    kind: str = "sweep"
+
+    def task(self, number: int, sample: Mapping[str, Value]) -> Task:
+        """The task of a sample.
+
+        Raises:
+            UserError: If a file cannot be read, or the solver does not take the load.
+        """
+        study = self.study
+        settings = study.settings_of(sample)
+        given = {**study.fixed, **sample}
+        values = {name: value for name, value in given.items() if not name.startswith(f"{study.solver}.")}
+        shape = {name: value for name, value in values.items() if name not in PHYSICS}
+        checkpoints, definition = None, {**self._base.definition(), **shape}
+        if study.settings_alone:
+            checkpoints = self.out / "runs" / "_".join(f"{key}-{value}" for key, value in settings.items())
+        else:
+            definition["name"] = f"{study.name}-{number}"
+        return Task(
+            number,
+            self._drawing(shape) if "section" in shape else definition,
+            self.mesh or MeshSettings(size=study.mesh_size),
+            {name: value for name, value in values.items() if name in PHYSICS},
+            study.solver,
+            {**study.settings, **settings},
+            study.density,
+            checkpoints,
+        )
+
+    def definition(self, sample: Mapping[str, Value], module: str) -> dict[str, Any]:
+        """The study, and everything else on which the results of a module depend."""
+        study, finger = self.study, self.task(0, sample).definition
+        return {
+            "schema": 1,
+            "study": study.model_dump(
+                mode="json", by_alias=True, exclude_none=True, include=set(Study.model_fields)
+            ),
+            "finger": {name: value for name, value in finger.items() if name not in study.varied},
+            "versions": package_versions(),
+            "program_sha256": sources_digest(module, type(study.made_solver()).__module__),
+        }
+
+    @cached_property
+    def _base(self) -> Finger:
+        """The finger from which the samples differ; the solver is asked for its loads before."""
+        study = self.study
+        kinds = study.varied["load"].values if "load" in study.varied else None
+        for kind in kinds or (study.fixed.get("load", "mean"),):
+            check_load(study.made_solver(), physics_of({"load": kind})[1])
+        near = self.folder / study.design
+        return self.finger or load_design(near if near.suffix == ".toml" and near.is_file() else study.design)
+
+    @cached_property
+    def _drawn(self) -> dict[tuple[str, ...], dict[str, Any]]:
+        return {}
+
+    def _drawing(self, shape: Mapping[str, Value]) -> dict[str, Any]:
+        """The definition of a drawn finger."""
+        lines = tuple(f"{name} = {value}" for name, value in shape.items() if name != "section")
+        key = (str(shape["section"]), *lines)
+        if key not in self._drawn:
+            file = self.folder / key[0]
+            drawn = drawn_finger(file, load_description(description_beside(file), lines))
+            self._drawn[key] = drawn.definition()
+        return self._drawn[key]
