@@ -35,7 +35,7 @@ ELASTIC = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class BeamFrame:
     """Beams of n fingers with the same number of ribs.
 
     The nodes are the ends of the rib axes on the front wall, the contact, the front wall's two ends; the rib
@@ -54,7 +54,7 @@ class Frame:
     ribs: int
 
     @classmethod
-    def of(cls, fingers: Sequence[Parameters]) -> "Frame":
+    def of(cls, fingers: Sequence[Parameters]) -> "BeamFrame":
         """The frames of fingers with the same number of ribs."""
         ribs = fingers[0].rib_count
         points = np.stack([_nodes(each) for each in fingers])
@@ -91,7 +91,7 @@ class Frame:
         share = (1 - ELASTIC) * length / np.maximum(found.sum(axis=2), 1e-12)
         return np.asarray(found * np.minimum(share, 1.0)[..., None])
 
-    def response(self, material: Material, travel: tuple[float | None, float | None]) -> "FrameResponse":
+    def response(self, material: Material, travel: tuple[float | None, float | None]) -> "BeamResponse":
         """What the frames do if their contact moves by `travel`, mm; None is free of force."""
         start, end = (np.take_along_axis(self.points, self.beams[:, :, side, None], 1) for side in (0, 1))
         length = np.maximum(np.linalg.norm(end - start, axis=2), SHORTEST)
@@ -121,7 +121,7 @@ class Frame:
         moment = np.maximum(np.abs(ends[..., 2]), np.abs(ends[..., 5]))
         stress = np.abs(ends[..., 3]) / self.thickness + 6 * moment / self.thickness**2
         parts = np.cumsum([0, self.ribs + 2, self.ribs + 1, self.ribs])
-        return FrameResponse(
+        return BeamResponse(
             force=force[:, axes, 0] @ (values / np.linalg.norm(values)),
             compliance=np.diagonal(compliance, axis1=1, axis2=2),
             contact=state[:, contact : contact + 2],
@@ -134,7 +134,7 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class FrameResponse:
+class BeamResponse:
     """What n frames of Young's modulus and depth one do.
 
     Attributes:

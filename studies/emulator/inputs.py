@@ -13,7 +13,7 @@ from geometry.finger.parameters import SYMBOLS, Parameters
 from geometry.finger.section import cavity_ends, rib_feet, rib_pitch
 from geometry.finger.validation import broken_rule
 from solvers.problem import Load, Material
-from studies.emulator.frame import Frame
+from studies.emulator.frame import BeamFrame
 from studies.sweep.study import PHYSICS, WHOLE, Range, Study, Value, physics_of, unit_of
 
 WIDE = 1.8
@@ -152,7 +152,7 @@ class Inputs:
         answers = np.zeros((len(shapes), 9))
         for (*_, travel), places in groups.items():
             own = [shapes[place] for place in places]
-            found = Frame.of(own).response(physics[places[0]][0], travel)
+            found = BeamFrame.of(own).response(physics[places[0]][0], travel)
             answers[places, 0] = found.force
             answers[places, 1:3] = found.compliance
             answers[places, 3:5] = found.tip

@@ -20,7 +20,7 @@ from studies.sweep.job import Task
 from studies.sweep.quantities import FRACTIONS, quantities
 from studies.sweep.study import physics_of
 
-State = Literal["done", "not converged", "refused", "failed"]
+Ending = Literal["done", "not converged", "refused", "failed"]
 """`refused`: the design breaks a rule or the solver does not take it; `failed`: an error of the program."""
 
 
@@ -37,7 +37,7 @@ class Measurement:
     """
 
     number: int
-    state: State
+    state: Ending
     message: str
     seconds: float
     values: dict[str, float] = field(default_factory=dict)
@@ -55,7 +55,7 @@ def measured(task: Task) -> Measurement:
     """
     started = time.perf_counter()
 
-    def ended(state: State, message: str, values: dict[str, float] | None = None) -> Measurement:
+    def ended(state: Ending, message: str, values: dict[str, float] | None = None) -> Measurement:
         words = " ".join(message.split())
         return Measurement(task.number, state, words, time.perf_counter() - started, values or {})
 

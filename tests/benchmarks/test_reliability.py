@@ -65,9 +65,7 @@ def test_every_change_of_a_file_is_a_point_also_those_of_children(tmp_path: Path
         ("ENOSPC", 0, 1, {}),
     ],
 )
-def test_faults_leave_what_they_say(
-    tmp_path: Path, kind: str, at: int, code: int, left: dict[str, str]
-) -> None:
+def test_faults_leave_what_they_say(tmp_path, kind, at, code, left):
     def work() -> int:
         write_text(tmp_path / "watched" / "a.txt", "hallo!")
         return 0
@@ -89,9 +87,7 @@ def test_faults_leave_what_they_say(
         ({}, ["other numbers: metrics.csv"]),
     ],
 )
-def test_numbers_are_those_of_the_undisturbed_run_or_of_its_cache(
-    tmp_path: Path, found: dict[str, str], said: list[str]
-) -> None:
+def test_numbers_are_those_of_the_undisturbed_run_or_of_its_cache(tmp_path, found, said):
     expected = Expected((), {"metrics.csv": "1"}, {"truth.npz": "2", "metrics.csv": "2"}, tmp_path)
     assert differences(expected, found) == said
 

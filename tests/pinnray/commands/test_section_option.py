@@ -69,9 +69,7 @@ def test_solve_works_on_a_drawing(tmp_path: Path, capsys: pytest.CaptureFixture[
         (BEAM, "--design slender", "give one of them"),
     ],
 )
-def test_a_bad_section_is_refused_in_one_line(
-    path: str, options: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bad_section_is_refused_in_one_line(path, options, text, tmp_path, capsys):
     out = tmp_path / "out"
     file = drawing(tmp_path, path)
     assert main(["mesh", "--section", str(file), "--out", str(out), *options.split()]) == 2
@@ -90,9 +88,7 @@ def test_a_bad_section_is_refused_in_one_line(
         ("--markers 5", "--markers belongs to a drawing"),
     ],
 )
-def test_what_is_no_drawing_is_refused_in_one_line(
-    options: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_drawing_is_refused_in_one_line(options, text, tmp_path, capsys):
     assert main(["mesh", "--out", str(tmp_path / "out"), *options.split()]) == 2
     said = capsys.readouterr().err.strip()
     assert text in said

@@ -70,18 +70,14 @@ def smooth(sample: Mapping[str, Value]) -> dict[str, float]:
     return {"force": force, "force_50": 0.5 * force, "tip_v": rib - front**2}
 
 
-def test_forces_of_fingers_that_it_has_not_seen_are_predicted(
-    emulator: Emulator, unseen: tuple[list[dict[str, Value]], dict[str, np.ndarray]]
-) -> None:
+def test_forces_of_fingers_that_it_has_not_seen_are_predicted(emulator, unseen):
     fingers, truth = unseen
     found = emulator.predict(fingers)
     errors = np.abs(found.column("force") / truth["force"] - 1)
     assert np.median(errors) < 0.005
 
 
-def test_intervals_hold_for_most_fingers_that_it_has_not_seen(
-    emulator: Emulator, unseen: tuple[list[dict[str, Value]], dict[str, np.ndarray]]
-) -> None:
+def test_intervals_hold_for_most_fingers_that_it_has_not_seen(emulator, unseen):
     fingers, truth = unseen
     found = emulator.predict(fingers)
     held = [
@@ -253,9 +249,7 @@ def test_the_command_predicts_a_table(folder: Path, emulator: Emulator, tmp_path
         (["--set", "N=4", "--out", "x.csv"], "--out is for the predictions of --csv"),
     ],
 )
-def test_the_command_refuses_in_one_line(
-    folder: Path, emulator: Emulator, arguments: list[str], words: str, capsys: Any
-) -> None:
+def test_the_command_refuses_in_one_line(folder, emulator, arguments, words, capsys):
     assert main(["predict", str(folder), *arguments]) == 2
     told = capsys.readouterr().err
     assert words in told

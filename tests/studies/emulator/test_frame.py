@@ -7,7 +7,7 @@ import pytest
 
 from geometry.finger.parameters import Parameters
 from solvers.problem import Material
-from studies.emulator.frame import SHEAR_SHARE, Frame, _stiffness
+from studies.emulator.frame import SHEAR_SHARE, BeamFrame, _stiffness
 from studies.sweep.sampling import samples
 from studies.sweep.study import load_study
 from tests.studies.emulator.sweeps import DATA
@@ -43,7 +43,7 @@ def test_a_finger_twice_as_large_is_as_stiff(ribs: int) -> None:
     small = Parameters(rib_count=ribs)
     twice = {name: 2 * getattr(small, name) for name in (*lengths, "base_thickness", "contact_width")}
     one, other = (
-        Frame.of([each]).response(Material(), TRAVEL) for each in (small, small.model_copy(update=twice))
+        BeamFrame.of([each]).response(Material(), TRAVEL) for each in (small, small.model_copy(update=twice))
     )
     assert other.force == pytest.approx(one.force, rel=1e-9)
     assert other.compliance == pytest.approx(one.compliance, rel=1e-9)
@@ -51,7 +51,7 @@ def test_a_finger_twice_as_large_is_as_stiff(ribs: int) -> None:
 
 
 def test_a_contact_that_slides_has_no_force_along_the_finger() -> None:
-    frame = Frame.of([Parameters()])
+    frame = BeamFrame.of([Parameters()])
     free = frame.response(Material(), (None, -10.0))
     assert free.force == pytest.approx(10 / free.compliance[:, 1])
     assert (frame.response(Material(), TRAVEL).force > free.force).all()
@@ -63,7 +63,7 @@ def test_it_follows_finite_elements() -> None:
     with (DATA / "ref.csv").open(encoding="utf-8") as table:
         rows = [row for row in csv.DictReader(table) if every[int(row["sample"])]["rib_count"] == 4]
     shapes = [Parameters(**every[int(row["sample"])]) for row in rows]
-    ratio = np.log(11.4 * 20 * Frame.of(shapes).response(Material(), TRAVEL).force)
+    ratio = np.log(11.4 * 20 * BeamFrame.of(shapes).response(Material(), TRAVEL).force)
     ratio -= np.log([float(row["force"]) for row in rows])
     assert abs(ratio.mean()) < 0.25
     assert ratio.std() < 0.04  # the forces themselves vary by 0.7

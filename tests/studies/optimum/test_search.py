@@ -82,18 +82,14 @@ def test_the_hypervolume_grows_past_that_of_the_samples(found: Optimum) -> None:
     assert found.volumes[-1] > 1.05 * found.volumes[13]
 
 
-def test_the_same_seed_has_the_same_runs_to_the_bit(
-    found: Optimum, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_same_seed_has_the_same_runs_to_the_bit(found, tmp_path, monkeypatch):
     monkeypatch.setattr("studies.optimum.search.finish", judge)
     again = search_front(StudyJob(QUESTION, Path(), tmp_path / "out", 1))
     assert again.fingers == found.fingers
     assert again.measurements == found.measurements
 
 
-def test_a_search_that_was_stopped_goes_on_to_the_same_runs(
-    found: Optimum, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_search_that_was_stopped_goes_on_to_the_same_runs(found, tmp_path, monkeypatch):
     def interrupted(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
         if len(tasks) > 30:
             raise KeyboardInterrupt
@@ -120,9 +116,7 @@ def test_the_table_has_a_row_for_each_finger_on_the_front(found: Optimum) -> Non
     assert len(set(map(len, grid.rows))) == 1
 
 
-def test_a_finger_that_goes_through_itself_is_not_on_the_front(
-    found: Optimum, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, monkeypatch):
     best = found.fingers[found.front[0]]["rib_count"]
 
     def strict(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
@@ -153,9 +147,7 @@ def test_ranges_in_which_no_finger_can_be_made_are_told(tmp_path: Path) -> None:
         search_front(StudyJob(asked, Path(), tmp_path / "out", 1), Stages(quiet=True))
 
 
-def test_the_command_writes_the_front(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_command_writes_the_front(tmp_path, capsys, monkeypatch):
     """The tutorial of the page for designers has the same on fingers that are solved."""
     monkeypatch.setattr("studies.optimum.search.finish", judge)
     path = tmp_path / "small.toml"

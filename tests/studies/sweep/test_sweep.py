@@ -172,18 +172,14 @@ def test_a_second_start_goes_on_and_does_nothing_twice(swept: Path, tmp_path: Pa
     assert [each.number for each in after] == list(range(8))
 
 
-def test_another_study_in_the_folder_is_refused(
-    swept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
     path = tmp_path / "ribs.toml"
     path.write_text(STUDY.format(samples=6).replace("mesh_size = 2.0", "mesh_size = 1.9"), encoding="utf-8")
     assert main(["sweep", str(path), "--out", str(swept / "out")]) == 2
     assert "holds a sweep with other settings (study.mesh_size)" in capsys.readouterr().err
 
 
-def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.sweep.workers._measured", die_at_one)
     monkeypatch.setattr("studies.sweep.workers.DEATHS", 2)
     study = load_study(study_file(tmp_path, 4))
@@ -210,9 +206,7 @@ def test_the_workers_of_a_scheduler_do_the_same(tmp_path: Path, monkeypatch: pyt
     assert (found[0], sorted(found[1:])) == (0, [0, 1, 2, 3, 4])
 
 
-def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(monkeypatch):
     from distributed import KilledWorker, LocalCluster
 
     def dying(task: SimpleNamespace) -> Measurement:
@@ -255,13 +249,7 @@ REFUSED: dict[str, tuple[Callable[[Path], list[str]], str]] = {
 
 
 @pytest.mark.parametrize(("arguments", "message"), REFUSED.values(), ids=REFUSED)
-def test_the_command_refuses_in_one_line(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: Callable[[Path], list[str]],
-    message: str,
-) -> None:
+def test_the_command_refuses_in_one_line(tmp_path, capsys, monkeypatch, arguments, message):
     monkeypatch.setattr("studies.sweep.workers.WAIT_S", 1)
     assert main(["sweep", *arguments(tmp_path), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
