@@ -14,6 +14,7 @@ from geometry.finger.section import cavity_ends, rib_feet, rib_pitch
 from geometry.finger.validation import broken_rule
 from solvers.problem import Load, Material
 from studies.emulator.frame import BeamFrame
+from studies.sweep.quantities import QUANTITIES
 from studies.sweep.study import PHYSICS, WHOLE, Range, Study, Value, physics_of, unit_of
 
 WIDE = 1.8
@@ -103,14 +104,15 @@ class Inputs:
         modulus, depth = scales.T
         force = answers[:, 0] * modulus * depth
         largest = np.maximum(answers[:, 6:9].max(axis=1), LEAST_STRESS)
+        one = np.ones(len(fingers))
         bases = {
+            **dict.fromkeys(QUANTITIES, one),  # of which the frames say nothing
             **{"force": force, "force_25": force / 4, "force_50": force / 2, "force_75": 0.75 * force},
             **{"tip_u": answers[:, 3], "tip_v": answers[:, 4], "wrap": answers[:, 5]},
             "compliance_along": answers[:, 1] / (modulus * depth),
             "compliance_across": answers[:, 2] / (modulus * depth),
             **{"von_mises": modulus * largest, "principal_strain": largest},
         }
-        one = np.ones(len(fingers))
         forces = dict.fromkeys(("force", "force_25", "force_50", "force_75"), modulus * depth)
         return Numbers(
             np.concatenate([*columns, np.stack([np.cos(phase), np.sin(phase)], axis=1), stress], axis=1),

@@ -15,7 +15,7 @@ from pinnray.cli import main
 from studies.emulator import emulator as module
 from studies.emulator.emulator import Emulator
 from studies.emulator.store import FILE, emulator_of
-from studies.sweep.quantities import narrowest_gap, thinnest_wall
+from studies.sweep.quantities import QUANTITIES, Quantity, narrowest_gap, thinnest_wall
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
 from studies.sweep.study import Study, Value
@@ -102,6 +102,16 @@ def test_quantities_of_the_section_are_exact(emulator: Emulator) -> None:
     assert found.column("mass") == pytest.approx(design.section.area * 20 * 1.2 / 1000)
     assert found.column("thinnest_wall") == thinnest_wall(design.section)
     assert found.column("narrowest_gap") == narrowest_gap(design.section)
+
+
+def test_a_quantity_of_which_the_frame_says_nothing_is_learnt_too(tmp_path, monkeypatch):
+    """So that a new one is added in one file, the quantities'."""
+    monkeypatch.setitem(QUANTITIES, "new", Quantity("mm", "of the test"))
+    folder = synthetic_sweep(
+        tmp_path / "out", small_study(), lambda one: smooth(one) | {"new": one["rib_thickness"] ** 2}
+    )
+    finger = {"rib_thickness": 1.6, "front_thickness": 1.4}
+    assert emulator_of(folder).predict([finger]).column("new") == pytest.approx(1.6**2, rel=1e-3)
 
 
 def test_some_quantities_alone_are_the_same(emulator: Emulator) -> None:
