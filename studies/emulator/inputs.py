@@ -57,7 +57,7 @@ class Inputs:
         if "section" in {*study.fixed, *study.varied}:
             raise UserError(
                 f"the sweep {study.name} is of drawings, and an emulator needs the parameters of a design; "
-                "sweep a design, or solve the drawing by `compare --section FILE`"
+                "sweep a design, or solve the drawing itself"
             )
         self.study = study
         self.base = {name: value for name, value in base.items() if name in Parameters.model_fields}

@@ -98,7 +98,7 @@ def load(file: Path, inputs: Inputs, digest: str) -> Emulator | None:
         return Emulator(inputs, learnt, ratios, int(header["count"]))
     except (SafetensorError, KeyError, ValueError, OSError) as error:
         reason = " ".join(str(error).split())
-        raise UserError(f"{file} is damaged ({reason}); fit the emulator again by --refit") from None
+        raise UserError(f"{file} is damaged ({reason}); let the emulator be fitted again (refit)") from None
 
 
 def _arrays_digest(arrays: dict[str, FloatArray]) -> str:

@@ -104,8 +104,7 @@ def front_sentences(optimum: Optimum) -> list[str]:
         f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are on the "
         f"front: none of them is beaten in every objective by another run.{itself} "
         "An emulator proposed fingers; all numbers here are the solver's.",
-        "A finger of the table: compare --design front/01.toml, or pinnray design --design front/01.toml for "
-        "its CAD files.",
+        "front/01.toml is the design of the first finger of the table, for `compare` and `pinnray design`.",
     ]
 
 

@@ -222,7 +222,7 @@ def test_a_damaged_file_is_told_in_one_line(damaged: Path, end: str) -> None:
     damaged.write_bytes(
         {"cut": content[:-100], "flipped": content[:-9] + b"#" + content[-8:], "empty": b""}[end]
     )
-    with pytest.raises(UserError, match=r"emulator.safetensors is damaged \(.*\); fit .* again by --refit"):
+    with pytest.raises(UserError, match=r"emulator.safetensors is damaged \(.*\); let .* be fitted again"):
         emulator_of(damaged.parent)
 
 
