@@ -2,10 +2,11 @@
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
@@ -23,6 +24,9 @@ from solvers.elasticity import LawName
 from solvers.problem import Load, LoadKind, Material, Physics
 from solvers.registry import PRESETS, make_solver
 from solvers.solver import Solver
+
+if TYPE_CHECKING:  # pandas comes with it, and `--help` has to be quick
+    from studies.sweep.job import S, StudyJob
 
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
@@ -254,6 +258,40 @@ def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) 
     solver = make_solver(name, **given)
     had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
     return make_solver(name, **given, **had)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class StudyOptions:
+    """Workers, pictures and folder of a study.
+
+    Attributes:
+        processes: Worker processes on this machine; default: one per core.
+        scheduler: Address of a Dask scheduler whose workers are used, such as tcp://host:8786; default: none.
+        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
+        out: Output folder; default: named after the command and the study, in out.
+    """
+
+    processes: int | None = None
+    scheduler: str | None = None
+    pictures: str = ""
+    out: OptionalOutputPath = None
+
+    def job(self, study: "S", file: Path, kind: str) -> "StudyJob[S]":
+        """The job of the study in a file."""
+        from studies.sweep.job import StudyJob
+
+        out = self.out or Path("out") / f"{kind}-{study.name}"
+        return StudyJob(study, file.parent, out, read_processes(self.processes), self.scheduler)
+
+
+@contextmanager
+def going_on_from(folder: Path) -> Iterator[None]:
+    """Tell who interrupts the work inside that the same command goes on from what a folder keeps."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"the same command goes on from what {folder} keeps") from None
 
 
 def comma_list(text: str) -> list[str]:

@@ -42,7 +42,7 @@ class Task:
     checkpoints: Path | None = None
 
 
-S = TypeVar("S", bound=Study, covariant=True)
+S = TypeVar("S", bound=Study)
 
 
 @dataclass(frozen=True)

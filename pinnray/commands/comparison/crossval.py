@@ -13,6 +13,7 @@ from pinnray.options.shared import (
     SolverOptions,
     comma_list,
     existing_table,
+    going_on_from,
     read_formats,
     read_processes,
 )
@@ -93,11 +94,8 @@ def crossval(
     finger.check_cost(design, mesh, [EXPERIMENT, *(solver.name for solver in made)])
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")
-    try:
-        with Stages() as stages:
-            result = cross_validate(study, stages)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"the same command goes on from what {study.out} keeps") from None
+    with going_on_from(study.out), Stages() as stages:
+        result = cross_validate(study, stages)
     console = Console()
     for table in terminal_tables(result):
         console.print(table)

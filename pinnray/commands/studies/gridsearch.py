@@ -14,6 +14,7 @@ from pinnray.options.shared import (
     OptionalOutputPath,
     PhysicsOptions,
     SolverOptions,
+    going_on_from,
     read_formats,
     read_processes,
 )
@@ -73,11 +74,8 @@ def gridsearch(
         kind="grid search",
     )
     formats = read_formats(pictures)
-    try:
-        with Stages() as stages:
-            runs = search_grid(job, stages, formats)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"the same command goes on from what {job.out} keeps") from None
+    with going_on_from(job.out), Stages() as stages:
+        runs = search_grid(job, stages, formats)
     Console().print(runs_table(runs))
     for name in ("gridsearch.csv", "gridsearch.json", "gridsearch.png"):
         print(job.out / name)

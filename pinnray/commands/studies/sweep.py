@@ -5,16 +5,12 @@ from pathlib import Path
 from rich.console import Console
 
 from compare.runtime.exits import NOT_CONVERGED, say
-from pinnray.options.shared import OptionalOutputPath, read_formats, read_processes
+from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 
 
 def sweep(
     study: Path,
-    *,
-    processes: int | None = None,
-    scheduler: str | None = None,
-    pictures: str = "",
-    out: OptionalOutputPath = None,
+    options: StudyOptions = StudyOptions(),
 ) -> int:
     """Solve many fingers: the samples of a study over parameters of design, material and load.
 
@@ -23,31 +19,22 @@ def sweep(
 
     Args:
         study: TOML file with the ranges of the parameters, the sampling and the solver.
-        processes: Worker processes on this machine; default: one per core.
-        scheduler: Address of a Dask scheduler whose workers are used, such as tcp://host:8786; default: none.
-        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
-        out: Output folder; default out/sweep-NAME.
     """
     from compare.runtime.stages import Stages
     from compare.runtime.tables import terminal_table
-    from studies.sweep.job import StudyJob
     from studies.sweep.page import write_page
     from studies.sweep.study import load_study
     from studies.sweep.sweep import run_sweep
     from studies.sweep.tables import failure_grid, quantity_grid, write_tables
 
-    formats = read_formats(pictures)
+    formats = read_formats(options.pictures)
     read = load_study(study)
-    folder = out or Path("out") / f"sweep-{read.name}"
-    job = StudyJob(read, study.parent, folder, read_processes(processes), scheduler)
-    try:
-        with Stages() as stages:
-            done = run_sweep(job, stages)
-            written = write_tables(done, folder)
-            with stages.stage("pictures"):
-                written += write_page(done, job, folder, stages.record(), formats)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"the same command goes on from what {folder} keeps") from None
+    job = options.job(read, study, "sweep")
+    with going_on_from(job.out), Stages() as stages:
+        done = run_sweep(job, stages)
+        written = write_tables(done, job.out)
+        with stages.stage("pictures"):
+            written += write_page(done, job, job.out, stages.record(), formats)
     quantities, failures = quantity_grid(done), failure_grid(done)
     for grid in (quantities, failures):
         if grid.rows:
