@@ -12,10 +12,8 @@ from geometry.arrays import FloatArray
 from geometry.drawing.drawn_finger import finger_from
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.finger.picture import draw_section
-from geometry.mesh.boundary import boundary_edges
-from solvers.solution import Solution
 from studies.sweep.job import StudyJob
-from studies.sweep.quantities import QUANTITIES, kink_points, turn
+from studies.sweep.quantities import QUANTITIES
 from studies.sweep.sensitivity import TRUSTED, Sensitivity
 from studies.sweep.study import Study, unit_of
 from studies.sweep.sweep import Sweep
@@ -134,43 +132,6 @@ def draw_fingers(sweep: Sweep, job: StudyJob[Study]) -> Figure:
                 axes.set_title(f"{name}, {unit}", size=SMALL, pad=14, loc="left", weight="bold")
             axes.text(0, 1.04, f"{value:.3g} (sample {number})", size=SMALL, transform=axes.transAxes)
     return drawn
-
-
-def draw_wrap(solution: Solution) -> Figure:
-    """Draw the wrap angle of a solution: both chords of the front face, before and under the load."""
-    mesh = solution.problem.mesh
-    rest = kink_points(solution.problem)
-    moved = rest + solution.displacement(rest)
-    shape, edges = mesh.points + solution.displacement(mesh.points), boundary_edges(mesh.triangles)
-    low, high = np.minimum(mesh.points.min(0), shape.min(0)), np.maximum(mesh.points.max(0), shape.max(0))
-    height = (WIDTH - 0.2) * (high[1] - low[1] + 14) / (high[0] - low[0] + 16)
-    with figure(0.5 + height) as drawn:
-        angle = turn(moved) - turn(rest)
-        write_heading(
-            drawn, f"Wrap angle {angle:.1f}°", "grey: at rest; the chords join base, contact and tip"
-        )
-        axes = axes_at(drawn, (0.1, 0.5, WIDTH - 0.2, height))
-        for points, colour in ((mesh.points, "#c4c4c4"), (shape, INK)):
-            for start, end in points[edges]:
-                axes.plot(*np.transpose([start, end]), color=colour, lw=0.7, zorder=1)
-        axes.plot(*rest.T, "--", color=MUTED, lw=1.2, zorder=2)
-        axes.plot(*moved.T, "o-", color=CONTACT, lw=1.6, ms=4, zorder=3)
-        ahead = moved[1] + 0.55 * (moved[1] - moved[0])
-        axes.plot(*np.transpose([moved[1], ahead]), ":", color=CONTACT, lw=1.2, zorder=2)
-        _draw_arc(axes, moved, ahead)
-        axes.set(xlim=(low[0] - 6, high[0] + 10), ylim=(low[1] - 4, high[1] + 10), aspect="equal")
-        axes.set_axis_off()
-    return drawn
-
-
-def _draw_arc(axes: Axes, kink: FloatArray, ahead: FloatArray) -> None:
-    """An arc from the first chord's extension to the second chord, with the word."""
-    start, end = (np.arctan2(*(point - kink[1])[::-1]) for point in (ahead, kink[2]))
-    radius = 0.8 * float(np.linalg.norm(ahead - kink[1]))
-    angles = np.linspace(start, end, 40)
-    arc = kink[1] + radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    axes.plot(*arc.T, color=CONTACT, lw=1.2)
-    axes.annotate("wrap", arc[20] + (1.5, 0), ha="left", va="center", color=CONTACT)
 
 
 def _draw_medians(axes: Axes, x: FloatArray, values: FloatArray) -> None:
