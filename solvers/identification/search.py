@@ -32,6 +32,9 @@ LawChoice = Literal["evidence", "given"]
 QUICK = 4
 """Steps in which a law is judged first."""
 
+IMPROBABLE = 15.0
+"""Logarithm of the ratio of evidences from which on a law is not fitted to the end."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class IdentifyingSolver:
@@ -142,13 +145,10 @@ class Identifier:
         for other in rough:
             if other.law == fit.law:
                 continue
-            if doubtful:
-                other = self._fit(other.law, fit.measurement, fit, rounds=1, steps=QUICK)
-            if other.log_evidence > fit.log_evidence - 15.0:  # a law that is less probable is not fitted on
+            other = self._fit(other.law, fit.measurement, fit, rounds=1, steps=QUICK)
+            # Laws are compared by fits to the end, unless one could not be probable even there.
+            if self._shifted(other, fit.measurement).log_evidence > fit.log_evidence - IMPROBABLE:
                 other = self._fit(other.law, fit.measurement, other)
-            if fit.estimate.inflation > 1:
-                again = self._fit(other.law, fit.measurement, fit)
-                other = max(other, again, key=lambda each: each.log_evidence)
             fits.append(other)
         for each in fits:
             self._known.setdefault(each.law, each)
