@@ -9,7 +9,7 @@ import pytest
 from geometry.content_hash import PROGRAM
 
 ROOT = Path(__file__).parents[1]
-DIGESTS = ("sources_digest", "job_definition")
+DIGESTS = ("sources_digest", "job_definition", "job.definition")
 
 
 @pytest.fixture(scope="module")

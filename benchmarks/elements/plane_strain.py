@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from rich.table import Table
 
 from benchmarks.tables import DOCS, fill, keep_rows, kept_rows, markdown
-from compare.evaluation.differences import field_difference
+from compare.evaluation.evaluation import field_difference
 from compare.figures.style import axes_at, write_heading
 from compare.runtime.tables import terminal_table
 from geometry.cache import finger_mesh

@@ -1,15 +1,15 @@
 """The force of the indenter in the frames of a film, from its markers: afterwards, or live."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 from rich.table import Table
 
-from compare.figures.force_charts import draw_force_track
-from compare.runtime.newest import NewestOnly
+from compare.figures.charts import draw_force_track
 from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.settings import MeshSettings
@@ -21,6 +21,44 @@ from solvers.solver import Progress
 from vision.frames.frame import Frame
 from vision.tracking.frame_tracker import FrameDetections
 from vision.tracking.trajectories import Tracking
+
+Newest = TypeVar("Newest")
+
+
+class NewestOnly(Generic[Newest]):
+    """Does work on items in a thread: always on the newest one, on none twice; the others are passed over.
+
+    A context manager, at whose end the last item is worked on. An error in the work is raised by `finish`,
+    which may be called before the end; no item may follow it.
+    """
+
+    def __init__(self, work: Callable[[Newest], None]) -> None:
+        self.passed_over = 0  #: Number of items that were not worked on.
+        self._work = work
+        self._thread = ThreadPoolExecutor(max_workers=1)
+        self._taken: list[Future[None]] = []
+
+    def put(self, item: Newest) -> None:
+        """Leave an item to be worked on, in place of one that waits."""
+        if self._taken and self._taken[-1].cancel():
+            self._taken.pop()
+            self.passed_over += 1
+        self._taken.append(self._thread.submit(self._work, item))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._thread.shutdown()
+        if kind is None:
+            self.finish()
+
+    def finish(self) -> None:
+        """Wait until the last item is done."""
+        self._thread.shutdown()
+        for work in self._taken:
+            work.result()
+
 
 MESH = MeshSettings(size=1.0, corner_size=0.2)
 """Elements: the default finger is a thousandth stiffer with them than with those of 0.25 mm."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from compare.crossval.folds import ALL, SCHEMES
 from compare.evaluation.truths import SLIDING, TRUTHS, Truth, check_truths
+from compare.runtime.output_folder import job_definition
 from compare.runtime.provenance import cores
-from compare.runtime.resumable_folder import job_definition
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.design import Design

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.evaluation.certificate import ROUNDING
-from compare.evaluation.differences import field_difference
-from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation, field_difference
 from compare.runtime.tables import percent
 from solvers.problem import Problem
 from solvers.registry import MissingLibraryError, make_solver

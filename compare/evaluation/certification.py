@@ -8,8 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from compare.evaluation.certificate import ROUNDING, Certificate, Region
-from compare.evaluation.differences import field_difference
-from compare.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation
+from compare.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation, field_difference
 from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.boundary import boundary_edges, boundary_loops, mean_thickness, singular_points
 from geometry.mesh.quadrature import body_quadrature

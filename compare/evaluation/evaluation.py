@@ -8,20 +8,67 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import TypeAdapter
 
 from compare.evaluation.certificate import Certificate
-from compare.evaluation.differences import ReferenceDifferences
 from geometry.arrays import FloatArray
 from geometry.atomic import write_arrays
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.lagrange import LagrangeSpace
 from solvers.solution import SolidField, Solution
+
+
+class FieldDifference(NamedTuple):
+    """Difference of a field from the reference's, over the whole body."""
+
+    rel_l2: float  #: Area-weighted L2 norm of the difference over the norm of the reference.
+    mean: float  #: Area-weighted mean of the pointwise absolute difference, in the field's unit.
+    p95: float  #: Area-weighted 95th percentile of the pointwise absolute difference.
+
+
+class ReferenceDifferences(NamedTuple):
+    """Differences of a solver from the reference on the shared mesh, or of the exact solution from it."""
+
+    displacement: FieldDifference  #: Of the displacement vector, mm.
+    von_mises: FieldDifference  #: MPa.
+    stress: Mapping[str, FieldDifference]  #: Of the in-plane Cauchy stress components, by name, MPa.
+    strain: Mapping[str, FieldDifference]  #: Of the in-plane strain components, by name.
+    mae_markers: float  #: Mean over the markers of `|du| + |dv|`, mm.
+    energy: float  #: Relative difference of the energy, signed.
+
+
+def field_difference(values: FloatArray, reference: FloatArray, weights: FloatArray) -> FieldDifference:
+    """Difference of two fields given at quadrature points.
+
+    Args:
+        values: Shape (q,) or (q, k).
+        reference: Of the same shape.
+        weights: Quadrature weights, shape (q,), mm^2.
+    """
+    size = _magnitude(values - reference)
+    norm = np.sqrt((weights * _magnitude(reference) ** 2).sum())
+    return FieldDifference(
+        rel_l2=float(np.sqrt((weights * size**2).sum()) / norm) if norm > 0 else float("nan"),
+        mean=float((weights * size).sum() / weights.sum()),
+        p95=weighted_percentile(size, weights, 95),
+    )
+
+
+def weighted_percentile(values: FloatArray, weights: FloatArray, percent: float) -> float:
+    """The value below which `percent` of the total weight lies."""
+    order = np.argsort(values)
+    share = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(share, percent / 100 * share[-1])])
+
+
+def _magnitude(values: FloatArray) -> FloatArray:
+    return np.abs(values) if values.ndim == 1 else np.asarray(np.linalg.norm(values, axis=1))
+
 
 QUADRATURE_DEGREE = 2
 IN_SAMPLE = "† was given these markers: its errors there are training errors"

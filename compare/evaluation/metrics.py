@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from compare.evaluation.differences import FieldDifference, ReferenceDifferences, field_difference
-from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation, FieldDifference, ReferenceDifferences, field_difference
 from geometry.arrays import FloatArray
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations

@@ -7,12 +7,11 @@ import matplotlib as mpl
 import numpy as np
 
 from compare.evaluation.comparison import TRUTH, Comparison
-from compare.evaluation.differences import field_difference, weighted_percentile
-from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation, field_difference, weighted_percentile
 from compare.evaluation.metrics import COMPONENTS
 from compare.figures import body
+from compare.figures.body import PERCENT, Scale, diverging, sequential, symmetric
 from compare.figures.canvas import Canvas
-from compare.figures.colours import PERCENT, Scale, diverging, sequential, symmetric
 from compare.figures.style import axes_at, write_heading
 from compare.runtime.tables import percent, significant
 from geometry.arrays import FloatArray

@@ -10,14 +10,17 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import IN_SAMPLE, Evaluation
 from compare.evaluation.force_displacement import ForceCurve, force_curves
 from compare.evaluation.metrics import held_out_errors
-from compare.figures.colours import PERCENT
+from compare.figures.body import PERCENT
+from compare.figures.charts import (
+    draw_energy,
+    draw_force_displacement,
+    draw_losses,
+    draw_marker_errors,
+)
 from compare.figures.design_drawing import draw_design
 from compare.figures.fields import DECADES, QUANTITIES, FieldQuantity, draw_excess, draw_field
-from compare.figures.force_charts import draw_force_displacement
-from compare.figures.marker_chart import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
-from compare.figures.record_charts import draw_energy, draw_losses
 from geometry.errors import UserError
 from geometry.figure import Figure
 

@@ -10,8 +10,8 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import body
+from compare.figures.body import Scale
 from compare.figures.canvas import Canvas, Extent
-from compare.figures.colours import Scale
 from compare.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure

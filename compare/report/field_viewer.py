@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from compare.evaluation.comparison import TRUTH, Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.figures.colours import diverging
+from compare.figures.body import diverging
 from compare.figures.fields import QUANTITIES, FieldQuantity, difference_scale, field_scale, triangle_values
 from geometry.arrays import FloatArray
 from geometry.mesh.boundary import boundary_edges, edge_paths

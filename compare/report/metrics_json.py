@@ -5,8 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.differences import FieldDifference, ReferenceDifferences
-from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation, FieldDifference, ReferenceDifferences
 from compare.evaluation.metrics import (
     MEANS,
     MarkerErrors,

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from rich.table import Table
 
-from compare.runtime.resumable_folder import job_definition
+from compare.runtime.output_folder import job_definition
 from compare.runtime.stages import Stages
 from compare.runtime.tables import NONE, Cell, terminal_table, write_csv
 from geometry.atomic import write_json

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from compare.runtime.output_folder import locked
-from compare.runtime.resumable_folder import check_resumable_folder
+from compare.runtime.output_folder import check_resumable_folder, locked
 from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from compare.evaluation.differences import field_difference
+from compare.evaluation.evaluation import field_difference
 from geometry.arrays import FloatArray
 from geometry.finger.finger import Finger
 from geometry.mesh.boundary import mean_thickness, singular_points

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from compare.evaluation.deformed_body import ADVICE
 from compare.evaluation.plausibility import LOOKS_LIKE
-from compare.runtime.output_folder import check_links, locked
-from compare.runtime.resumable_folder import check_resumable_folder
+from compare.runtime.output_folder import check_links, check_resumable_folder, locked
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
 from geometry.errors import UserError

@@ -80,7 +80,7 @@ def compare(
     from compare.pipeline.job import Job
     from compare.pipeline.pipeline import run
     from compare.pipeline.shared_mesh import tolerance_reached
-    from compare.report.terminal import body_table, marker_table
+    from compare.report.tables import body_table, marker_table
     from compare.runtime.stages import Stages
     from pinnray.commands.launch import on_ranks
     from pinnray.options.cost import EXPERIMENT

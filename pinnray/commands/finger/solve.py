@@ -38,7 +38,7 @@ def solve(
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
     from compare.evaluation.metrics import evaluated
     from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
-    from compare.figures.force_charts import draw_force_displacement
+    from compare.figures.charts import draw_force_displacement
     from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached
     from compare.report.vtu_file import write_vtu
     from compare.runtime.stages import Stages

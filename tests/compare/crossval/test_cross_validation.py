@@ -198,7 +198,9 @@ def test_simulated_markers_of_a_file_are_called_simulated_everywhere(
     tmp_path, capsys, monkeypatch, in_line, observations
 ):
     headings = []
-    monkeypatch.setattr("compare.crossval.charts.write_heading", lambda _, *texts: headings.extend(texts))
+    monkeypatch.setattr(
+        "compare.crossval.output_files.write_heading", lambda _, *texts: headings.extend(texts)
+    )
     file, out = tmp_path / "markers.csv", tmp_path / "out"
     write_measurements(file, replace(observations, simulated=True, source="made up"))
     assert run(f"--measurements {file} --solvers fem,gp --schemes one-out --seeds 1", out) == 0

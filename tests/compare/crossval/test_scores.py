@@ -7,7 +7,6 @@ import pytest
 from rich.console import Console
 from scipy.stats import t
 
-from compare.crossval.charts import draw_fields, draw_held_out, draw_weight_sweeps
 from compare.crossval.folds import (
     ALL,
     DRAWS,
@@ -21,11 +20,11 @@ from compare.crossval.folds import (
     hide_markers,
     load_cases_of,
 )
+from compare.crossval.output_files import draw_fields, draw_held_out, draw_weight_sweeps
 from compare.crossval.result import Case, CaseResult, CrossvalResult
 from compare.crossval.scores import Difference, Interval, differences, of_scheme, score
 from compare.crossval.study import EVERY_TRUTH, CrossvalStudy, solver_variants
-from compare.crossval.tables import truth_tables
-from compare.crossval.verdicts import verdict_sentences
+from compare.crossval.tables import truth_tables, verdict_sentences
 from compare.evaluation.truths import TRUTHS
 from compare.runtime.tables import terminal_table
 from geometry.finger.design import Design

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.differences import field_difference, weighted_percentile
+from compare.evaluation.evaluation import field_difference, weighted_percentile
 from compare.evaluation.metrics import (
     MEANS,
     force_error,

@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from compare.evaluation.differences import ReferenceDifferences
-from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation, ReferenceDifferences
 from compare.evaluation.metrics import indistinct, reference_differences
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compare.evaluation.evaluation import Evaluation
-from compare.figures.colours import Scale, diverging, sequential, symmetric
+from compare.figures.body import Scale, diverging, sequential, symmetric
 from compare.figures.fields import QUANTITIES, difference_scale, field_scale, max_principal
 from geometry.mesh.triangle_mesh import TriangleMesh
 

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.report.terminal import body_table, marker_table
+from compare.report.tables import body_table, marker_table
 
 Comparing = Callable[..., Comparison]
 

@@ -4,7 +4,7 @@ from threading import Event
 
 import pytest
 
-from compare.runtime.newest import NewestOnly
+from compare.camera.force_estimate import NewestOnly
 
 
 def test_the_newest_item_is_taken_and_those_before_it_are_passed_over():

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from compare.runtime.resumable_folder import check_resumable_folder
+from compare.runtime.output_folder import check_resumable_folder
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from studies.sweep import sweep

@@ -1,0 +1,344 @@
+"""Charts of the records that solvers keep on their way: energy, and losses of trained networks."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.force_displacement import ForceCurve, follows_load
+from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
+from compare.figures.style import (
+    axes_at,
+    legend_above,
+    legend_below_heading,
+    legend_height,
+    solver_colour,
+    write_heading,
+)
+from geometry.arrays import BoolArray, FloatArray
+from geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
+from geometry.observations import Observations
+
+HEAD = 0.3
+"""Height of the heading, inches."""
+
+Group = tuple[str, str]
+"""Abscissa and ordinate of a record: names of its columns."""
+
+
+def records_by_kind(evaluations: Sequence[Evaluation]) -> dict[Group, list[Evaluation]]:
+    """The evaluations by the first column of their record and the one over it: `energy`, or the second."""
+    groups: dict[Group, list[Evaluation]] = {}
+    for evaluation in evaluations:
+        abscissa, *others = list(evaluation.history) or [""]
+        if others and len(evaluation.history[abscissa]):
+            column = "energy" if "energy" in others else others[0]
+            groups.setdefault((abscissa, column), []).append(evaluation)
+    return groups
+
+
+def approaches_reference(group: Group) -> bool:
+    """True if the record should end at the reference's energy.
+
+    The record of a load that grows is a path through other problems, and other columns are no energies.
+    """
+    abscissa, column = group
+    return column == "energy" and not abscissa.startswith("load")
+
+
+def draw_energy(comparison: Comparison) -> Figure | None:
+    """Draw every solver's record, a row for each kind; beside it the distance from the reference's energy.
+
+    None without a record.
+    """
+    evaluations, reference = comparison.evaluations, comparison.reference
+    groups = records_by_kind(evaluations)
+    if not groups:
+        return None
+    colours = {evaluation.solver: solver_colour(number) for number, evaluation in enumerate(evaluations)}
+    line = f"{reference.label} {reference.energy:.4g}"
+    height, foot, left, gap = 1.6, 0.45, 0.75, 0.85  # inches
+    heights = [
+        legend_height([*map(_record_label, members), *([line] if approaches_reference(group) else [])])
+        for group, members in groups.items()
+    ]
+    with figure(HEAD + sum(heights) + len(groups) * (height + foot)) as drawn:
+        write_heading(drawn, "Energy on the way to the solution")
+        for row, (group, members) in enumerate(groups.items()):
+            others = [each for each in members if each is not reference and not each.in_sample]
+            compared = others if approaches_reference(group) else []
+            columns = 2 if compared else 1
+            width = (WIDTH - left - 0.15 - (columns - 1) * gap) / columns
+            top = HEAD + sum(heights[: row + 1]) + row * (height + foot)
+            axes = axes_at(drawn, (left, top, width, height))
+            energies = [each.history[group[1]] for each in members]
+            _draw_records(axes, group, members, energies, colours, [_record_label(each) for each in members])
+            axes.set_ylabel(readable(group[1]))
+            if compared:
+                dashes = (0, (4, 2))
+                axes.axhline(reference.energy, color=INK, lw=0.9, ls=dashes, label=line, zorder=1)
+                beside = axes_at(drawn, (left + width + gap, top, width, height))
+                away = [100 * np.abs(each.history["energy"] / reference.energy - 1) for each in compared]
+                _draw_records(beside, group, compared, away, colours, [None] * len(compared))
+                beside.set_ylabel(f"distance from {reference.solver}, %")
+            legend_above(axes)
+    return drawn
+
+
+def _record_label(evaluation: Evaluation) -> str:
+    return f"{evaluation.label} {evaluation.energy:.4g}"
+
+
+def _draw_records(
+    axes: Axes,
+    group: Group,
+    members: Sequence[Evaluation],
+    ordinates: Sequence[FloatArray],
+    colours: dict[str, str],
+    labels: Sequence[str | None],
+) -> None:
+    for evaluation, y, label in zip(members, ordinates, labels, strict=True):
+        x = evaluation.history[group[0]]
+        # Three results or fewer are no curve: a dotted line joins them.
+        marker, style = "o" if len(x) <= 40 else "", "-" if len(x) > 3 else ":"
+        colour = colours[evaluation.solver]
+        axes.plot(x, y, style, color=colour, marker=marker, label=label, lw=1.2, ms=3, zorder=2)
+    axes.set_xlabel(readable(group[0]))
+    if wants_log(np.concatenate([evaluation.history[group[0]] for evaluation in members])):
+        axes.set_xscale("log")
+    if wants_log(np.concatenate(ordinates)):
+        axes.set_yscale("log")
+    axes.grid()
+
+
+def wants_log(values: FloatArray) -> bool:
+    """True if a logarithmic axis helps: all values are positive, the largest above 20 times the smallest."""
+    finite = values[np.isfinite(values)]
+    return bool(finite.size and finite.min() > 0 and finite.max() > 20 * finite.min())
+
+
+def readable(name: str) -> str:
+    """A column's name for an axis: with its unit where it has one, without underscores."""
+    names = {
+        "seconds": "time, s",
+        "energy": "energy, N mm/mm",
+        "curve_energy": "energy added, N mm/mm",
+        "units": "hidden units of the network",
+        "load_fraction": "share of the load",
+        "weight_factor": "factor of the markers’ weight",
+    }
+    return names.get(name, name.replace("_", " "))
+
+
+def draw_losses(comparison: Comparison) -> Figure | None:
+    """Draw a chart for each term of the loss, with a line for every solver that has it (Fig. 7 of the paper).
+
+    None without a record.
+    """
+    trained = {
+        number: evaluation
+        for number, evaluation in enumerate(comparison.evaluations)
+        if {"epoch", "PDE"} <= evaluation.history.keys()
+    }
+    if not trained:
+        return None
+    units = {"PDE": "MPa", "BC": "mm²", "ASM": "mm²"}
+    terms = [name for name in units if any(name in each.history for each in trained.values())]
+    head = HEAD + legend_height([evaluation.label_at_markers for evaluation in trained.values()])
+    height, gap, foot, left = 1.15, 0.15, 0.42, 0.85  # inches
+    with figure(head + len(terms) * (height + gap) + foot) as drawn:
+        write_heading(drawn, "Losses over the epochs, without their weights")
+        for row, term in enumerate(terms):
+            axes = axes_at(drawn, (left, head + row * (height + gap), WIDTH - left - 0.15, height))
+            for number, evaluation in trained.items():
+                if term in evaluation.history:
+                    epochs, losses = evaluation.history["epoch"], evaluation.history[term]
+                    colour, label = solver_colour(number), evaluation.label_at_markers
+                    axes.plot(epochs, losses, color=colour, lw=1, label=label)
+                    if wants_log(losses):
+                        axes.set_yscale("log")
+            axes.set_ylabel(rf"$\mathcal{{L}}_\mathrm{{{term}}}$, {units[term]}")
+            axes.grid()
+            if row == 0:
+                legend_above(axes)
+            if row < len(terms) - 1:
+                axes.tick_params(labelbottom=False)
+        axes.set_xlabel("epoch")
+    return drawn
+
+
+def draw_force_displacement(
+    curves: Sequence[ForceCurve], *, depth: float, truth: ForceCurve | None = None
+) -> Figure:
+    """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
+
+    A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line. A cross
+    is the end of the simulated finger's curve.
+    """
+    labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
+    true_label = [_end_label(truth, "truth, simulated")] if truth else []
+    top, height, left = 0.3 + legend_height([*labels, *true_label]), 2.4, 0.75  # inches
+    with figure(top + height + 0.45) as drawn:
+        write_heading(drawn, "Force of the indenter along its travel")
+        axes = axes_at(drawn, (left, top, WIDTH - left - 0.65, height))
+        straight = sum(not follows_load(curve.evaluation) for curve in curves)
+        for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
+            followed = follows_load(curve.evaluation)
+            straight -= not followed
+            axes.plot(
+                curve.travel,
+                curve.force,
+                color=solver_colour(number),
+                linestyle="-" if followed else (0, (3, 2)),
+                # Straight lines often coincide: the later ones are narrower.
+                linewidth=1.3 if followed else 1.2 + 1.4 * straight,
+                marker="o" if followed or len(curve.travel) == 1 else "",
+                markersize=3.2,
+                label=label,
+                zorder=3 if followed else 2,
+            )
+        if truth:
+            end = truth.travel[-1:], truth.force[-1:]
+            axes.plot(*end, "x", ms=7, mew=1.8, color=MEASURED, label=true_label[0], zorder=4)
+        every = [*curves, truth] if truth else curves
+        axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))
+        forces = np.concatenate([curve.force for curve in every])
+        axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
+        axes.set_xlabel("travel of the indenter, mm")
+        axes.set_ylabel("force, N per mm of depth")
+        axes.grid()
+        whole = axes.secondary_yaxis(
+            "right",
+            functions=(lambda force: np.asarray(force) * depth, lambda force: np.asarray(force) / depth),
+        )
+        whole.set_ylabel(f"force for {depth:g} mm of depth, N")
+        whole.spines["right"].set(visible=True, color=INK)
+        legend_above(axes)
+    return drawn
+
+
+def _end_label(curve: ForceCurve, name: str) -> str:
+    return f"{name}, {curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
+
+
+def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, *, depth: float) -> Figure:
+    """Draw the force over time, and its place where there is at least a tenth of the largest force.
+
+    Args:
+        times: Shape (f,), s.
+        forces: Force and the ends of its interval, shape (f, 3), N; nan and inf where it is not known.
+        places: Abscissa of the contact and the ends of its interval, shape (f, 3), mm.
+        depth: Of the finger, mm.
+    """
+    known = np.isfinite(forces).all(axis=1)
+    top = float(forces[known, 2].max(initial=0.0)) or 1.0
+    pressed = known & (forces[:, 0] > 0.1 * forces[known, 0].max(initial=0.0))
+    head, height, gap, left = 0.5, 1.9, 0.25, 0.75  # inches
+    with figure(head + 2 * height + gap + 0.45) as drawn:
+        note = f"for a depth of {depth:g} mm; bands: intervals of 95 %"
+        write_heading(drawn, "Force of the indenter, by the markers", note)
+        rows = ((forces, known, "force, N"), (places, pressed, "contact, x in mm"))
+        for row, (values, shown, label) in enumerate(rows):
+            axes = axes_at(drawn, (left, head + row * (height + gap), WIDTH - left - 0.15, height))
+            value, low, high = np.where(shown[:, None], values, np.nan).T
+            axes.fill_between(times, low, high, color=solver_colour(0), alpha=0.25, linewidth=0)
+            axes.plot(times, value, color=solver_colour(0), linewidth=1.2)
+            axes.set_ylabel(label)
+            axes.grid()
+            axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-3))
+            if row == 0:
+                axes.set_ylim(0, 1.05 * top)
+                axes.tick_params(labelbottom=False)
+        axes.set_xlabel("time, s")
+    return drawn
+
+
+CIRCLE: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3.2, "mfc": "white", "mew": 0.8}
+"""Look of a training error, which is seen even where the error vanishes."""
+
+
+def draw_marker_errors(comparison: Comparison) -> Figure:
+    """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one scale.
+
+    Bars: at markers that the solver was not given. Circles: at markers that it was given.
+    """
+    evaluations, observations = comparison.evaluations, comparison.observations
+    head, title, height, gap, foot = 0.62, 0.19, 0.42, 0.09, 0.4  # inches: with legend; a solver's name; ...
+    left, step = 0.56, title + height + gap
+    width = WIDTH / 2 - left - 1.08  # where the means stand
+    ceiling = _ceiling(evaluations, observations)
+    with figure(head + len(evaluations) * step + foot) as drawn:
+        write_heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
+        fitted = any(evaluation.in_sample for evaluation in evaluations)
+        handles = [
+            Patch(facecolor=MUTED, edgecolor=MUTED, label="held out: the solver was not given this marker"),
+            Line2D([], [], **CIRCLE, color=MUTED, label="training: it was given this marker (†)"),
+        ]
+        legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
+        for row, evaluation in enumerate(evaluations):
+            held_out = held_out_errors(evaluation, observations)
+            given = marker_errors(evaluation, observations) if evaluation.in_sample else None
+            for column, symbol in enumerate("uv"):
+                axes = axes_at(drawn, (left + column * WIDTH / 2, head + title + row * step, width, height))
+                _draw_errors(axes, symbol, held_out, given, solver_colour(row))
+                _set_scales(axes, observations.visible, ceiling)
+                axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=SMALL)
+                if row == 0:
+                    axes.text(1.03, 1.06, "mean, mm", size=SMALL, color=INK, transform=axes.transAxes)
+                if column == 0:
+                    axes.set_title(evaluation.label_at_markers, size=8.5, pad=2, weight="bold")
+                if row == len(evaluations) - 1:
+                    axes.set_xlabel("marker, by its number in the drawing")
+                else:
+                    axes.tick_params(labelbottom=False)
+    return drawn
+
+
+def _ceiling(evaluations: Sequence[Evaluation], observations: Observations) -> float:
+    """The largest error of a solver that converged (or of any), mm."""
+    chosen = [evaluation for evaluation in evaluations if evaluation.converged] or evaluations
+    errors = [
+        error(evaluation, observations) for evaluation in chosen for error in (marker_errors, held_out_errors)
+    ]
+    found = [np.nanmax([error.ae_u, error.ae_v]) for error in errors if error is not None]
+    return float(max(found)) or 1.0
+
+
+def _draw_errors(
+    axes: Axes, symbol: str, held_out: MarkerErrors | None, given: MarkerErrors | None, colour: str
+) -> None:
+    """The bars and circles of one solver and component, and their means beside."""
+    words = []
+    for errors, kind in ((held_out, "held out"), (given, "training")):
+        if errors is None:
+            continue
+        values = getattr(errors, f"ae_{symbol}")
+        marker = np.arange(1, len(values) + 1)
+        seen = np.isfinite(values)
+        if errors is given:
+            axes.plot(marker[seen], values[seen], **CIRCLE, color=INK, clip_on=False, zorder=3)
+        else:
+            axes.bar(marker[seen], values[seen], 0.72, color=colour, edgecolor=colour, linewidth=0.6)
+        words.append(f"{getattr(errors, f'mae_{symbol}'):.3f} {kind}")
+    axes.text(1.03, 0.5, "\n".join(words), size=SMALL, va="center", color=MUTED, transform=axes.transAxes)
+
+
+def _set_scales(axes: Axes, visible: BoolArray, ceiling: float) -> None:
+    count = len(visible)
+    for marker in np.flatnonzero(~visible) + 1:
+        place = axes.get_xaxis_transform()
+        axes.text(marker, 0.04, "×", size=SMALL, color=MUTED, ha="center", transform=place)
+    axes.set_xticks(range(1, count + 1) if count <= 12 else range(1, count + 1, 5))
+    axes.set_xlim(0.4, count + 0.6)
+    axes.set_ylim(0, 1.04 * ceiling)
+    axes.yaxis.set_major_locator(MaxNLocator(2))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.tick_params(labelsize=SMALL)
+    axes.grid(axis="y")
+    axes.set_axisbelow(True)
