@@ -14,7 +14,7 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tables import DOCS, fill, keep_rows, kept_rows, markdown
-from compare.evaluation.virtual_experiment import virtual_experiment
+from compare.evaluation.truths import virtual_experiment
 from compare.runtime.tables import terminal_table
 from geometry.cache import finger_mesh
 from geometry.finger.presets import load_design

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from compare.evaluation.virtual_experiment import simulate
+from compare.evaluation.truths import simulate
 from geometry.arrays import BoolArray, FloatArray
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design

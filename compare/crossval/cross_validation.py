@@ -13,7 +13,7 @@ from compare.crossval.solver_folds import SWEPT, SolverTask, run_folds, sweep_we
 from compare.crossval.study import CrossvalStudy, visible_markers
 from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
-from compare.evaluation.virtual_experiment import experiment_source
+from compare.evaluation.truths import experiment_source
 from compare.runtime.output_folder import check_resumable_folder, locked
 from compare.runtime.stages import Stages, in_stages
 from geometry.arrays import FloatArray

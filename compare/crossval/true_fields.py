@@ -9,8 +9,7 @@ import numpy as np
 from compare.crossval.folds import LoadCase
 from compare.crossval.study import CrossvalStudy
 from compare.evaluation.evaluation import field_difference
-from compare.evaluation.truths import Truth
-from compare.evaluation.virtual_experiment import simulate
+from compare.evaluation.truths import Truth, simulate
 from compare.runtime.provenance import package_versions
 from compare.runtime.tables import Cell
 from geometry.arrays import FloatArray

@@ -11,8 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.force_displacement import ForceCurve, follows_load
-from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
+from compare.evaluation.metrics import ForceCurve, MarkerErrors, follows_load, held_out_errors, marker_errors
 from compare.figures.style import (
     axes_at,
     legend_above,

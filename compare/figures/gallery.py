@@ -8,8 +8,7 @@ import numpy as np
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import IN_SAMPLE, Evaluation
-from compare.evaluation.force_displacement import ForceCurve, force_curves
-from compare.evaluation.metrics import held_out_errors
+from compare.evaluation.metrics import ForceCurve, force_curves, held_out_errors
 from compare.figures.body import PERCENT
 from compare.figures.charts import (
     draw_energy,

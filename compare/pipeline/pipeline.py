@@ -12,11 +12,10 @@ from compare.evaluation.branches import with_branches
 from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Comparison, supported_solvers
 from compare.evaluation.deformed_body import with_body_checks
-from compare.evaluation.force_displacement import force_curves, write_force_displacement
-from compare.evaluation.metrics import pick_reference
+from compare.evaluation.metrics import force_curves, pick_reference, write_force_displacement
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
-from compare.evaluation.truths import TRUTHS
-from compare.evaluation.virtual_experiment import (
+from compare.evaluation.truths import (
+    TRUTHS,
     UnfinishedExperimentError,
     no_displacements,
     virtual_experiment,
@@ -26,9 +25,8 @@ from compare.pipeline.job import Job, checked
 from compare.pipeline.shared_mesh import shared_mesh, write_rounds
 from compare.pipeline.solving import ERRORS, solve_all
 from compare.report.html_report import write_report
-from compare.report.metrics_json import metrics
+from compare.report.output_files import metrics, write_vtu
 from compare.report.tables import write_markers, write_summary, write_table_one
-from compare.report.vtu_file import write_vtu
 from compare.runtime.output_folder import check_output, replaced_folder, write_run
 from compare.runtime.provenance import package_versions
 from compare.runtime.stages import Stages

@@ -1,26 +1,163 @@
-"""The report: one HTML file that holds its pictures and needs nothing else."""
+"""The report as one HTML file, with a viewer of the fields."""
 
+import base64
+import gzip
 from collections.abc import Mapping, Sequence
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import Template
+from numpy.typing import NDArray
 
 from compare.evaluation.certification import REGION_RADIUS
-from compare.evaluation.comparison import Comparison, unsupported_remarks
+from compare.evaluation.comparison import TRUTH, Comparison, unsupported_remarks
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, indistinct, reference_differences, truth_differences
 from compare.figures import Picture
-from compare.figures.fields import QUANTITIES
+from compare.figures.body import diverging
+from compare.figures.fields import QUANTITIES, FieldQuantity, difference_scale, field_scale, triangle_values
 from compare.report import text
-from compare.report.field_viewer import viewer
-from compare.report.metrics_json import metrics
+from compare.report.output_files import metrics
 from compare.report.summary import answers
 from compare.report.tables import millimetres, printed_rows, seconds, table_one
 from compare.runtime.html import picture_urls, template_environment
 from compare.runtime.tables import distance, number, percent
+from geometry.arrays import FloatArray
 from geometry.atomic import write_text
+from geometry.mesh.boundary import boundary_edges, edge_paths
+
+BUDGET = 6_000_000
+"""Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""
+
+DISPLACEMENT = FieldQuantity(
+    "displacement",
+    "Displacement magnitude",
+    "|u|",
+    "mm",
+    False,
+    lambda evaluation: np.hypot(*evaluation.displacement.T),
+)
+
+
+class Packed:
+    """Arrays in one piece of memory; `add` gives the place and type by which the browser reads one."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self._length = 0
+
+    def add(self, values: NDArray[Any]) -> dict[str, Any]:
+        """Append an array of float32, uint32 or uint16."""
+        data = values.tobytes()
+        place = {"kind": str(values.dtype), "offset": self._length, "length": values.size}
+        data += bytes(-len(data) % 4)
+        self._pieces.append(data)
+        self._length += len(data)
+        return place
+
+    def add_steps(self, values: FloatArray) -> dict[str, Any]:
+        """Append values as steps of their range: value = low + step * number."""
+        low, high = float(values.min()), float(values.max())
+        step = (high - low) / 65_535 or 1.0
+        steps = np.round((values - low) / step).astype("<u2")
+        return self.add(steps) | {"low": low, "step": step}
+
+    def text(self) -> str:
+        """All of it, compressed, in Base64."""
+        return _base64(b"".join(self._pieces))
+
+
+def viewer(comparison: Comparison) -> dict[str, Any] | None:
+    """Manifest, packed arrays and library of the viewer; None where there is no field to show.
+
+    There are no solvers whose field is not finite, and no quantities beyond the `BUDGET`.
+    """
+    mesh, reference = comparison.mesh, comparison.reference
+    shown = [each for each in comparison.shown_fields if each.finite]
+    size = 2 * len(shown) * len(mesh.triangles)
+    quantities = [DISPLACEMENT, *QUANTITIES][: BUDGET // size if size else 0]
+    if not quantities or not reference.finite:
+        return None
+    packed = Packed()
+    manifest = {
+        "points": packed.add(mesh.points.astype("<f4")),
+        "triangles": packed.add(mesh.triangles.astype("<u4")),
+        "outlines": [path.tolist() for path in edge_paths(boundary_edges(mesh.triangles))],
+        "reference": reference.label,
+        "differences": [_stop(share) for share in np.linspace(0, 1, 17)],
+        "quantities": [
+            {
+                "title": quantity.title,
+                "unit": quantity.unit,
+                "low": (scale := field_scale(quantity, mesh, reference)).low,
+                "high": scale.high,
+                "signed": quantity.signed,
+            }
+            for quantity in quantities
+        ],
+        "solvers": [_solver(each, comparison, quantities, packed) for each in shown],
+    }
+    return {"manifest": manifest, "data": packed.text(), "library": _library(), "shown": shown}
+
+
+def _solver(
+    evaluation: Evaluation, comparison: Comparison, quantities: Sequence[FieldQuantity], packed: Packed
+) -> dict[str, Any]:
+    """A solver's fields; of a solver that is not the reference, their differences from it."""
+    mesh, reference = comparison.mesh, comparison.reference
+    is_reference = evaluation is reference
+    fields = []
+    for quantity in quantities:
+        values = triangle_values(quantity, evaluation)
+        if is_reference:
+            fields.append(packed.add_steps(values))
+            continue
+        own = packed.add_steps(values - triangle_values(quantity, reference))
+        fields.append(own | {"scale": difference_scale(quantity, mesh, evaluation, reference).high})
+    fractions, states, path = _load_path(evaluation)
+    return {
+        "label": "truth (simulated)" if evaluation.solver == TRUTH else evaluation.label,
+        "isReference": is_reference,
+        "fields": fields,
+        "fractions": fractions,
+        "states": packed.add_steps(states),
+        "path": path,
+    }
+
+
+def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
+    """Fractions of the load, the nodes' displacements there, shape (k, n, 2), mm, and a word on them."""
+    path, fractions = evaluation.path, evaluation.history.get("load_fraction")
+    if path is not None and fractions is not None and len(path) == len(fractions) > 1:
+        chosen = np.unique(np.linspace(0, len(path) - 1, min(16, len(path))).round().astype(int))
+        word = f"load path of {len(path) - 1} equilibria that the solver found"
+        return np.asarray(fractions)[chosen].tolist(), path[chosen], word
+    word = (
+        "scaled in proportion to the load, as the linear law has it"
+        if evaluation.law == "linear"
+        else "end state scaled for the eye: this solver records no load path"
+    )
+    end = evaluation.node_displacement
+    return [0.0, 1.0], np.stack([np.zeros_like(end), end]), word
+
+
+def _stop(share: float) -> list[Any]:
+    """A stop of the colour scale of differences, as Plotly takes it."""
+    red, green, blue, _ = diverging()(share, bytes=True)
+    return [round(float(share), 4), f"rgb({red},{green},{blue})"]
+
+
+@cache
+def _library() -> str:
+    """Plotly.js, compressed, in Base64."""
+    return _base64(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes())
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(gzip.compress(data, compresslevel=6, mtime=0)).decode("ascii")
 
 
 def write_report(

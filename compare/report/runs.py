@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.evaluation.metrics import MEANS
-from compare.report.metrics_json import SCHEMA
+from compare.report.output_files import SCHEMA
 from compare.report.summary import RunAnswer, answers
 from compare.runtime.html import picture_urls, write_html
 from compare.runtime.output_folder import RUN_FILE, check_links

@@ -42,7 +42,7 @@ def rig(
         out: Output folder.
     """
     from compare.camera.filmed_force import LONGEST_STEP, filmed_course, true_forces
-    from compare.evaluation.virtual_experiment import experiment_source, simulate
+    from compare.evaluation.truths import experiment_source, simulate
     from compare.pipeline.shared_mesh import shared_mesh
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions

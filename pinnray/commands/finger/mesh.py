@@ -24,7 +24,7 @@ def mesh(
     """
     from compare.figures.mesh_drawing import draw_mesh
     from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached, write_rounds
-    from compare.report.vtu_file import write_mesh
+    from compare.report.output_files import write_mesh
     from compare.runtime.stages import Stages
 
     chosen, settings = finger.read()

@@ -35,12 +35,11 @@ def solve(
     """
     from compare.evaluation.certification import with_certificates
     from compare.evaluation.deformed_body import with_body_checks
-    from compare.evaluation.force_displacement import force_curves, write_force_displacement
-    from compare.evaluation.metrics import evaluated
+    from compare.evaluation.metrics import evaluated, force_curves, write_force_displacement
     from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
     from compare.figures.charts import draw_force_displacement
     from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached
-    from compare.report.vtu_file import write_vtu
+    from compare.report.output_files import write_vtu
     from compare.runtime.stages import Stages
     from solvers.problem import Problem
     from solvers.solver import Traits, solved, with_law

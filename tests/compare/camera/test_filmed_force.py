@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compare.camera.filmed_force import LONGEST_STEP, filmed_course, true_forces
-from compare.evaluation.virtual_experiment import simulate
+from compare.evaluation.truths import simulate
 from geometry.finger.design import Design
 from pinnray.cli import main
 from solvers.fem.finite_strain.solver import FemNonlinearSolver

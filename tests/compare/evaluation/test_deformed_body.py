@@ -10,7 +10,7 @@ import pytest
 from compare.evaluation.deformed_body import DeformedBody, with_body_checks
 from compare.evaluation.evaluation import Evaluation
 from compare.report.html_report import report_html
-from compare.report.metrics_json import metrics
+from compare.report.output_files import metrics
 from geometry import MeshSettings, finger_mesh, load_design
 from geometry.arrays import FloatArray
 from geometry.mesh.triangle_mesh import TriangleMesh

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.force_displacement import ForceCurve, force_curves, write_force_displacement
+from compare.evaluation.metrics import ForceCurve, force_curves, write_force_displacement
 from compare.figures.charts import draw_force_displacement
 from solvers.problem import Load
 from tests.compare.figures.drawn_pages import page_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
-from compare.evaluation.virtual_experiment import virtual_experiment
+from compare.evaluation.truths import virtual_experiment
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations

@@ -9,8 +9,7 @@ import pytest
 from compare.crossval.folds import LoadCase
 from compare.crossval.study import CrossvalStudy
 from compare.crossval.true_fields import FieldSampler, TrueField, TruthTask, simulate_truth
-from compare.evaluation.truths import SLIDING, TRUTHS, Truth
-from compare.evaluation.virtual_experiment import experiment_source, simulate
+from compare.evaluation.truths import SLIDING, TRUTHS, Truth, experiment_source, simulate
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design

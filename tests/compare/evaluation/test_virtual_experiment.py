@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.truths import TRUTHS
-from compare.evaluation.virtual_experiment import UnfinishedExperimentError, virtual_experiment
+from compare.evaluation.truths import TRUTHS, UnfinishedExperimentError, virtual_experiment
 from compare.pipeline.job import Job
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
@@ -127,9 +126,9 @@ def test_another_mesh_is_simulated_again(problem, solutions):
 
 def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(problem, solutions, monkeypatch):
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr("compare.evaluation.virtual_experiment.package_versions", lambda: {"numpy": "9"})
+    monkeypatch.setattr("compare.evaluation.truths.package_versions", lambda: {"numpy": "9"})
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr("compare.evaluation.virtual_experiment.sources_digest", lambda *_: "other")
+    monkeypatch.setattr("compare.evaluation.truths.sources_digest", lambda *_: "other")
     virtual_experiment(problem, 0.8)
     assert len(solutions) == 3
 
@@ -168,7 +167,7 @@ def test_another_truth_has_its_law_and_load(problem, solutions):
 
 def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, monkeypatch):
     """It is sampled on the shared mesh, and differs from plane strain as the depth makes it differ."""
-    monkeypatch.setattr("compare.evaluation.virtual_experiment.SOLID_SIZE", 2.5)
+    monkeypatch.setattr("compare.evaluation.truths.SOLID_SIZE", 2.5)
     design = Design(height=40, rib_count=0, tip_length=12, contact_position=18)
     short = finger_mesh(design, settings=MeshSettings(size=2.0))
     known = Problem(short, load=Load(displacement=(0.0, -0.5)), finger=design)

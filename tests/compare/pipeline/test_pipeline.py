@@ -15,7 +15,7 @@ import pytest
 import pyvista
 
 from compare.pipeline.job import Job
-from compare.report.metrics_json import metrics
+from compare.report.output_files import metrics
 from compare.runtime.provenance import package_versions
 from geometry.cache import finger_mesh
 from geometry.errors import UserError

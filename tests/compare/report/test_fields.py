@@ -6,7 +6,7 @@ import pytest
 import pyvista
 
 from compare.evaluation.evaluation import Evaluation
-from compare.report.vtu_file import write_mesh, write_vtu
+from compare.report.output_files import write_mesh, write_vtu
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 

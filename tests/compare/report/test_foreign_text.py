@@ -13,7 +13,7 @@ from compare.evaluation.comparison import Comparison
 from compare.figures import Picture
 from compare.pipeline.job import Job, checked
 from compare.report.html_report import report_html
-from compare.report.metrics_json import metrics
+from compare.report.output_files import metrics
 from compare.report.runs import read_runs, write_side_by_side
 from compare.runtime.html import PNG, SMALL, template_environment
 from geometry import Design, UserError

@@ -8,7 +8,7 @@ import pytest
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.report.metrics_json import metrics
+from compare.report.output_files import metrics
 from compare.report.summary import RunAnswer, answers
 from compare.report.text import truth_sentences
 from geometry.observations import Observations

@@ -11,7 +11,7 @@ import pytest
 
 from compare.evaluation.certification import with_certificates
 from compare.evaluation.metrics import marker_errors, reference_differences
-from compare.report.metrics_json import metrics
+from compare.report.output_files import metrics
 from geometry.finger.design import Design
 from solvers.problem import Load, Material, Problem
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from compare.report.metrics_json import metrics
+from compare.report.output_files import metrics
 from compare.report.runs import differing_settings, read_runs
 from geometry.atomic import write_json
 from pinnray.cli import main

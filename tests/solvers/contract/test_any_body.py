@@ -234,7 +234,7 @@ def test_the_certificate_of_finite_elements_has_no_fault_on_any_body(body):
 
 @pytest.mark.parametrize("body", ["ring", "feet and slot", "arch"])
 def test_the_virtual_experiment_presses_on_any_body(body):
-    from compare.evaluation.virtual_experiment import simulate
+    from compare.evaluation.truths import simulate
 
     solution = simulate(problem_of(body, COARSE, 1.0))
     assert solution.status.converged

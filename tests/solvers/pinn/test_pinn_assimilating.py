@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from compare.evaluation.virtual_experiment import virtual_experiment
+from compare.evaluation.truths import virtual_experiment
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
