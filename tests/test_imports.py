@@ -1,4 +1,8 @@
-"""The program's imports, also those inside functions and for type checkers alone."""
+"""The program's imports, also those inside functions and for type checkers alone, and its layers."""
+
+import ast
+import re
+from pathlib import Path
 
 import grimp
 import numpy as np
@@ -6,6 +10,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from geometry.content_hash import PROGRAM
+
+ROOT = Path(__file__).parents[1]
 
 
 def test_no_modules_import_one_another_in_a_circle():
@@ -16,3 +22,17 @@ def test_no_modules_import_one_another_in_a_circle():
     imports = coo_matrix((np.ones(len(pairs)), tuple(zip(*pairs, strict=True))), shape=(len(names),) * 2)
     _, circle = connected_components(imports, connection="strong")
     assert [name for name in names if np.count_nonzero(circle == circle[place[name]]) > 1] == []
+
+
+def test_only_the_front_door_names_an_option_of_the_command_line():
+    """Messages of the other packages speak of the concept: truth, travel, seed."""
+    found = []
+    for path in (path for package in PROGRAM for path in (ROOT / package).rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        texts = (node for node in ast.walk(tree) if isinstance(node, ast.Constant))
+        found += [
+            f"{path.relative_to(ROOT)}:{node.lineno}"
+            for node in texts
+            if isinstance(node.value, str) and re.search(r"(?<![\w-])--[a-z]", node.value)
+        ]
+    assert [place for place in found if not place.startswith("pinnray/")] == []

@@ -22,7 +22,7 @@ from benchmarks.tracker.films import Finger, Score, coverage, film_of, one_threa
 from compare.runtime.tables import terminal_table
 from geometry.finger.design import Design
 from vision.calibration.camera import Camera
-from vision.calibration.camera_calibration import calibrate
+from vision.calibration.camera_calibration import calibrate_camera
 from vision.calibration.chessboard import Board
 from vision.discs.disc_detector import luma_of
 from vision.rig.bench import Bench
@@ -102,7 +102,7 @@ def calibrated(camera: Camera, exposure: Exposure, seed: int) -> Camera:
         (str(number), luma_of(render(scene, camera, pose, exposure, seed=seed, frame=number)))
         for number, pose in enumerate(poses)
     )
-    return calibrate(images, BOARD).camera
+    return calibrate_camera(images, BOARD).camera
 
 
 def random_recording(finger: Finger, camera: Camera, rng: np.random.Generator, seed: int) -> Recording:

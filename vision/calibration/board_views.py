@@ -11,7 +11,6 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.bundle_adjustment import CornerObservations
 from vision.calibration.chessboard import Board
 from vision.frames.frame import GreyImage
 
@@ -68,25 +67,10 @@ def _other_sizes(sizes: Mapping[tuple[int, int], Sequence[str]]) -> str:
     others = [(name, size) for size, names in sizes.items() if size != usual for name in names]
     named = ", ".join(f"{name} {width}x{height}" for name, (width, height) in others[:MAX_NAMED])
     rest = f" and {len(others) - MAX_NAMED} more" if len(others) > MAX_NAMED else ""
-    without = " ".join(f"--without {name}" for name, _ in others)
     return (
         f"photographs for one calibration must have one size: {len(sizes[usual])} have "
-        f"{usual[0]}x{usual[1]} pixels, {named}{rest}; leave those out by {without}"
+        f"{usual[0]}x{usual[1]} pixels, {named}{rest}; leave out {', '.join(name for name, _ in others)}"
     )
-
-
-def corner_observations(views: Sequence[FloatArray] | FloatArray, board: Board) -> CornerObservations:
-    """The corners seen in all views."""
-    seen = np.isfinite(views).all(axis=2)
-    view, corner = np.nonzero(seen)
-    return CornerObservations(board.corners[corner], np.asarray(views)[seen], view)
-
-
-def residuals_by_view(residuals: FloatArray, views: Sequence[FloatArray]) -> FloatArray:
-    """Residuals of the corners that were seen, shape (m, 2), in the shape of the views, (views, n, 2)."""
-    spread = np.full(np.shape(views), np.nan)
-    spread[np.isfinite(views).all(axis=2)] = residuals
-    return spread
 
 
 def coverage(views: Sequence[FloatArray], size: tuple[int, int]) -> float:

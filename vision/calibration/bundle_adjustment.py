@@ -1,13 +1,14 @@
 """Bundle adjustment: intrinsics and board poses fitted together to observed corners.
 
-Least squares by the Levenberg-Marquardt method on the normal equations (B. Triggs et al., "Bundle
-adjustment - a modern synthesis", Vision Algorithms, 1999, sections 4 and 9). `scipy.optimize.least_squares`
-finds the same optimum to 1e-6 standard deviations, but takes 35 times as long at 40 views, since it
-factorises the whole Jacobian; its sparse solver stops 1e-2 away after hundreds of times as many steps.
-Units: mm, pixels.
+Least squares by the Levenberg-Marquardt method on the normal equations, from which the poses are eliminated
+view by view (B. Triggs et al., "Bundle adjustment - a modern synthesis", Vision Algorithms, 1999, sections 4,
+6 and 9). OpenCV's `calibrateCamera` reaches the same optimum to 1e-3 standard deviations, but starts from
+poses of its own: of 60 sets of distant boards it ended in another minimum for two, and its
+`fisheye.calibrate` gave up on 3 of 8 sets that determine the camera. Units: mm, pixels.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,181 +17,157 @@ from scipy.spatial.transform import Rotation
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import UserError
 from vision.calibration.camera import Camera
+from vision.calibration.chessboard import Board
 
-MAX_STEPS = 200
-TOLERANCE = 1e-12
-"""Relative change of the sum of squares at which the fit ends."""
-MAX_DAMPING = 1e12
 FEWEST_JACKKNIFED = 10
 """Number of views from which on their scatter counts for the covariance."""
 
 
 class Poses(NamedTuple):
-    """Poses of the board in the camera's frame, one a view."""
+    """Poses of the board in the camera's coordinates, one a view."""
 
     rotations: Rotation
     translations: FloatArray
 
     def to_camera(self, points: FloatArray, view: IntArray) -> FloatArray:
-        """Points of the board, shape (n, 3), each in a view, shape (n,), in the camera's frame."""
+        """Points of the board, shape (n, 3), each in a view, shape (n,), in the camera's coordinates."""
         return np.asarray(self.rotations[view].apply(points) + self.translations[view])
 
     def moved(self, step: FloatArray) -> "Poses":
-        """Turned and shifted in the camera's frame by a small step, shape (views, 6)."""
+        """Turned and shifted in the camera's coordinates by a small step, shape (views, 6)."""
         return Poses(Rotation.from_rotvec(step[:, :3]) * self.rotations, self.translations + step[:, 3:])
 
 
-@dataclass(frozen=True, eq=False)
-class CornerObservations:
-    """Corners seen in photographs, sorted by view.
-
-    Attributes:
-        points: In the board's frame, shape (n, 3), mm.
-        pixels: In the image, shape (n, 2).
-        view: Number of the view, shape (n,), from 0 and each at least once.
-    """
-
-    points: FloatArray
-    pixels: FloatArray
-    view: IntArray
-
-    @property
-    def starts(self) -> IntArray:
-        """Index of the first corner of every view."""
-        return np.flatnonzero(np.diff(self.view, prepend=-1))
-
-
 class Adjustment(NamedTuple):
-    """Result of a bundle adjustment.
-
-    Attributes:
-        camera: With the covariance of its free intrinsics: that of independent corners, with the standard
-            deviations of the jackknife over views where these are larger.
-        poses: Of the board.
-        residuals: Observed minus predicted, shape (n, 2), pixels.
-        independent: Standard deviations of the intrinsics if the errors of the corners are independent, shape
-            (intrinsics,), which tell whether the views determine the camera.
-    """
+    """Result of a bundle adjustment."""
 
     camera: Camera
+    """With the covariance of its free intrinsics. Corners count as independent, unless the jackknife over
+    views gives a larger standard deviation."""
     poses: Poses
     residuals: FloatArray
+    """Observed minus predicted, shape (views, n, 2), pixels; NaN where a corner was not seen."""
     independent: FloatArray
+    """Standard deviations of the intrinsics for independent corners, shape (intrinsics,)."""
 
 
-def adjust(camera: Camera, poses: Poses, observations: CornerObservations, *, free: BoolArray) -> Adjustment:
+def adjust(
+    camera: Camera, poses: Poses, views: Sequence[FloatArray] | FloatArray, board: Board, *, free: BoolArray
+) -> Adjustment:
     """Fit intrinsics and poses, from a first guess of both.
 
     Args:
         camera: First guess.
         poses: First guess.
-        observations: Corners to fit to.
+        views: Corners of the board, shape (views, n, 2), pixels; NaN where one is not seen.
+        board: In the views.
         free: True for the intrinsics that are fitted, shape (intrinsics,).
 
     Raises:
         UserError: If a corner of the first guess is behind the camera.
         LinAlgError: If the corners do not determine the free intrinsics and the poses.
     """
-    fitted = int(free.sum())
-    equations = _linearised(camera, poses, observations, free)
-    normal, gradient = equations.assembled()
-    cost, damping = np.sum(equations.residuals**2), 1e-3
-    for _ in range(MAX_STEPS):
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
+    views, fitted = np.asarray(views), int(free.sum())
+    equations = _linearised(camera, poses, views, board, free)
+    cost, damping = np.nansum(equations.residuals**2), 1e-3
+    for _ in range(200):
+        blocks, sides, by_intrinsics = equations.without_poses(damping)
+        step = np.linalg.solve(blocks.sum(axis=0), sides.sum(axis=0))
         intrinsics = camera.intrinsics
-        intrinsics[free] += step[:fitted]
+        intrinsics[free] += step
         try:
-            trial = camera.with_intrinsics(intrinsics), poses.moved(step[fitted:].reshape(-1, 6))
-            linearised = _linearised(*trial, observations, free)
-            trial_cost = np.sum(linearised.residuals**2)
+            trial = (
+                camera.with_intrinsics(intrinsics),
+                poses.moved(by_intrinsics @ np.append(-step, 1.0)),
+            )
+            linearised = _linearised(*trial, views, board, free)
+            gain = cost - np.nansum(linearised.residuals**2)
         except UserError:
-            trial_cost = np.inf
-        gain = cost - trial_cost
+            gain = -np.inf
         if gain > 0:
-            (camera, poses), cost, damping = trial, trial_cost, damping / 10
-            equations = linearised
-            normal, gradient = equations.assembled()
+            (camera, poses), equations = trial, linearised
+            cost, damping = cost - gain, damping / 10
         else:
             damping *= 10
-        if abs(gain) <= TOLERANCE * cost or damping > MAX_DAMPING:
+        if abs(gain) <= 1e-12 * cost or damping > 1e12:
             break
-    scale = np.sqrt(np.outer(np.diag(normal), np.diag(normal)))  # columns scaled to one length
-    inverse = (np.linalg.inv(normal / scale) / scale)[:fitted, :fitted]
-    variance = cost / max(equations.residuals.size - len(normal), 1)
-    independent = 0.5 * variance * (inverse + inverse.T)
-    larger = np.sqrt(np.maximum(equations.jackknife() / np.diag(independent), 1.0))
+    blocks, sides, _ = equations.without_poses()
+    inverse = np.linalg.inv(_scaled(blocks.sum(axis=0))) / _lengths(blocks.sum(axis=0))
+    unknowns = fitted + 6 * len(views)
+    independent = (inverse + inverse.T) / 2 * cost / max(np.isfinite(views).sum() - unknowns, 1)
+    larger = np.sqrt(np.maximum(_jackknife(blocks, sides) / np.diag(independent), 1.0))
     covariance = np.zeros((len(free), len(free)))
     covariance[np.ix_(free, free)] = independent * np.outer(larger, larger)
-    known = replace(camera, covariance=tuple(map(tuple, covariance.tolist())))
     deviations = np.zeros(len(free))
     deviations[free] = np.sqrt(np.diag(independent))
+    known = replace(camera, covariance=tuple(map(tuple, covariance.tolist())))
     return Adjustment(known, poses, equations.residuals, deviations)
 
 
 class _Equations(NamedTuple):
-    """Normal equations of every view.
-
-    Attributes:
-        residuals: Shape (n, 2), pixels.
-        blocks: Matrices, shape (views, fitted + 6, fitted + 6); the unknowns are the free intrinsics, then a
-            rotation vector and a shift of the view.
-        sides: Right-hand sides, shape (views, fitted + 6).
-    """
+    """Normal equations of every view for the free intrinsics, a rotation vector and a shift."""
 
     residuals: FloatArray
     blocks: FloatArray
+    """Matrices, shape (views, fitted + 6, fitted + 6)."""
     sides: FloatArray
+    """Right-hand sides, shape (views, fitted + 6)."""
 
-    def assembled(self) -> tuple[FloatArray, FloatArray]:
-        """Matrix and right-hand side of all: the free intrinsics, then six unknowns a view."""
-        views, fitted = len(self.sides), self.sides.shape[1] - 6
-        pose = fitted + np.arange(6 * views).reshape(views, 6)
-        places = np.column_stack([np.tile(np.arange(fitted), (views, 1)), pose])
-        normal, gradient = np.zeros((places[-1, -1] + 1,) * 2), np.zeros(places[-1, -1] + 1)
-        np.add.at(normal, (places[:, :, None], places[:, None, :]), self.blocks)
-        np.add.at(gradient, places, self.sides)
-        return normal, gradient
+    def without_poses(self, damping: float = 0.0) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Matrices and right-hand sides of the intrinsics alone, and the poses as functions of these.
 
-    def jackknife(self) -> FloatArray:
-        """Variances of the free intrinsics by the jackknife over views, to first order, shape (fitted,).
-
-        The errors of the corners in one photograph are correlated: by its blur, its light, the bend of the
-        board. Leaving out a view changes the intrinsics by what its corners say together. Zero with fewer
-        than `FEWEST_JACKKNIFED` views, whose scatter says little.
-
-        Source: C. F. J. Wu, "Jackknife, bootstrap and other resampling methods in regression analysis",
-        Annals of Statistics 14, 1986.
+        The poses' steps are the last product, shape (views, 6, fitted + 1), with (-step, 1).
         """
-        views, fitted = len(self.sides), self.sides.shape[1] - 6
-        if views < FEWEST_JACKKNIFED:
-            return np.zeros(fitted)
-        own, shared, pose = (
-            self.blocks[:, part, other]
-            for part, other in (
-                (np.s_[:fitted], np.s_[:fitted]),
-                (np.s_[:fitted], np.s_[fitted:]),
-                (np.s_[fitted:], np.s_[fitted:]),
-            )
-        )
-        by_pose = np.linalg.solve(pose, shared.transpose(0, 2, 1)).transpose(0, 2, 1)
-        reduced = own - by_pose @ shared.transpose(0, 2, 1)
-        sides = self.sides[:, :fitted] - (by_pose @ self.sides[:, fitted:, None])[:, :, 0]
-        without = reduced.sum(axis=0) - reduced
-        lengths = np.sqrt(np.diagonal(without, axis1=1, axis2=2))  # columns scaled to one length
-        scaled = without / (lengths[:, :, None] * lengths[:, None, :])
-        steps = np.linalg.solve(scaled, (sides / lengths)[:, :, None])[:, :, 0] / lengths
-        return np.asarray((views - 1) / views * (steps**2).sum(axis=0))
+        fitted = self.sides.shape[1] - 6
+        damped = self.blocks * (1 + damping * np.eye(fitted + 6))
+        shared, pose = damped[:, :fitted, fitted:], damped[:, fitted:, fitted:]
+        whole = np.concatenate([damped[:, :, :fitted], self.sides[:, :, None]], axis=2)
+        by_intrinsics = np.linalg.solve(pose, whole[:, fitted:])
+        reduced = whole[:, :fitted] - shared @ by_intrinsics
+        return reduced[:, :, :fitted], reduced[:, :, fitted], by_intrinsics
 
 
-def _linearised(
-    camera: Camera, poses: Poses, observations: CornerObservations, free: BoolArray
-) -> _Equations:
-    """Normal equations of the residuals, observed minus predicted."""
-    turned = poses.rotations[observations.view].apply(observations.points)
-    projection = camera.project_with_jacobians(turned + poses.translations[observations.view])
-    residuals = observations.pixels - projection.pixels
+def _linearised(camera: Camera, poses: Poses, views: FloatArray, board: Board, free: BoolArray) -> _Equations:
+    view, corner = np.nonzero(np.isfinite(views[:, :, 0]))
+    turned = poses.rotations[view].apply(board.corners[corner])
+    projection = camera.project_with_jacobians(turned + poses.translations[view])
+    residuals = np.full(views.shape, np.nan)
+    missed = residuals[view, corner] = views[view, corner] - projection.pixels
     by_turn = np.cross(turned[:, None], projection.by_point)  # ω x point: the gradient is point x gradient
     jacobian = np.concatenate([projection.by_intrinsics[:, :, free], by_turn, projection.by_point], axis=2)
-    blocks = np.add.reduceat(np.einsum("nki,nkj->nij", jacobian, jacobian), observations.starts)
-    sides = np.add.reduceat(np.einsum("nki,nk->ni", jacobian, residuals), observations.starts)
-    return _Equations(residuals, blocks, sides)
+    starts = np.flatnonzero(np.diff(view, prepend=-1))
+    blocks = np.add.reduceat(np.einsum("nki,nkj->nij", jacobian, jacobian), starts)
+    return _Equations(residuals, blocks, np.add.reduceat(np.einsum("nki,nk->ni", jacobian, missed), starts))
+
+
+def _jackknife(blocks: FloatArray, sides: FloatArray) -> FloatArray:
+    """Variances of the intrinsics by the jackknife over views, to first order, shape (fitted,).
+
+    The errors of the corners in one photograph are correlated: by its blur, its light, the bend of the board.
+    Leaving out a view changes the intrinsics by their common effect. Zero with fewer than `FEWEST_JACKKNIFED`
+    views, whose scatter is uncertain.
+
+    Source: C. F. J. Wu, "Jackknife, bootstrap and other resampling methods in regression analysis",
+    Annals of Statistics 14, 1986.
+    """
+    views, fitted = sides.shape
+    if views < FEWEST_JACKKNIFED:
+        return np.zeros(fitted)
+    kept = blocks.sum(axis=0) - blocks
+    lengths = np.sqrt(np.diagonal(kept, axis1=1, axis2=2))
+    steps = np.linalg.solve(_scaled(kept), (sides / lengths)[:, :, None])[:, :, 0] / lengths
+    return np.asarray((views - 1) / views * (steps**2).sum(axis=0))
+
+
+def _lengths(matrices: FloatArray) -> FloatArray:
+    """Products of the square roots of the diagonal entries, shape (..., n, n)."""
+    diagonal = np.diagonal(matrices, axis1=-2, axis2=-1)
+    if not (diagonal > 0).all():
+        raise np.linalg.LinAlgError("an unknown is not determined")
+    lengths = np.sqrt(diagonal)
+    return np.asarray(lengths[..., :, None] * lengths[..., None, :])
+
+
+def _scaled(matrices: FloatArray) -> FloatArray:
+    """Matrices with ones on the diagonal, for an accurate solution, shape (..., n, n)."""
+    return np.asarray(matrices / _lengths(matrices))

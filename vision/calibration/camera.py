@@ -1,13 +1,15 @@
 """Camera model: projection of points to pixels with lens distortion, and removal of the distortion.
 
-A pinhole behind one of the lenses of `vision.calibration.lens`, in the convention of OpenCV: x to the right,
-y down, z away from the camera; the centre of the first pixel is (0, 0).
+A pinhole behind a lens, by OpenCV: x to the right, y down, z away from the camera; the centre of the first
+pixel is (0, 0). The lens "brown" has radial and tangential distortion (D. C. Brown, "Close-range camera
+calibration", Photogrammetric Engineering 37, 1971); "fisheye", for angles of view beyond about 100 degrees,
+is a polynomial in the angle to the axis (J. Kannala, S. S. Brandt, "A generic camera model and calibration
+method for conventional, wide-angle, and fish-eye lenses", IEEE TPAMI 28, 2006, eq. 6).
 Units: mm in space, pixels in the image.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -16,11 +18,9 @@ from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.lens import LENSES, Lens
 
-NEWTON_STEPS = 60
-NEWTON_TOLERANCE = 1e-10
-"""Pixels."""
+LENSES = {"brown": ("k1", "k2", "p1", "p2", "k3"), "fisheye": ("k1", "k2", "k3", "k4")}
+"""Names of the distortion coefficients by the name of the lens."""
 
 
 class Pose(NamedTuple):
@@ -55,8 +55,8 @@ class Camera:
         width, height: Of its images, pixels.
         fx, fy: Focal lengths, pixels.
         cx, cy: Principal point, pixels.
-        distortion: Coefficients of the lens: k1, k2, p1, p2, k3 of "brown"; k1, k2, k3, k4 of "fisheye".
-        model: Name of the lens in `vision.calibration.lens.LENSES`.
+        distortion: Coefficients of the lens, in the order of `LENSES`.
+        model: Name of the lens in `LENSES`.
         covariance: Of `intrinsics`, in rows; None if it is not known.
 
     Raises:
@@ -91,15 +91,10 @@ class Camera:
         if self.covariance is not None:
             _check_covariance(np.array(self.covariance, dtype=np.float64), self.intrinsic_names)
 
-    @cached_property
-    def lens(self) -> Lens:
-        """The lens with its coefficients."""
-        return LENSES[self.model](*self.distortion)
-
     @property
     def intrinsic_names(self) -> tuple[str, ...]:
-        """Names of `intrinsics`: fx, fy, cx, cy and the coefficients of the lens."""
-        return ("fx", "fy", "cx", "cy", *(field.name for field in fields(LENSES[self.model])))
+        """Names of `intrinsics`."""
+        return ("fx", "fy", "cx", "cy", *LENSES[self.model])
 
     @property
     def intrinsics(self) -> FloatArray:
@@ -136,7 +131,7 @@ class Camera:
         """
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         rotation = np.asarray(cv2.Rodrigues(pose.rotation)[0], dtype=np.float64)
-        return self._pixels(self.lens.distort(_plane(points @ rotation.T + pose.translation)))
+        return self.project_with_jacobians(points @ rotation.T + pose.translation).pixels
 
     def project_with_jacobians(self, points: ArrayLike) -> Projection:
         """Project points in the camera's frame, shape (n, 3), mm, with derivatives by points and intrinsics.
@@ -145,65 +140,55 @@ class Camera:
             UserError: If a point is not in front of the camera.
         """
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-        plane = _plane(points)
-        bent = self.lens.distort(plane)
-        by_plane = np.array([[self.fx], [self.fy]]) * self.lens.jacobian(plane)
-        along_ray = -np.einsum("nij,nj->ni", by_plane, plane)
-        by_point = np.concatenate([by_plane, along_ray[:, :, None]], axis=2) / points[:, 2, None, None]
-        return Projection(self._pixels(bent), by_point, self._by_intrinsics(plane, bent))
+        behind = ~(points[:, 2] > 0)
+        if behind.any():
+            raise UserError(f"{behind.sum()} of {len(points)} points are not in front of the camera")
+        count, intrinsics = len(points), len(self.intrinsic_names)
+        if not count:
+            return Projection(np.empty((0, 2)), np.empty((0, 2, 3)), np.empty((0, 2, intrinsics)))
+        fisheye = self.model == "fisheye"
+        project = cv2.fisheye.projectPoints if fisheye else cv2.projectPoints
+        pixels, derivatives = project(points[:, None], *IDENTITY, self.matrix, np.array(self.distortion))
+        by_all = np.asarray(derivatives, dtype=np.float64).reshape(count, 2, -1)
+        # OpenCV's columns: fisheye f, c, k, rotation, shift, skew; brown rotation, shift, f, c, k.
+        by_point, first = (by_all[:, :, 11:14], 0) if fisheye else (by_all[:, :, 3:6], 6)
+        seen = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        return Projection(seen, by_point, by_all[:, :, first : first + intrinsics])
 
     def distort(self, pixels: ArrayLike) -> FloatArray:
         """Pixels of a pinhole camera to pixels behind the lens; shapes (n, 2)."""
-        return self._pixels(self.lens.distort(self._on_plane(pixels)))
+        plane = self._on_plane(np.asarray(pixels, dtype=np.float64).reshape(-1, 2))
+        return self.project(np.column_stack([plane, np.ones(len(plane))]))
 
     def undistort(self, pixels: ArrayLike) -> FloatArray:
         """Pixels behind the lens to pixels of a pinhole camera, the inverse of `distort`; shapes (n, 2).
 
-        Newton's method on every point, to 1e-10 pixels.
+        Newton's method on every point, to 1e-10 pixels; OpenCV's own inverse does not notice a fold.
 
         Raises:
             UserError: If a point lies where the distortion cannot be undone: the polynomial folds there.
         """
-        bent = self._on_plane(pixels)
-        plane, tolerance = bent.copy(), NEWTON_TOLERANCE / max(self.fx, self.fy)
-        for _ in range(NEWTON_STEPS):
-            missed, jacobian = self.lens.distort(plane) - bent, self.lens.jacobian(plane)
+        seen = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        plane, tolerance = self._on_plane(seen), 1e-10
+        for _ in range(60):
+            bent = self.project_with_jacobians(np.column_stack([plane, np.ones(len(plane))]))
+            missed, jacobian = bent.pixels - seen, bent.by_point[:, :, :2]
             upright = np.linalg.det(jacobian) > 0
             if not upright.all() or np.abs(missed).max(initial=0) < tolerance:
                 break
             plane -= np.linalg.solve(jacobian, missed[:, :, None])[:, :, 0]
         folded = ~(upright & (np.abs(missed) < 10 * tolerance).all(axis=1))
         if folded.any():
-            x, y = self._pixels(bent)[folded][0]
+            x, y = seen[folded][0]
             raise UserError(
                 f"the lens distortion cannot be undone at pixel ({x:.1f}, {y:.1f}); calibrate the camera "
                 "with boards that reach the corners of the image"
             )
-        return self._pixels(plane)
-
-    def _on_plane(self, pixels: ArrayLike) -> FloatArray:
-        """Points of the plane at depth 1 that a pinhole shows at `pixels`; shapes (n, 2)."""
-        pixels = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-        return np.asarray((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
-
-    def _pixels(self, plane: FloatArray) -> FloatArray:
-        """The inverse of `_on_plane`."""
         return np.asarray(plane * (self.fx, self.fy) + (self.cx, self.cy))
 
-    def _by_intrinsics(self, plane: FloatArray, bent: FloatArray) -> FloatArray:
-        """Derivative of pixels by the intrinsics, shape (n, 2, intrinsics), at points before the lens."""
-        zero, one = np.zeros(len(bent)), np.ones(len(bent))
-        by_pinhole = [[bent[:, 0], zero, one, zero], [zero, bent[:, 1], zero, one]]
-        by_lens = np.array([[self.fx], [self.fy]]) * self.lens.by_coefficients(plane)
-        return np.concatenate([np.array(by_pinhole).transpose(2, 0, 1), by_lens], axis=2)
-
-
-def _plane(points: FloatArray) -> FloatArray:
-    """Intersections of the rays to points, shape (n, 3), with the plane at depth 1, shape (n, 2)."""
-    behind = ~(points[:, 2] > 0)
-    if behind.any():
-        raise UserError(f"{behind.sum()} of {len(points)} points are not in front of the camera")
-    return np.asarray(points[:, :2] / points[:, 2:])
+    def _on_plane(self, pixels: FloatArray) -> FloatArray:
+        """Points of the plane at depth 1 that a pinhole shows at `pixels`; shapes (n, 2)."""
+        return np.asarray((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
 
 
 def _check_covariance(covariance: FloatArray, names: tuple[str, ...]) -> None:

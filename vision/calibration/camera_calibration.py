@@ -15,7 +15,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.board_views import FEWEST_VIEWS, coverage, find_views, residuals_by_view
+from vision.calibration.board_views import FEWEST_VIEWS, coverage, find_views
 from vision.calibration.camera import Camera
 from vision.calibration.chessboard import Board
 from vision.calibration.lens_fit import LENS_CHOICES, LensChoice, fit_lens, held_out_rms, rms
@@ -60,7 +60,7 @@ class Calibration:
         return {name: rms([residuals]) for name, residuals in self.residuals.items()}
 
 
-def calibrate(
+def calibrate_camera(
     images: Iterable[tuple[str, GreyImage]], board: Board, *, lens: LensChoice = LENS_CHOICES[0]
 ) -> Calibration:
     """Calibrate a camera from photographs of a board.
@@ -108,13 +108,13 @@ def calibrate_views(
             )
         )
     corners = list(views.values())
-    adjusted = fit_lens(corners, board, size, lens)
+    fitted = fit_lens(corners, board, size, lens)
     calibration = Calibration(
-        camera=adjusted.camera,
+        camera=fitted.camera,
         board=board,
         views=views,
-        residuals=dict(zip(views, residuals_by_view(adjusted.residuals, corners), strict=True)),
-        held_out_rms=held_out_rms(corners, board, adjusted.camera, lens),
+        residuals=dict(zip(views, fitted.residuals, strict=True)),
+        held_out_rms=held_out_rms(corners, board, fitted.camera, lens),
         coverage=coverage(corners, size),
         boardless=boardless,
     )
@@ -147,7 +147,7 @@ def _warn(calibration: Calibration) -> None:
         if error > OUTLIER * usual:
             warnings.warn(
                 f"{name} has an error of {error:.2f} px, the median is {usual:.2f} px; look whether it is "
-                f"blurred or the board bent, or calibrate without it: --without {name}",
+                "blurred or the board bent, or calibrate without it",
                 stacklevel=3,
             )
     if calibration.coverage < LEAST_COVERAGE:

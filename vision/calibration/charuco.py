@@ -127,6 +127,6 @@ def parse_board(
             raise UserError(f"the chessboard {text} has no markers; for a ChArUco board give charuco:{text}")
         return Board(columns, rows, square)
     if marker is None:
-        raise UserError(f"the board {text} has markers; give their side in mm by --marker")
+        raise UserError(f"the board {text} has markers; give their side in mm")
     name = dictionary.upper().removeprefix("DICT_")
     return CharucoBoard(columns - 1, rows - 1, square, marker, name)

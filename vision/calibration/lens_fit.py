@@ -1,11 +1,11 @@
-"""Fit of camera and lens to views of a board, from first guesses on, and its error in other views.
+"""Fit of camera and lens to views of a board, and its error in other views.
 
-Units: mm, pixels.
+A view is the corners in one photograph, in the order of the board, shape (n, 2), pixels, NaN where one is not
+seen. Units: mm, pixels.
 """
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import fields
 from typing import NamedTuple
 
 import cv2
@@ -14,40 +14,24 @@ from scipy.spatial.transform import Rotation
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.board_views import corner_observations
-from vision.calibration.bundle_adjustment import Adjustment, CornerObservations, Poses, adjust
-from vision.calibration.camera import Camera
+from vision.calibration.bundle_adjustment import Adjustment, Poses, adjust
+from vision.calibration.camera import LENSES, Camera
 from vision.calibration.chessboard import Board
-from vision.calibration.lens import LENSES
 
-FOLDS = 5
-FOCAL_LENGTHS = 2.0 ** np.arange(-2.5, 4.5, 0.5)
-"""First guesses, in widths of the image: angles of view from 140 to 4 degrees (fisheye: beyond)."""
-CORNER_ERROR, LARGEST_DEVIATION = 0.1, 0.05
-"""Pixels; largest relative standard deviation of the focal lengths for corner errors of that size."""
 UNDETERMINED = (
     "the photographs do not determine the camera; take some with the board tilted by 20 to 45 degrees in "
     "different directions"
 )
-ALIKE = 3.0
-"""Largest ratio of the reprojection errors of the two poses that a plane may have for both to be tried."""
-GAIN = 1e-6
-"""Relative change of the sum of squares from which on another pose is better."""
 
 
 class LensChoice(NamedTuple):
-    """Lens model to fit.
-
-    Attributes:
-        model: Name in `vision.calibration.lens.LENSES`.
-        fit_k3: Fit k3 of "brown", too; otherwise it is 0.
-    """
+    """Lens model to fit: a name in `LENSES`, and whether k3 of "brown" is fitted; otherwise it is 0."""
 
     model: str = "brown"
     fit_k3: bool = False
 
     def __str__(self) -> str:
-        return f"--model {self.model}{' --k3' if self.fit_k3 else ''}"
+        return f"lens model {self.model}{' with k3' if self.fit_k3 else ''}"
 
 
 LENS_CHOICES = (LensChoice(), LensChoice(fit_k3=True), LensChoice("fisheye"))
@@ -56,98 +40,91 @@ LENS_CHOICES = (LensChoice(), LensChoice(fit_k3=True), LensChoice("fisheye"))
 def fit_lens(
     views: Sequence[FloatArray], board: Board, size: tuple[int, int], lens: LensChoice
 ) -> Adjustment:
-    """Fit camera and poses to views, without a first guess."""
-    observations = corner_observations(views, board)
-    try:
-        first = initial_camera(observations, size, lens.model)
-    except UserError:
-        raise UserError(UNDETERMINED) from None
-    adjusted = _adjusted(first, observations, lens)
-    for view, pose in _other_poses(adjusted, observations):
-        rotations, translations = adjusted.poses.rotations.as_rotvec(), adjusted.poses.translations.copy()
+    """Fit camera and poses to views in images of `size`, (width, height), without a first guess.
+
+    Raises:
+        UserError: If the views do not determine the camera.
+    """
+    fit = _adjusted(_first_camera(views, board, size, lens.model), views, board, lens)
+    for view, pose in _other_poses(fit, views, board):
+        rotations, translations = fit.poses.rotations.as_rotvec(), fit.poses.translations.copy()
         rotations[view], translations[view] = np.split(pose, 2)
-        poses = Poses(Rotation.from_rotvec(rotations), translations)
         with suppress(UserError):
-            other = _adjusted(adjusted.camera, observations, lens, poses)
-            if (other.residuals**2).sum() < (1 - GAIN) * (adjusted.residuals**2).sum():
-                adjusted = other
-    return _determined(adjusted)
+            other = _adjusted(
+                fit.camera, views, board, lens, Poses(Rotation.from_rotvec(rotations), translations)
+            )
+            if np.nansum(other.residuals**2) < (1 - 1e-6) * np.nansum(fit.residuals**2):
+                fit = other
+    _check_determined(fit)
+    return fit
 
 
 def held_out_rms(views: Sequence[FloatArray], board: Board, camera: Camera, lens: LensChoice) -> float:
-    """Root mean square reprojection error, pixels, by k-fold cross-validation over the views.
+    """Root mean square reprojection error, pixels, by 5-fold cross-validation over the views.
 
-    In a view that was left out, each half of the corners gives the pose from which the other half is
-    predicted.
+    In a view outside the training set, each half of the corners gives the pose that predicts the other half.
     """
-    folds, none = min(FOLDS, len(views)), np.zeros(len(camera.intrinsic_names), dtype=bool)
-    distances = []
+    folds, distances = min(5, len(views)), []
     for fold in range(folds):
-        left_out = np.asarray(views[fold::folds])
         others = [view for number, view in enumerate(views) if number % folds != fold]
-        kept = corner_observations(others, board)
-        trained = _determined(_adjusted(camera, kept, lens)).camera
+        fit = _adjusted(camera, others, board, lens)
+        _check_determined(fit)
+        tested, none = np.asarray(views[fold::folds]), np.zeros(len(camera.intrinsic_names), dtype=bool)
         for half in board.halves:
-            known = corner_observations(np.where(half[:, None], left_out, np.nan), board)
-            asked = corner_observations(np.where(half[:, None], np.nan, left_out), board)
-            poses = adjust(trained, initial_poses(trained, known), known, free=none).poses
-            distances.append(trained.project(poses.to_camera(asked.points, asked.view)) - asked.pixels)
+            known = np.where(half[:, None], tested, np.nan)
+            poses = adjust(fit.camera, _first_poses(fit.camera, known, board), known, board, free=none).poses
+            view, corner = np.nonzero(np.isfinite(tested[:, :, 0]) & ~half)
+            predicted = fit.camera.project(poses.to_camera(board.corners[corner], view))
+            distances.append(predicted - tested[view, corner])
     return rms(distances)
 
 
+def rms(distances: Sequence[FloatArray]) -> float:
+    """Root mean square length of vectors, shapes (..., 2); NaN does not count."""
+    squares = np.concatenate([np.sum(each**2, axis=-1).ravel() for each in distances])
+    return float(np.sqrt(np.nanmean(squares)))
+
+
 def _adjusted(
-    camera: Camera, observations: CornerObservations, lens: LensChoice, poses: Poses | None = None
+    camera: Camera, views: Sequence[FloatArray], board: Board, lens: LensChoice, poses: Poses | None = None
 ) -> Adjustment:
     """Fit camera and poses from a first guess of the camera, and of the poses if there is one."""
-    free = np.array([lens.fit_k3 or lens.model != "brown" or name != "k3" for name in camera.intrinsic_names])
+    free = np.array([lens != LENS_CHOICES[0] or name != "k3" for name in camera.intrinsic_names])
     try:
-        return adjust(camera, poses or initial_poses(camera, observations), observations, free=free)
+        return adjust(camera, poses or _first_poses(camera, views, board), views, board, free=free)
     except (UserError, np.linalg.LinAlgError):
         raise UserError(UNDETERMINED) from None
 
 
-def _determined(adjusted: Adjustment) -> Adjustment:
-    """The same.
-
-    Raises:
-        UserError: If the views do not determine the focal lengths.
-    """
-    deviation = adjusted.independent[:2] / adjusted.camera.intrinsics[:2]
-    error = max(rms([adjusted.residuals]), 1e-9)
-    if not (deviation * max(1, CORNER_ERROR / error) < LARGEST_DEVIATION).all():
+def _check_determined(fit: Adjustment) -> None:
+    """Raise `UserError` unless corner errors of 0.1 pixels leave the focal lengths known within 5 %."""
+    deviation = fit.independent[:2] / fit.camera.intrinsics[:2]
+    if not (deviation * max(1, 0.1 / max(rms([fit.residuals]), 1e-9)) < 0.05).all():
         raise UserError(UNDETERMINED)
-    return adjusted
 
 
-def initial_camera(observations: CornerObservations, size: tuple[int, int], model: str) -> Camera:
-    """First guess: no distortion, principal point in the middle, the best of `FOCAL_LENGTHS`.
-
-    Args:
-        observations: Corners of the board.
-        size: (width, height) of the images, pixels.
-        model: Name of the lens.
+def _first_camera(views: Sequence[FloatArray], board: Board, size: tuple[int, int], model: str) -> Camera:
+    """The best camera without distortion whose principal point is in the middle.
 
     Raises:
-        UserError: If the poses cannot be found for any focal length.
+        UserError: If no focal length gives poses for all views.
     """
     best, least = None, np.inf
-    for focal in (size[0] * FOCAL_LENGTHS).tolist():
-        distortion = (0.0,) * len(fields(LENSES[model]))
-        centre = (0.5 * (size[0] - 1), 0.5 * (size[1] - 1))
-        camera = Camera(*size, focal, focal, *centre, distortion, model)
-        try:
-            placed = initial_poses(camera, observations).to_camera(observations.points, observations.view)
-            cost = float(np.sum((camera.project(placed) - observations.pixels) ** 2))
-        except UserError:
-            continue
-        if cost < least:
-            best, least = camera, cost
+    view, corner = np.nonzero(np.isfinite(np.asarray(views)[:, :, 0]))
+    for widths in 2.0 ** np.arange(-2.5, 4.5, 0.5):  # angles of view from 140 to 4 degrees; fisheye: beyond
+        focal, (x, y) = float(size[0] * widths), ((side - 1) / 2 for side in size)
+        camera = Camera(*size, focal, focal, x, y, (0.0,) * len(LENSES[model]), model)
+        with suppress(UserError):
+            placed = _first_poses(camera, views, board).to_camera(board.corners[corner], view)
+            cost = float(np.sum((camera.project(placed) - np.asarray(views)[view, corner]) ** 2))
+            if cost < least:
+                best, least = camera, cost
     if best is None:
-        raise UserError("no camera sees a board as it stands in the photographs")
+        raise UserError(UNDETERMINED)
     return best
 
 
-def initial_poses(camera: Camera, observations: CornerObservations) -> Poses:
+def _first_poses(camera: Camera, views: Sequence[FloatArray] | FloatArray, board: Board) -> Poses:
     """First guess of the board's pose in every view.
 
     Source: T. Collins, A. Bartoli, "Infinitesimal plane-based pose estimation", IJCV 109, 2014, as in OpenCV.
@@ -155,7 +132,7 @@ def initial_poses(camera: Camera, observations: CornerObservations) -> Poses:
     Raises:
         UserError: If the corners of a view are no image of a plane, or the distortion cannot be undone there.
     """
-    found = [poses for poses, _ in _planar_poses(camera, observations)]
+    found = [poses for poses, _ in _planar_poses(camera, views, board)]
     if not all(len(poses) and np.isfinite(poses[0]).all() for poses in found):
         raise UserError("the corners of a view are no image of a plane")
     rotations, translations = np.split(np.array([poses[0] for poses in found]), 2, axis=1)
@@ -163,15 +140,15 @@ def initial_poses(camera: Camera, observations: CornerObservations) -> Poses:
 
 
 def _planar_poses(
-    camera: Camera, observations: CornerObservations
+    camera: Camera, views: Sequence[FloatArray] | FloatArray, board: Board
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Poses that the plane of every view may have, shape (k, 6), and their errors, pixels; the best first."""
-    straight = camera.undistort(observations.pixels)
-    points, pixels = (np.split(each, observations.starts[1:]) for each in (observations.points, straight))
-    for corners, seen in zip(points, pixels, strict=True):
+    """Possible poses of the plane of every view, shape (k, 6), and their errors, pixels; the best first."""
+    for view in views:
+        seen = np.isfinite(view[:, 0])
+        straight = camera.undistort(view[seen])
         try:
             _, rotations, translations, errors = cv2.solvePnPGeneric(
-                corners, seen, camera.matrix, np.zeros(4), flags=cv2.SOLVEPNP_IPPE
+                board.corners[seen], straight, camera.matrix, np.zeros(4), flags=cv2.SOLVEPNP_IPPE
             )
         except cv2.error:
             yield np.empty((0, 6)), np.empty(0)
@@ -180,7 +157,9 @@ def _planar_poses(
         yield poses.astype(np.float64), np.ravel(errors)
 
 
-def _other_poses(adjusted: Adjustment, observations: CornerObservations) -> Iterator[tuple[int, FloatArray]]:
+def _other_poses(
+    fit: Adjustment, views: Sequence[FloatArray], board: Board
+) -> Iterator[tuple[int, FloatArray]]:
     """Views whose board could also have another pose than the fitted one, and that pose, shape (6,).
 
     A distant plane looks almost the same when it is tilted the other way: while the lens is not known, the
@@ -188,14 +167,9 @@ def _other_poses(adjusted: Adjustment, observations: CornerObservations) -> Iter
 
     Source: G. Schweighofer, A. Pinz, "Robust pose estimation from a planar target", IEEE TPAMI 28, 2006.
     """
-    for view, (poses, errors) in enumerate(_planar_poses(adjusted.camera, observations)):
+    for view, (poses, errors) in enumerate(_planar_poses(fit.camera, views, board)):
         if len(poses) > 1 and np.isfinite(poses).all():
-            fitted = adjusted.poses.rotations[view].inv()
+            fitted = fit.poses.rotations[view].inv()
             other = int((Rotation.from_rotvec(poses[:, :3]) * fitted).magnitude().argmax())
-            if errors[other] < ALIKE * errors[0]:
+            if errors[other] < 3 * errors[0]:  # both explain the corners about as well
                 yield view, poses[other]
-
-
-def rms(distances: Sequence[FloatArray]) -> float:
-    """Root mean square length of vectors, shapes (n, 2); NaN does not count."""
-    return float(np.sqrt(np.nanmean(np.sum(np.concatenate(distances) ** 2, axis=1))))

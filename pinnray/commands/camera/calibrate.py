@@ -39,8 +39,7 @@ def calibrate(
         out: Camera file, .json or .yaml.
     """
     from compare.camera.calibration_report import calibration_table, draw_calibration, view_table
-    from vision.calibration.camera_calibration import better_lens
-    from vision.calibration.camera_calibration import calibrate as calibrated
+    from vision.calibration.camera_calibration import better_lens, calibrate_camera
     from vision.calibration.camera_file import check_format, save_calibration
     from vision.calibration.charuco import parse_board
     from vision.calibration.lens_fit import LensChoice
@@ -50,7 +49,7 @@ def calibrate(
     if not images:
         raise UserError("no photograph was given; name at least 4 that show the board")
     chosen, lens = parse_board(board, square, marker=marker, dictionary=dictionary), LensChoice(model, k3)
-    calibration = calibrated(photographs(images, without=without), chosen, lens=lens)
+    calibration = calibrate_camera(photographs(images, without=without), chosen, lens=lens)
     versions = package_versions()
     save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})
     errors = calibration.view_errors

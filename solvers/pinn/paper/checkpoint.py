@@ -40,10 +40,10 @@ def load_checkpoint(folder: Path, digest: str) -> dict[str, torch.Tensor] | None
             saved = (file.metadata() or {}).get("digest")
             state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (it is no mapping)
     except (SafetensorError, OSError) as error:
-        raise UserError(f"{path} cannot be read ({error}); remove it, or train without --resume") from None
+        raise UserError(f"{path} cannot be read ({error}); remove it, or train without resuming") from None
     if saved != digest:
         raise UserError(
-            f"{path} belongs to another problem or other settings; remove it, or train without --resume"
+            f"{path} belongs to another problem or other settings; remove it, or train without resuming"
         )
     return state
 

@@ -1,4 +1,4 @@
-"""`pinn-std --preset paper`: the paper's two networks, loss and optimiser, trained for 60,000 epochs."""
+"""Preset `paper` of `pinn-std`: the paper's two networks, loss and optimiser, trained for 60,000 epochs."""
 
 import time
 from dataclasses import dataclass, field, fields, replace

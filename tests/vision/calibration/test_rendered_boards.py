@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vision.calibration.camera_calibration import calibrate
+from vision.calibration.camera_calibration import calibrate_camera
 from vision.calibration.charuco import CharucoBoard
 from vision.calibration.chessboard import Board
 from vision.rig.boards import board_poses, board_scene
@@ -26,7 +26,7 @@ def test_the_camera_is_recovered_within_its_standard_deviations(board):
         str(number): render(scene, CAMERA, pose, EXPOSURE, seed=2, frame=number)
         for number, pose in enumerate(poses)
     }
-    found = calibrate(images.items(), board)
+    found = calibrate_camera(images.items(), board)
     assert found.boardless == ()
     off = (found.camera.intrinsics - CAMERA.intrinsics)[:8]
     deviations = np.array(found.camera.standard_deviations)[:8]
