@@ -68,9 +68,9 @@ def _work(kind: str) -> Callable[[Mapping[str, Any]], Any]:
     """The function for tasks of a kind, its libraries imported: a limit of memory is the task's alone."""
     if kind == "drawing":
         from geometry.drawing.description import Description
-        from geometry.drawing.load import load_drawing
+        from geometry.drawing.load import finger_from_file
 
-        return lambda task: load_drawing(task["file"], Description(**task["description"]))
+        return lambda task: finger_from_file(task["file"], Description(**task["description"]))
     from geometry.drawing.drawn_finger import finger_from
 
     if kind == "mesh":

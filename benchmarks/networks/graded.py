@@ -23,7 +23,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, reference_differences
 from compare.runtime.tables import terminal_table
 from geometry.cache import finger_mesh
-from geometry.drawing.load import load_drawing
+from geometry.drawing.load import finger_from_file
 from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.finger.presets import load_design
@@ -70,7 +70,7 @@ def designs() -> Table:
 def drawings() -> Table:
     """Drawings of the tests."""
     files = [*sorted(DATA.glob("compliant-finray/*.stp")), DATA / "csiro-finger" / "finray_test_vol.msh"]
-    fingers: dict[str, Finger] = {path.stem: load_drawing(path) for path in files}
+    fingers: dict[str, Finger] = {path.stem: finger_from_file(path) for path in files}
     rows = default_settings(fingers | {"preset csiro": load_design("csiro")})
     return table("Networks on drawings", rows)
 

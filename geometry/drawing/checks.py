@@ -31,7 +31,7 @@ def body(loops: Sequence[Loop]) -> Section:
     ]
     _check_apart(outline, cavities)
     section = Section(outline, tuple(cavities))
-    thickness, where = thinnest_wall(section)
+    thickness, where = least_thickness(section)
     if thickness < 0.05:
         raise UserError(
             f"the wall at {place(where)} is {thickness:.3g} mm thin; make every wall at least 0.05 mm"
@@ -39,7 +39,7 @@ def body(loops: Sequence[Loop]) -> Section:
     return section
 
 
-def thinnest_wall(section: Section) -> tuple[float, FloatArray]:
+def least_thickness(section: Section) -> tuple[float, FloatArray]:
     """Thickness of the thinnest wall, mm, and a point on it, shape (2,); infinite without a wall."""
     extent = float(np.ptp(section.bounds, axis=0).max())
     points, thickness = wall_thickness(section, extent / 400)

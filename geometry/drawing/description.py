@@ -11,7 +11,7 @@ from geometry.errors import UserError
 from geometry.finger.parameters import CheckedModel, bounded
 from geometry.text_files import parse_toml, read_toml
 
-Point = tuple[float, float]
+Coordinates = tuple[float, float]
 
 
 class Description(CheckedModel):
@@ -29,18 +29,18 @@ class Description(CheckedModel):
         default=None, description="Unit of the file's coordinates; none means the file's own, or mm"
     )
     plane: str | None = Field(default=None, description="Plane in which a solid is cut, such as z = 6")
-    clamp: tuple[tuple[Point, Point], ...] | str | None = Field(
+    clamp: tuple[tuple[Coordinates, Coordinates], ...] | str | None = Field(
         default=None,
         description="Two points of the outline, or several such pairs: the boundary between them, the "
         "shorter way, is clamped; or a label of the file",
     )
-    contact: Point | str | None = Field(
+    contact: Coordinates | str | None = Field(
         default=None, description="A point of the outline, where the indenter touches; or a label of the file"
     )
     contact_width: float | None = bounded(
         None, 1e-6, 2000, "", "", "Length of front face that the indenter touches, in the file's unit"
     )
-    markers: tuple[Point, ...] | int | str | None = Field(
+    markers: tuple[Coordinates, ...] | int | str | None = Field(
         default=None, description="Centres of the markers, or their number, or a label of the file"
     )
     marker_diameter: float | None = bounded(

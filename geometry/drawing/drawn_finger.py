@@ -13,7 +13,7 @@ import numpy as np
 from geometry.arrays import FloatArray, frozen_array
 from geometry.atomic import write_text
 from geometry.content_hash import content_hash
-from geometry.drawing.checks import thinnest_wall
+from geometry.drawing.checks import least_thickness
 from geometry.drawing.placement import Placement
 from geometry.errors import UserError
 from geometry.finger.design import Design
@@ -183,7 +183,7 @@ class DrawnFinger:
     def facts(self) -> list[tuple[str, str, str]]:
         """Rows of the report: meaning, an empty symbol, and value with unit."""
         low, high = self.section.bounds
-        thickness, where = thinnest_wall(self.section)
+        thickness, where = least_thickness(self.section)
         clamp = sum(loop.lengths[which] for loop, which in self.section.named("base"))
         contact = self.section.front_point(self.contact_abscissa)
         wall = f"{thickness:.4g} mm at ({where[0]:.4g}, {where[1]:.4g})" if np.isfinite(thickness) else "none"

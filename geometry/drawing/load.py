@@ -32,7 +32,7 @@ class ContactPlace(NamedTuple):
     source: str  # `given`, `drawn` or `proposed`
 
 
-def load_drawing(path: str | Path, description: Description | None = None) -> DrawnFinger:
+def finger_from_file(path: str | Path, description: Description | None = None) -> DrawnFinger:
     """The finger of a STEP, DXF, SVG or MSH file.
 
     Args:

@@ -7,7 +7,7 @@ from pydantic import model_validator
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.finger.parameters import SYMBOLS, Parameters, parameter_info, title, with_unit
+from geometry.finger.parameters import SYMBOLS, Parameters, parameter_info, with_symbol, with_unit
 from geometry.finger.section import finger_section, marker_positions
 from geometry.finger.validation import check
 from geometry.notebook import fact_table
@@ -94,6 +94,8 @@ def by_parameter_name(values: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in values.items():
         name = SYMBOLS.get(key, key)
         if name in named:
-            raise UserError(f"{title(name)} is given twice, by its name and by its symbol; give it once")
+            raise UserError(
+                f"{with_symbol(name)} is given twice, by its name and by its symbol; give it once"
+            )
         named[name] = value
     return named

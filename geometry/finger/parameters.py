@@ -184,7 +184,7 @@ def with_unit(value: float, name: str, model: type[BaseModel] = Parameters) -> s
     return f"{value:.6g} {parameter_info(name, 'unit', model)}".rstrip()
 
 
-def title(name: str, model: type[BaseModel] = Parameters) -> str:
+def with_symbol(name: str, model: type[BaseModel] = Parameters) -> str:
     """The parameter's name with the paper's symbol, such as `rib_count (N)`."""
     symbol = parameter_info(name, "symbol", model)
     return f"{name} ({symbol})" if symbol else name
@@ -199,7 +199,7 @@ def unknown_parameter(key: str, model: type[BaseModel]) -> str:
     known = list(model.model_fields)
     near = difflib.get_close_matches(key.lower(), known, n=3, cutoff=0.6)
     near = near or [name for name in known if key.lower() in name or key.lower()[:3] == name[:3]]
-    titles = ", ".join(title(name, model) for name in near or known)
+    titles = ", ".join(with_symbol(name, model) for name in near or known)
     hint = f"did you mean {titles}?" if near else f"there are {titles}"
     return f"unknown parameter {key!r}; {hint}"
 
@@ -211,7 +211,7 @@ def _sentence(problem: ErrorDetails, model: type[BaseModel]) -> str:
     name = str(problem["loc"][0])
     if kind == "extra_forbidden":
         return unknown_parameter(name, model)
-    titled = title(name, model)
+    titled = with_symbol(name, model)
     if kind in ("greater_than_equal", "less_than_equal"):
         try:
             given = with_unit(float(value), name, model)

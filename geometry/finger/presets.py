@@ -6,7 +6,7 @@ from typing import Any
 
 from geometry.errors import UserError
 from geometry.finger.design import Design, by_parameter_name
-from geometry.finger.parameters import SYMBOLS, Parameters, title, unknown_parameter
+from geometry.finger.parameters import SYMBOLS, Parameters, unknown_parameter, with_symbol
 from geometry.text_files import read_toml
 
 OPTIONAL = tuple(name for name, field in Parameters.model_fields.items() if field.default is None)
@@ -59,7 +59,7 @@ def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
         if name not in Parameters.model_fields:
             raise UserError(unknown_parameter(key, Parameters))
         if name in overrides:
-            raise UserError(f"{title(name)} is set twice; set it once")
+            raise UserError(f"{with_symbol(name)} is set twice; set it once")
         overrides[name] = None if name in OPTIONAL and value.lower() == "none" else value
     return overrides
 

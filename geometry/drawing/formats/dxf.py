@@ -13,7 +13,7 @@ from ezdxf.lldxf.const import DXFError
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.drawing import UNITS, Drawing, label_of
 from geometry.drawing.formats.marks import Marks
-from geometry.drawing.formats.pieces import Curve, Piece, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.pieces import Curve, Piece, arc_through, arcs_along, full_circle, line
 from geometry.errors import UserError
 
 HEADER_UNITS = {1: "in", 4: "mm", 5: "cm", 6: "m", 13: "um"}
@@ -93,12 +93,12 @@ def _pieces(entity: Any, layer: str, unit: float) -> Iterator[Piece]:
             for a in (first, first + sweep / 2, first + sweep)
         )
         if sweep > 2 * np.pi - 1e-9:
-            yield from circle(0.5 * (start + middle) * unit, entity.dxf.radius * unit, layer)
+            yield from full_circle(0.5 * (start + middle) * unit, entity.dxf.radius * unit, layer)
         else:
             yield arc_through(start, middle, end, layer).scaled(unit)
     elif kind == "CIRCLE":
         centre = _flat(_world(entity, entity.dxf.center))
-        yield from circle(centre * unit, entity.dxf.radius * unit, layer)
+        yield from full_circle(centre * unit, entity.dxf.radius * unit, layer)
     elif kind == "ELLIPSE":
         first, last = entity.dxf.start_param, entity.dxf.end_param
         last += 2 * np.pi if last <= first else 0.0

@@ -54,7 +54,7 @@ def arc_through(start: ArrayLike, middle: ArrayLike, end: ArrayLike, label: str)
     return Piece(first, last, _bulge(first, half, last), label)
 
 
-def circle(centre: ArrayLike, radius: float, label: str) -> list[Piece]:
+def full_circle(centre: ArrayLike, radius: float, label: str) -> list[Piece]:
     """A full circle as two arcs, counter-clockwise."""
     middle = np.asarray(centre, dtype=np.float64)
     along = np.array([radius, 0.0])

@@ -17,7 +17,7 @@ from OCP.STEPControl import STEPControl_Reader
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import closed_loops
 from geometry.drawing.formats.drawing import UNITS, Drawing
-from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
 from geometry.drawing.formats.planes import axes_across, plane_of, plane_text
 from geometry.errors import UserError
 
@@ -221,7 +221,7 @@ def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
         yield line(start, end, "")
     elif edge.geomType() == "CIRCLE":
         if edge.IsClosed():
-            yield from circle(axes @ _array(edge.arcCenter()), edge.radius(), "")
+            yield from full_circle(axes @ _array(edge.arcCenter()), edge.radius(), "")
         else:
             yield arc_through(start, middle, end, "")
     else:

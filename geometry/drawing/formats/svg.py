@@ -13,7 +13,7 @@ import svgelements
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, label_of
 from geometry.drawing.formats.marks import Marks
-from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
 from geometry.errors import UserError
 
 LENGTHS = {**UNITS, "": 25.4 / 96, "px": 25.4 / 96, "pt": 25.4 / 72, "pc": 25.4 / 6}
@@ -205,6 +205,6 @@ def _pieces(segments: Iterable[Any], label: str, place: _Transformation) -> Iter
         elif not (round_arc and place.scale):
             yield from arcs_along(place.along(segment), 0.0, 1.0, label)
         elif abs(segment.sweep) > 2 * np.pi - 1e-9:
-            yield from circle(place(segment.center), float(segment.rx) * place.scale, label)
+            yield from full_circle(place(segment.center), float(segment.rx) * place.scale, label)
         else:
             yield arc_through(start, place(segment.point(0.5)), end, label)

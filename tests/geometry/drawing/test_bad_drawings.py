@@ -8,7 +8,7 @@ import pytest
 from geometry import UserError
 from geometry.cache import drawn_finger
 from geometry.drawing.description import Description, load_description
-from geometry.drawing.load import load_drawing, read_drawing
+from geometry.drawing.load import finger_from_file, read_drawing
 from tests.geometry.drawing.files import BEAM, FINRAY, rectangle, write_dxf, write_svg
 
 HOLE = rectangle(40, -7, 10, 4)
@@ -57,7 +57,7 @@ def test_message(tmp_path, curves, description, message):
     settings = dict(description)
     path = write_dxf(tmp_path / "bad.dxf", curves, closed=not settings.pop("_open", False))
     with pytest.raises(UserError, match=message) as error:
-        load_drawing(path, Description(**settings))
+        finger_from_file(path, Description(**settings))
     assert str(error.value).startswith("bad.dxf: ")
     assert "\n" not in str(error.value)
 
@@ -108,13 +108,13 @@ def test_a_view_box_must_be_four_numbers(box, tmp_path):
     with pytest.raises(
         UserError, match=rf"a\.svg: viewBox = '{box}' is not four numbers with width and height"
     ):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 def test_a_coordinate_must_be_a_number(tmp_path):
     path = write_svg(tmp_path / "a.svg", '<path d="M 0 0 H nan V 10 H 0 Z"/>')
     with pytest.raises(UserError, match=r"a\.svg: a coordinate of a path without an id is no number"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_a_coordinate_must_be_a_number(tmp_path):
 def test_a_damaged_header_of_a_dxf_file_is_one_line(tmp_path, text):
     (tmp_path / "a.dxf").write_text(text)
     with pytest.raises(UserError, match=r"a\.dxf: it cannot be read as DXF"):
-        load_drawing(tmp_path / "a.dxf")
+        finger_from_file(tmp_path / "a.dxf")
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_a_damaged_header_of_a_dxf_file_is_one_line(tmp_path, text):
 def test_what_svgelements_stumbles_over_is_one_line(tmp_path, head, body):
     path = write_svg(tmp_path / "a.svg", body, head)
     with pytest.raises(UserError, match=r"a\.svg"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 HEAD = 'width="100mm" height="60mm" viewBox="0 0 100 60"'
@@ -168,7 +168,7 @@ FAR = r"a coordinate is not finite or beyond 1e\+07 mm; draw the section near"
 def test_numbers_without_bounds_are_one_line(tmp_path, head, body, message):
     path = write_svg(tmp_path / "a.svg", body, head)
     with pytest.raises(UserError, match=message) as error:
-        load_drawing(path)
+        finger_from_file(path)
     assert str(error.value).startswith("a.svg: ")
     assert "\n" not in str(error.value)
 
@@ -177,14 +177,14 @@ def test_the_outermost_element_must_be_svg(tmp_path):
     path = tmp_path / "a.svg"
     path.write_text('<path xmlns="http://www.w3.org/2000/svg" d="M0 0H60V10H0Z"/>')
     with pytest.raises(UserError, match=r"a\.svg: it cannot be read as SVG: its outermost element is path"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 def test_an_unknown_entity_of_a_dxf_file_is_named(tmp_path):
     path = write_dxf(tmp_path / "a.dxf", [BEAM])
     path.write_text(path.read_text().replace("LWPOLYLINE", "LVPOLYLINE"))
     with pytest.raises(UserError, match="cannot read the LVPOLYLINE on layer"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 @pytest.mark.timeout(20)
@@ -192,7 +192,7 @@ def test_an_unknown_entity_of_a_dxf_file_is_named(tmp_path):
 def test_an_element_that_contains_itself_is_one_line(tmp_path, link):
     path = write_svg(tmp_path / "a.svg", f'<g id="a" transform="scale(2)"><use href="{link}"/><rect/></g>')
     with pytest.raises(UserError, match=r"a\.svg: it cannot be read as SVG: an element contains itself"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 def test_copies_of_copies_are_counted_before_they_are_made(tmp_path):
@@ -200,20 +200,20 @@ def test_copies_of_copies_are_counted_before_they_are_made(tmp_path):
     levels = "".join(f'<g id="g{n + 1}">{2 * f"""<use href="#g{n}"/>"""}</g>' for n in range(30))
     path = write_svg(tmp_path / "a.svg", f'<g id="g0"><rect width="9" height="3"/></g>{levels}')
     with pytest.raises(UserError, match=r"a\.svg: it cannot be read as SVG: its copies make \d+ elements"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 def test_a_drawing_of_which_all_is_called_front_is_read(tmp_path):
     """What is named may lie on the boundary, but here it is the boundary."""
     path = write_svg(tmp_path / "a.svg", '<g id="front"><rect width="60" height="9"/></g>')
-    finger = load_drawing(path, Description(clamp=[[0, 0], [0, -9]], contact=[40, 0]))
+    finger = finger_from_file(path, Description(clamp=[[0, 0], [0, -9]], contact=[40, 0]))
     assert np.ptp(finger.section.outline.points, axis=0) == pytest.approx([60, 9])
 
 
 def test_the_contact_is_not_the_whole_outline(tmp_path):
     path = write_svg(tmp_path / "a.svg", '<g id="contact"><rect width="20" height="5" rx="0.2"/></g>')
     with pytest.raises(UserError, match=r"the contact begins and ends at .*; call only the part contact"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 def test_a_step_file_that_was_cut_off_is_one_line(tmp_path):
@@ -246,19 +246,19 @@ def test_a_marker_must_be_round(tmp_path):
         tmp_path / "a.svg", '<rect width="50" height="9"/><g id="markers"><rect width="1" height="1"/></g>'
     )
     with pytest.raises(UserError, match="is no circle"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 def test_markers_have_one_diameter(tmp_path):
     circles = '<circle cx="9" cy="4" r="1"/><circle cx="19" cy="4" r="2"/>'
     path = write_svg(tmp_path / "a.svg", f'<rect width="50" height="9"/><g id="markers">{circles}</g>')
     with pytest.raises(UserError, match="have diameters from 2 to 4 mm"):
-        load_drawing(path)
+        finger_from_file(path)
 
 
 def test_plane_must_be_a_plane():
     with pytest.raises(UserError, match=r'cannot read the plane .*"z = 6"'):
-        load_drawing(FINRAY / "Finray_8.stp", Description(plane="middle"))
+        finger_from_file(FINRAY / "Finray_8.stp", Description(plane="middle"))
 
 
 def test_everything_clamped(tmp_path):
@@ -266,4 +266,4 @@ def test_everything_clamped(tmp_path):
     corners = np.array(BEAM)
     pairs = [[a.tolist(), b.tolist()] for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
     with pytest.raises(UserError, match="whole outline is clamped"):
-        load_drawing(path, Description(clamp=pairs))
+        finger_from_file(path, Description(clamp=pairs))

@@ -11,11 +11,11 @@ from geometry import Design, MeshSettings, UserError, load_design
 from geometry.cad import write_dxf as export_dxf
 from geometry.cad import write_step as export_step
 from geometry.cad import write_svg as export_svg
-from geometry.drawing.checks import thinnest_wall
+from geometry.drawing.checks import least_thickness
 from geometry.drawing.description import Description, load_description
 from geometry.drawing.drawn_finger import DrawnFinger, description_lines
-from geometry.drawing.formats.pieces import circle
-from geometry.drawing.load import load_drawing
+from geometry.drawing.formats.pieces import full_circle
+from geometry.drawing.load import finger_from_file
 from geometry.mesh.mesher import build_mesh
 from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, rectangle, write_beam_mesh, write_dxf, write_svg
 
@@ -38,7 +38,7 @@ def clamped_length(finger):
 @pytest.mark.parametrize("export", [export_step, export_dxf, export_svg])
 def test_a_design_comes_back_in_its_own_frame(tmp_path, export):
     design = Design()
-    finger = load_drawing(export(design, tmp_path)[0])
+    finger = finger_from_file(export(design, tmp_path)[0])
     assert str(finger.placement) == "none"
     assert finger.section.area == pytest.approx(design.section.area, rel=1e-9)
     np.testing.assert_allclose(np.sort(finger.section.outline.points, axis=0), [[0, -30], [0, 0], [90, 0]])
@@ -55,7 +55,7 @@ def test_a_design_comes_back_in_its_own_frame(tmp_path, export):
     ids=["contact elsewhere", "csiro"],
 )
 def test_exports_name_the_clamp_and_the_contact(tmp_path, export, design):
-    finger = load_drawing(export(design, tmp_path)[0])
+    finger = finger_from_file(export(design, tmp_path)[0])
     assert finger.section.area == pytest.approx(design.section.area, rel=1e-9)
     assert (finger.sources["clamp"], finger.sources["contact"]) == ("drawn", "drawn")
     back = finger.placement.inverse  # x = 0 is at the foot, which the design has at negative x
@@ -67,7 +67,7 @@ def test_exports_name_the_clamp_and_the_contact(tmp_path, export, design):
 
 @pytest.mark.parametrize("path", FILES, ids=IDS)
 def test_frame(path):
-    finger = load_drawing(path)
+    finger = finger_from_file(path)
     outline = finger.section.outline
     assert finger.section.front_point(finger.contact_abscissa)[1] == pytest.approx(0, abs=1e-9)
     base = np.concatenate([outline.ends[which] for which in outline.pieces("base")])
@@ -90,7 +90,7 @@ def test_frame(path):
     ids=IDS,
 )
 def test_proposals(path, clamp, contact, diameter):
-    finger = load_drawing(path)
+    finger = finger_from_file(path)
     assert set(finger.sources.values()) == {"proposed", "drawn"}
     assert clamped_length(finger) == pytest.approx(clamp, abs=1e-3)
     placed = finger.placement.inverse([[finger.contact_abscissa, 0]])[0]
@@ -99,25 +99,25 @@ def test_proposals(path, clamp, contact, diameter):
     assert len(finger.markers) == 9
     assert (finger.section.clearance(finger.markers) >= finger.marker_radius).all()
     assert 3 <= (finger.markers[:, 1] > -3).sum() <= 6  # on the front and elsewhere
-    assert load_drawing(path).digest == finger.digest  # the same every time
+    assert finger_from_file(path).digest == finger.digest  # the same every time
 
 
 def test_markers_leave_a_sharp_tip_out(tmp_path):
-    finger = load_drawing(write_dxf(tmp_path / "wedge.dxf", [[(0, 0), (60, 0), (0, 20)]]))
+    finger = finger_from_file(write_dxf(tmp_path / "wedge.dxf", [[(0, 0), (60, 0), (0, 20)]]))
     assert finger.marker_diameter > 0.5
     assert (finger.markers[:, 1] > -3).sum() >= 3
 
 
 def test_a_body_held_at_both_ends_has_markers_on_both_sides(tmp_path):
     path = write_dxf(tmp_path / "beam.dxf", [BEAM])
-    finger = load_drawing(path, Description(clamp=[[[0, 0], [0, -10]], [[100, 0], [100, -10]]]))
+    finger = finger_from_file(path, Description(clamp=[[[0, 0], [0, -10]], [[100, 0], [100, -10]]]))
     assert sorted(set(finger.markers[:, 1])) == pytest.approx([-8, -2])
     assert len(finger.markers) == 9
 
 
 def test_a_long_curved_body_is_touched_at_its_side(tmp_path):
     drop = '<path d="M5 30 C 5 5 60 5 95 25 L 95 35 C 60 40 5 55 5 30 z"/>'
-    finger = load_drawing(write_svg(tmp_path / "drop.svg", drop))
+    finger = finger_from_file(write_svg(tmp_path / "drop.svg", drop))
     x, y = finger.placement.inverse([[finger.contact_abscissa, 0]])[0]
     assert (x, y) == pytest.approx((50, -11), abs=0.3)  # half of 5 to 95, on the upper side
     assert clamped_length(finger) == pytest.approx(10)
@@ -141,7 +141,7 @@ def test_the_frame_does_not_depend_on_the_file_s(tmp_path, turn, mirror):
     description = Description(
         clamp=there([(0, 0), (0, -30)]), contact=there([(35, 0)])[0], markers=there([(40, -3), (20, -2)])
     )
-    finger = load_drawing(path, description)
+    finger = finger_from_file(path, description)
     assert finger.contact_abscissa == pytest.approx(35)
     assert finger.markers == pytest.approx(np.array([[20, -2], [40, -3]]))
     assert finger.section.outline.points[list(finger.section.outline.pieces("front"))] == pytest.approx(
@@ -152,14 +152,14 @@ def test_the_frame_does_not_depend_on_the_file_s(tmp_path, turn, mirror):
 
 
 def test_ring(tmp_path):
-    finger = load_drawing(ring_file(tmp_path / "ring.dxf"))
+    finger = finger_from_file(ring_file(tmp_path / "ring.dxf"))
     outline = finger.section.outline
     assert clamped_length(finger) == pytest.approx(2 * np.pi * 20 / 6, rel=1e-2)  # the lowest sixth
     front = np.concatenate([outline.ends[which] for which in outline.pieces("front")])
     reach = 2 * 20 * np.sin(np.radians(60))
     assert np.ptp(front[:, 0]) == pytest.approx(reach, rel=1e-6)
     assert finger.section.front_point(finger.contact_abscissa)[1] == pytest.approx(0, abs=1e-9)
-    assert thinnest_wall(finger.section)[0] == pytest.approx(5)
+    assert least_thickness(finger.section)[0] == pytest.approx(5)
     assert (finger.markers[:, 1] < -10).any()  # around it, not only near the contact
     moved = finger.at_contact(finger.contact_abscissa + 5)
     assert moved.section.front_point(moved.contact_abscissa)[1] == pytest.approx(np.sqrt(375) - 20, abs=0.02)
@@ -178,13 +178,13 @@ def test_labels_of_the_file_beat_proposals_and_the_description_beats_both(tmp_pa
         document.modelspace().add_point((x, -4), dxfattribs={"layer": "markers"})
     path = tmp_path / "beam.dxf"
     document.saveas(path)
-    drawn = load_drawing(path)
+    drawn = finger_from_file(path)
     assert drawn.contact_abscissa == pytest.approx(58)  # from the right end
     assert drawn.contact_width == pytest.approx(4)
     assert drawn.markers == pytest.approx(np.array([[50, -6], [70, -6], [90, -6]]))
     assert not drawn.placement.mirrored  # half a turn
     (tmp_path / "beam.toml").write_text('clamp = [[0, 0], [0, -10]]\ndepth = 7\nname = "held-left"')
-    given = load_drawing(path)
+    given = finger_from_file(path)
     assert given.contact_abscissa == pytest.approx(42)
     assert (given.name, given.depth) == ("held-left", 7)
     assert given.sources["clamp"] == "given"
@@ -194,7 +194,7 @@ def test_labels_of_the_file_beat_proposals_and_the_description_beats_both(tmp_pa
 def test_units_apply_to_the_description(tmp_path):
     path = write_dxf(tmp_path / "beam.dxf", [[(x / 1000, y / 1000) for x, y in BEAM]])
     lines = ['units = "m"', "contact = [0.04, 0]", "depth = 0.01", "markers = 5", "contact_width = 0.003"]
-    finger = load_drawing(path, load_description(None, lines))
+    finger = finger_from_file(path, load_description(None, lines))
     assert finger.section.area == pytest.approx(1000)
     assert (finger.contact_abscissa, finger.contact_width, finger.depth) == pytest.approx((40, 3, 10))
     assert len(finger.markers) == 5
@@ -210,9 +210,9 @@ def test_units_apply_to_the_description(tmp_path):
 def test_the_lines_of_a_finger_give_it_again(tmp_path, units, lines):
     """Description lines are in the file's coordinates and hold its unit where it was given."""
     path = write_dxf(tmp_path / "beam.dxf", [[(x / 25, y / 25) for x, y in BEAM]], units=units)
-    finger = load_drawing(path, load_description(None, lines))
+    finger = finger_from_file(path, load_description(None, lines))
     (tmp_path / "beam.toml").write_text(description_lines(finger))
-    again = load_drawing(path)
+    again = finger_from_file(path)
     assert again.section.area == pytest.approx(finger.section.area)
     np.testing.assert_allclose(again.markers, finger.markers, atol=1e-9)
     assert (again.contact_abscissa, again.depth) == pytest.approx((finger.contact_abscissa, finger.depth))
@@ -220,13 +220,13 @@ def test_the_lines_of_a_finger_give_it_again(tmp_path, units, lines):
 
 
 def test_the_lines_of_a_cut_solid_hold_its_plane():
-    finger = load_drawing(FILES[0], Description(plane="z = 5"))
+    finger = finger_from_file(FILES[0], Description(plane="z = 5"))
     assert 'plane = "z = 5"' in description_lines(finger)
 
 
 def test_mesh_with_groups_is_taken_as_it_is(tmp_path):
     groups = ("base", "contact", "front", "markers")
-    finger = load_drawing(write_beam_mesh(tmp_path / "beam.msh", groups=groups))
+    finger = finger_from_file(write_beam_mesh(tmp_path / "beam.msh", groups=groups))
     mesh = finger.mesh
     assert mesh is not None
     assert mesh.areas.sum() == pytest.approx(1000)
@@ -247,14 +247,14 @@ def test_mesh_with_groups_is_taken_as_it_is(tmp_path):
 
 
 def test_markers_of_a_ready_mesh_are_its_nodes(tmp_path):
-    finger = load_drawing(write_beam_mesh(tmp_path / "beam.msh", groups=("base", "contact")))
+    finger = finger_from_file(write_beam_mesh(tmp_path / "beam.msh", groups=("base", "contact")))
     assert finger.mesh is not None
     np.testing.assert_array_equal(finger.mesh.markers, finger.markers)
 
 
 @pytest.mark.parametrize("path", FILES, ids=IDS)
 def test_definition_is_read_back(path):
-    finger = load_drawing(path)
+    finger = finger_from_file(path)
     again = DrawnFinger.from_definition(json.loads(json.dumps(finger.definition())))
     assert again.definition() == finger.definition()
     assert again.digest == finger.digest
@@ -265,7 +265,7 @@ def test_definition_is_read_back(path):
 
 
 def test_facts_say_where_values_come_from():
-    facts = {meaning: value for meaning, _, value in load_drawing(FILES[0]).facts()}
+    facts = {meaning: value for meaning, _, value in finger_from_file(FILES[0]).facts()}
     assert facts["Drawing"] == "Finray_8.stp (STEP, extruded by 12 mm, at z = 0)"
     assert facts["Placement"] == "mirrored in x, shifted by (52.8, 0) mm"
     assert facts["Depth"] == "12 mm, drawn"
@@ -275,7 +275,7 @@ def test_facts_say_where_values_come_from():
 
 @pytest.mark.parametrize("path", [FILES[0], CSIRO], ids=["Finray_8", "csiro"])
 def test_drawn_fingers_are_meshed(path):
-    finger = load_drawing(path)
+    finger = finger_from_file(path)
     mesh = build_mesh(finger, MeshSettings(size=1.5, coarsening=2))
     assert mesh.areas.sum() == pytest.approx(finger.section.area, rel=1e-3)
     assert mesh.boundary_length("base") == pytest.approx(clamped_length(finger), rel=1e-6)
@@ -283,17 +283,17 @@ def test_drawn_fingers_are_meshed(path):
 
 
 def test_ring_is_meshed(tmp_path):
-    finger = load_drawing(ring_file(tmp_path / "ring.dxf"))
+    finger = finger_from_file(ring_file(tmp_path / "ring.dxf"))
     mesh = build_mesh(finger, MeshSettings(size=1.5, coarsening=2))
     assert mesh.areas.sum() == pytest.approx(np.pi * (400 - 225), rel=1e-2)
 
 
 def test_drawn_and_parametric_csiro_agree():
     """The preset was measured on the same mesh by others."""
-    drawn, preset = load_drawing(CSIRO), load_design("csiro")
+    drawn, preset = finger_from_file(CSIRO), load_design("csiro")
     assert drawn.section.area == pytest.approx(preset.section.area, rel=5e-3)
 
 
 def test_circle_pieces_close():
-    first, second = circle([1, 2], 3, "")
+    first, second = full_circle([1, 2], 3, "")
     assert first.end == pytest.approx(second.start)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from geometry.drawing.formats.chain import closed_loops, nearest_piece, straightened
-from geometry.drawing.formats.pieces import DEVIATION, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.pieces import DEVIATION, arc_through, arcs_along, full_circle, line
 from geometry.errors import UserError
 from geometry.section.loop import Loop
 
@@ -38,7 +38,7 @@ def test_pieces_in_any_order_and_direction_are_chained():
     pieces = [
         line(corners[2], corners[1], "back"),  # against the others
         line(corners[0], corners[1], ""),
-        *circle([5, 2.5], 1, "hole"),
+        *full_circle([5, 2.5], 1, "hole"),
         line(corners[3] + [0, 4e-4], corners[0], "base"),  # an end within the tolerance
         line(corners[2], corners[3], ""),
     ]

@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from geometry import Section, load_design
-from geometry.drawing.load import load_drawing
+from geometry.drawing.load import finger_from_file
 
 MESH = Path(__file__).parents[2] / "data" / "csiro-finger" / "finray_test_vol.msh"
 WITHIN = 1e-3
@@ -17,7 +17,7 @@ WITHIN = 1e-3
 @pytest.fixture(scope="module")
 def printed() -> Section:
     """The section of the mesh with the preset's origin, the front end of the base line."""
-    section = load_drawing(MESH).section
+    section = finger_from_file(MESH).section
     return section.transformed(np.eye(2), (load_design("csiro").section.bounds[0, 0], 0.0))
 
 

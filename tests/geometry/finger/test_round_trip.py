@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import Design, load_design
-from geometry.drawing.load import load_drawing
+from geometry.drawing.load import finger_from_file
 from pinnray.cli import main
 
 FINGERS = {
@@ -27,7 +27,7 @@ def test_every_export_is_read_back_as_the_same_finger(options: list[str], tmp_pa
     design = design_of(options)
     assert main(["design", *options, "--formats", "step,dxf,svg", "--out", str(tmp_path)]) == 0
     for name in ("finger.step", "section.dxf", "section.svg"):
-        drawn = load_drawing(tmp_path / name)
+        drawn = finger_from_file(tmp_path / name)
         shift = drawn.placement.shift
         np.testing.assert_allclose(drawn.placement.matrix, np.eye(2), atol=1e-12)
         assert drawn.section.area == pytest.approx(design.section.area, rel=1e-9)
