@@ -2,7 +2,6 @@
 
 import shlex
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -45,9 +44,7 @@ def test_the_example_questions_can_be_read(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(tmp_path, monkeypatch):
     from pinnray.cli import compare_main, main
 
     monkeypatch.setattr("studies.optimum.proposals.POPULATION", 32)  # a quick search for the front

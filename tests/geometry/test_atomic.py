@@ -1,6 +1,5 @@
 import errno
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +17,7 @@ def test_the_new_file_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
     assert path.read_text() == "new"
 
 
-def test_the_new_file_is_on_the_disk_before_it_takes_the_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_new_file_is_on_the_disk_before_it_takes_the_name(tmp_path, monkeypatch):
     """A power cut after a rename alone may leave an empty file under the final name."""
     path, synced = tmp_path / "table.csv", []
     sync, replace = os.fsync, os.replace
@@ -93,9 +90,7 @@ def test_a_writer_that_leaves_nothing_is_an_error_and_the_old_file_stays(tmp_pat
     ],
     ids=["text", "arrays"],
 )
-def test_a_full_disk_names_the_file_and_leaves_the_old_one(
-    write: Callable[[Path], None], tmp_path: Path, full_disk: None
-) -> None:
+def test_a_full_disk_names_the_file_and_leaves_the_old_one(write, tmp_path, full_disk):
     path = tmp_path / "table.csv"
     path.touch()
     with pytest.raises(OSError, match="File too large") as error:

@@ -105,9 +105,7 @@ def test_refusal_in_the_worker_comes_back_as_its_own_line() -> None:
     assert "\n" not in str(refused.value)
 
 
-def test_the_worker_stays_and_follows_a_change_of_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_worker_stays_and_follows_a_change_of_folder(tmp_path, monkeypatch):
     finger_mesh(Design(), settings=COARSE, cache_dir=tmp_path / "first")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "beam.svg").write_text(
@@ -158,9 +156,7 @@ def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_p
     ],
     ids=["mesh", "cad"],
 )
-def test_a_full_disk_in_the_worker_names_the_place(
-    full_disk: None, task: dict[str, object], end: str
-) -> None:
+def test_a_full_disk_in_the_worker_names_the_place(full_disk, task, end):
     more = {"what": "this", "finger": {}, "memory_gb": 8.0}
     with Pool(1) as pool:  # a new process, which inherits the full disk
         ((_, answer),) = pool.answers(perform, {"this": {**task, **more}})
@@ -208,9 +204,7 @@ def test_meshing_works_under_mpirun(tmp_path: Path) -> None:
     assert first == second
 
 
-def test_cad_files_come_from_the_cache_the_second_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cad_files_come_from_the_cache_the_second_time(tmp_path, monkeypatch):
     first = cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
     monkeypatch.setattr("geometry.cache.run_task", None)
     second = cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")

@@ -61,9 +61,7 @@ def printed_ranges(message: str) -> dict[str, tuple[float | None, float | None]]
 
 
 @pytest.mark.parametrize(("values", "name", "reason"), BAD_DESIGNS)
-def test_bad_design_gives_one_line_with_reason_and_range(
-    messages: dict[str, str], values: dict[str, object], name: str, reason: str
-) -> None:
+def test_bad_design_gives_one_line_with_reason_and_range(messages, values, name, reason):
     message = messages[str(values)]
     assert "\n" not in message
     assert reason in message
@@ -71,9 +69,7 @@ def test_bad_design_gives_one_line_with_reason_and_range(
 
 
 @pytest.mark.parametrize(("values", "name", "reason"), BAD_DESIGNS)
-def test_printed_ranges_are_true(
-    messages: dict[str, str], values: dict[str, object], name: str, reason: str
-) -> None:
+def test_printed_ranges_are_true(messages, values, name, reason):
     message = messages[str(values)]
     assert "allowed with the rest unchanged" in message
     for parameter, ends in printed_ranges(message).items():

@@ -141,9 +141,7 @@ def test_meshing_twice_gives_the_same_mesh(fine_mesh: TriangleMesh) -> None:
         ("contact_size", (35.0, 0.0)),  # where a point load acts
     ],
 )
-def test_grading_reaches_its_size_where_asked_and_only_there(
-    setting: str, place: tuple[float, float]
-) -> None:
+def test_grading_reaches_its_size_where_asked_and_only_there(setting, place):
     mesh = build_mesh(Design(), MeshSettings(size=0.6, **{setting: 0.02}))
     ends = mesh.points[mesh.edges]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

@@ -120,9 +120,7 @@ def test_the_plane_is_that_of_the_fiducials_in_all_frames_at_rest(listed: Listed
 
 
 @pytest.mark.parametrize("size", [(1280, 721), (1281, 720)])
-def test_a_film_of_another_size_than_the_camera_is_refused(
-    listed: ListedDiscs, size: tuple[int, int]
-) -> None:
+def test_a_film_of_another_size_than_the_camera_is_refused(listed, size):
     listed.size = size
     said = rf"the film has {size[0]}x{size[1]} pixels, but the camera was calibrated with 1280x720"
     with pytest.raises(UserError, match=said):
@@ -156,9 +154,7 @@ def test_a_person_ends_a_camera_and_breaks_off_a_film(listed: ListedDiscs) -> No
 
 
 @pytest.mark.parametrize(("live", "count"), [(False, 8), (True, 2)])
-def test_fiducials_are_looked_for_in_each_frame_or_in_a_cameras_fifth_ones(
-    listed: ListedDiscs, live: bool, count: int
-) -> None:
+def test_fiducials_are_looked_for_in_each_frame_or_in_a_cameras_fifth_ones(listed, live, count):
     track(film(pressed(listed), live=live), SCENE)
     assert sum(request.colour is DARK and request.limits is None for request in listed.requests) == count
 
@@ -201,9 +197,7 @@ def test_a_motion_that_too_few_fiducials_show_is_told(listed: ListedDiscs) -> No
 
 
 @pytest.mark.parametrize(("shift", "told"), [(0.28, False), (0.32, True)])
-def test_a_shift_of_three_tenths_of_a_pixel_is_worth_a_warning(
-    listed: ListedDiscs, shift: float, told: bool
-) -> None:
+def test_a_shift_of_three_tenths_of_a_pixel_is_worth_a_warning(listed, shift, told):
     pictures = pressed(listed)
     for number in (5, 6, 7):
         for _, discs in listed.pictures[number]:
@@ -213,9 +207,7 @@ def test_a_shift_of_three_tenths_of_a_pixel_is_worth_a_warning(
 
 
 @pytest.mark.parametrize(("off", "told"), [(0.48, False), (0.52, True)])
-def test_markers_half_a_millimetre_from_the_design_are_worth_a_warning(
-    listed: ListedDiscs, off: float, told: bool
-) -> None:
+def test_markers_half_a_millimetre_from_the_design_are_worth_a_warning(listed, off, told):
     places = MARKERS + off * np.array([0.6, -0.8])
     said = track(film([picture(listed, places + share * PRESSED) for share in SHARES]), SCENE).warnings
     assert (f"at rest the markers are {off:.2f} mm (rms) from where the design has them" in said) == told

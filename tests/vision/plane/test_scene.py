@@ -107,9 +107,7 @@ def test_the_plane_of_markers_is_of_those_that_are_seen() -> None:
 
 
 @pytest.mark.parametrize("camera", [None, PINHOLE, BENT, FISHY])
-def test_fiducials_are_found_among_discs_that_fit_the_image(
-    listed: ListedDiscs, camera: Camera | None
-) -> None:
+def test_fiducials_are_found_among_discs_that_fit_the_image(listed, camera):
     image = np.dstack([filmed(listed, camera=camera or PINHOLE)] * 3)  # in colour
     found = FilmedScene(FINGER, SPACE, camera).find_fiducials(image)
     np.testing.assert_array_equal(found.centres, seen(SPACE.points, camera or PINHOLE))
@@ -139,9 +137,7 @@ def moved(number: int, away: float, hidden: tuple[int, ...] = ()) -> FloatArray:
 
 
 @pytest.mark.parametrize(("away", "kept"), [(0.55, True), (0.9, False)])
-def test_a_fiducial_that_is_half_a_millimetre_off_is_left_out(
-    listed: ListedDiscs, away: float, kept: bool
-) -> None:
+def test_a_fiducial_that_is_half_a_millimetre_off_is_left_out(listed, away, kept):
     """The fit gives way a little, so that its residual is about 0.8 of the way."""
     found = FilmedScene(FINGER, SPACE, PINHOLE).find_fiducials(filmed(listed, moved(5, away)))
     assert np.isfinite(found.radii).tolist() == [True] * 5 + [kept, True]
@@ -176,9 +172,7 @@ def test_where_all_are_off_none_is_left_out(listed: ListedDiscs) -> None:
 @pytest.mark.parametrize(
     ("away", "said"), [(0.9, ""), (1.5, r"the fiducials lie 0\.\d\d mm .* more than 0.5 mm")]
 )
-def test_five_fiducials_are_kept_and_must_lie_within_half_a_millimetre(
-    listed: ListedDiscs, away: float, said: str
-) -> None:
+def test_five_fiducials_are_kept_and_must_lie_within_half_a_millimetre(listed, away, said):
     scene = FilmedScene(FINGER, SPACE, PINHOLE)
     image = filmed(listed, moved(5, away, hidden=(1, 3)))
     if said:

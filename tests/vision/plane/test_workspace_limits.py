@@ -40,9 +40,7 @@ def test_what_is_not_given_is_as_documented() -> None:
         (45.0, (15.0, 70.0)),  # far from both
     ],
 )
-def test_the_default_fiducials_stand_around_the_finger_beside_the_indenter(
-    position: float, places: tuple[float, float]
-) -> None:
+def test_the_default_fiducials_stand_around_the_finger_beside_the_indenter(position, places):
     """12 mm around it; half of the contact's 4 mm and 8 % of the length are left free on either side."""
     points = default_workspace(replace(beam(), contact_abscissa=position)).points
     front = [(x, 12.0) for x in (-12.0, *places, 112.0)]

@@ -78,9 +78,7 @@ def test_nothing_found_is_nothing_drawn() -> None:
 
 
 @pytest.mark.parametrize(("width", "line"), [(1280, 1), (2560, 5), (320, 1)])
-def test_a_marker_is_circled_at_its_edge_with_a_line_as_wide_as_the_image_asks_for(
-    width: int, line: int
-) -> None:
+def test_a_marker_is_circled_at_its_edge_with_a_line_as_wide_as_the_image_asks_for(width, line):
     image = drawn(blank(width), [(200.0, 120.0, 60.0)], [(200.0, 120.0)])
     edge = np.nonzero(painted(image[120, 200:], GREEN))[0]
     assert abs(edge.mean() - 60) <= 0.5

@@ -54,9 +54,7 @@ def test_the_order_of_the_discs_is_of_no_account() -> None:
 
 @pytest.mark.parametrize("direction", [(1, 0), (-0.6, 0.8)])
 @pytest.mark.parametrize(("away", "name"), [(1.9, 5), (2.1, -1)])
-def test_a_disc_is_no_fiducial_more_than_two_millimetres_away(
-    direction: tuple[float, float], away: float, name: int
-) -> None:
+def test_a_disc_is_no_fiducial_more_than_two_millimetres_away(direction, away, name):
     """The five others have their places exactly, and the misfit of other four would be larger."""
     places = of(SIX).points
     places[5] += away * np.array(direction)

@@ -101,9 +101,7 @@ def test_discs_that_no_frame_shows_are_not_known() -> None:
 
 @pytest.mark.parametrize("method", ["precise", "hough"])
 @pytest.mark.parametrize("count", [1, 2, 6])
-def test_one_frame_or_its_copies_keep_all_of_the_covariance_and_have_the_floor(
-    count: int, method: DetectionMethod
-) -> None:
+def test_one_frame_or_its_copies_keep_all_of_the_covariance_and_have_the_floor(count, method):
     frames = frames_of(series([0.0] * count, 3), contrast=np.nan)
     mean = mean_detections(frames, method)
     expected = (DEVIATION**2 + {"precise": 0.0005, "hough": 0.45}[method] ** 2) * np.eye(2)

@@ -131,9 +131,7 @@ def test_three_markers_must_be_where_the_design_has_them(listed: ListedDiscs, hi
 
 
 @pytest.mark.parametrize("size", [1.0, 1.2])
-def test_markers_are_looked_for_at_the_size_that_the_first_frame_shows(
-    listed: ListedDiscs, size: float
-) -> None:
+def test_markers_are_looked_for_at_the_size_that_the_first_frame_shows(listed, size):
     tracker = FrameTracker(SCENE, shown(listed, size=size, hidden=[2]))
     tracker.see(shown(listed, size=size))
     near = [r for r in listed.requests if r.window is None and r.colour is RED]
@@ -205,9 +203,7 @@ def test_a_jump_is_followed_by_a_search(listed: ListedDiscs) -> None:
     np.testing.assert_allclose(seen.places, MARKERS + jump, atol=1e-9)
 
 
-def test_markers_that_a_search_leaves_out_are_looked_for_where_the_others_predict(
-    listed: ListedDiscs,
-) -> None:
+def test_markers_that_a_search_leaves_out_are_looked_for_where_the_others_predict(listed):
     """As one that is partly hidden: here its disc is too large for a search of all discs."""
     tracker = FrameTracker(SCENE, shown(listed))
     places, sizes = MARKERS + 6 * BENT, np.array([1, 1, 1, 1.33, 1, 1, 1])
@@ -237,9 +233,7 @@ def test_markers_that_stay_lost_are_searched_for_in_every_frame_of_a_film_and_ev
 
 
 @pytest.mark.parametrize("live", [False, True])
-def test_markers_that_the_first_frame_lacks_are_searched_for_as_often(
-    listed: ListedDiscs, live: bool
-) -> None:
+def test_markers_that_the_first_frame_lacks_are_searched_for_as_often(listed, live):
     tracker = FrameTracker(SCENE, shown(listed, hidden=[2]), live=live)
     counts = []
     for _ in range(11):
@@ -258,9 +252,7 @@ def test_nothing_lost_is_nothing_searched_for(listed: ListedDiscs) -> None:
 
 
 @pytest.mark.parametrize("live", [False, True])
-def test_fiducials_are_looked_for_in_every_frame_of_a_film_and_every_fifth_of_a_camera(
-    listed: ListedDiscs, live: bool
-) -> None:
+def test_fiducials_are_looked_for_in_every_frame_of_a_film_and_every_fifth_of_a_camera(listed, live):
     tracker = FrameTracker(SCENE, shown(listed), live=live)
     detections = [tracker.first, *(tracker.see(shown(listed)) for _ in range(11))]
     looked = [number for number, each in enumerate(detections) if each.fiducials is not None]

@@ -58,9 +58,7 @@ def test_a_disc_of_another_size_is_no_marker(size: float, name: int) -> None:
 
 @pytest.mark.parametrize(("share", "name"), [(0.14, 3), (0.16, -1)])
 @pytest.mark.parametrize("direction", [0, 130, 270])
-def test_a_disc_is_no_marker_farther_away_than_a_share_of_the_spacing(
-    share: float, name: int, direction: int
-) -> None:
+def test_a_disc_is_no_marker_farther_away_than_a_share_of_the_spacing(share, name, direction):
     """0.15 of the smallest distance of two markers, here √109 mm."""
     away = share * 109**0.5 * np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
     places = UNEVEN.copy()
@@ -94,9 +92,7 @@ def test_of_two_layouts_the_one_that_fits_better_is_taken() -> None:
 
 
 @pytest.mark.parametrize(("shown", "chosen"), [(4, [0, 1, 2, 3, 4, -1, 6]), (5, [7, 8, 9, 10, 11, -1, -1])])
-def test_a_marker_far_off_counts_less_than_an_exact_one_and_more_than_none(
-    shown: int, chosen: list[int]
-) -> None:
+def test_a_marker_far_off_counts_less_than_an_exact_one_and_more_than_none(shown, chosen):
     """Six that are a millimetre off (one is beyond the gate) outweigh four that are exact, and not five."""
     both = np.concatenate([UNEVEN + SHIFTS - (0, 30), UNEVEN[:shown]])
     assert names(seen(both), UNEVEN) == chosen

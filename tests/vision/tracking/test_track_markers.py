@@ -38,9 +38,7 @@ STEP = -1.0 * np.column_stack([0.1 * (ROW[:, 0] / 90) ** 2, (ROW[:, 0] / 90) ** 
 
 
 @pytest.mark.parametrize(("turn", "said"), [(20, ""), (-60, ""), (180, "180"), (200, "200"), (130, "130")])
-def test_the_markers_alone_give_the_plane_and_their_motion_its_direction(
-    listed: ListedDiscs, turn: float, said: str
-) -> None:
+def test_the_markers_alone_give_the_plane_and_their_motion_its_direction(listed, turn, said):
     """A row looks the same from both ends: if x does not run to the right, the motion shows it."""
     tracking = markers_only(listed, ROW, STEP, turn)
     np.testing.assert_allclose(tracking.observations("a film").displacements, STEP, atol=1e-6)
@@ -78,9 +76,7 @@ def of(count: int, hidden: Sequence[int]) -> list[DiscDetections | None]:
         ((4, 5), (4,), (5,)),  # none at either end: the nearest ones
     ],
 )
-def test_fiducials_at_rest_are_those_searched_for_or_the_nearest(
-    searched: Sequence[int], before: Sequence[int], after: Sequence[int]
-) -> None:
+def test_fiducials_at_rest_are_those_searched_for_or_the_nearest(searched, before, after):
     hidden = [number for number in range(10) if number not in searched]
     found = _fiducials_at_rest(of(10, hidden), RestIntervals(range(3), range(8, 10)))
     numbers = [[int(discs.radii[0]) for discs in end] for end in found]
