@@ -32,9 +32,8 @@ from vision.discs.disc_detector import METHODS, DetectionMethod
 from vision.frames.frame import Frames
 from vision.frames.sources import open_frames
 from vision.rig.bench import BENCH, Bench
-from vision.rig.course import Course
 from vision.rig.exposure import Exposure
-from vision.rig.motion import Motion
+from vision.rig.motion import Course, Motion
 from vision.rig.occluders import cable, cables
 from vision.rig.recording import FrameTruth, Recording
 from vision.rig.recording_files import FILES, record

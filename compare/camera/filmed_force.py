@@ -5,7 +5,7 @@ from scipy.interpolate import CubicSpline
 
 from compare.runtime.tables import Cell
 from solvers.solution import Solution
-from vision.rig.course import Course
+from vision.rig.motion import Course
 from vision.rig.recording import Recording
 
 LONGEST_STEP = 0.05

@@ -1,4 +1,8 @@
-"""The report as one HTML file, with a viewer of the fields."""
+"""The report: one HTML file that holds its pictures and a viewer of the fields, and needs nothing else.
+
+The browser draws the fields with Plotly.js (MIT licence), which comes with the Python package `plotly` and is
+packed into the page. Numbers have 16 bits: the range of a field, or of its difference, in 65,535 steps.
+"""
 
 import base64
 import gzip

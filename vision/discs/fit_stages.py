@@ -5,6 +5,7 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray
 from vision.discs.correlated_noise import correlated_noise
 from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, Array, X, Y
+from vision.discs.edge_profile import with_edges
 from vision.discs.fit_priors import Known, prior_and_limits
 from vision.discs.ground_texture import without_waves
 from vision.discs.hough import HoughVotes, sector, vote_for_centres
@@ -17,7 +18,6 @@ from vision.discs.least_squares import (
     refined_fit,
 )
 from vision.discs.pixel_windows import QUANTISATION, PixelWindows, median_where
-from vision.discs.straight_edges import with_edges
 from vision.frames.frame import GreyImage
 
 MARGIN = 6

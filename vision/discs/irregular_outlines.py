@@ -34,6 +34,7 @@ from vision.discs.disc_image_model import (
     outline,
     outline_centroid,
 )
+from vision.discs.edge_profile import with_edges
 from vision.discs.fit_priors import MISSING, Known, prior_and_limits
 from vision.discs.hough import SECTORS, sector
 from vision.discs.least_squares import (
@@ -48,7 +49,6 @@ from vision.discs.least_squares import (
     refined_fit,
 )
 from vision.discs.pixel_windows import DARKEST, LIGHTEST, PixelWindows
-from vision.discs.straight_edges import with_edges
 
 PENALTY = 40.0
 """Gain in logarithmic likelihood from which on an irregular outline is preferred to an ellipse: half of the

@@ -1,7 +1,11 @@
-"""Motion of the finger in a film: at rest, pressed, held."""
+"""How the finger, the camera and the light move while the rig films."""
+
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 
 from geometry.arrays import FloatArray
 from geometry.finger.parameters import CheckedModel, bounded
@@ -71,3 +75,29 @@ class Motion(CheckedModel):
     def travel(self, frame: int) -> float:
         """Growth of the share of the load from the first exposure of a frame's row to the last."""
         return float(np.ptp(self.load(frame + np.array([0.0, self.rolling + self.shutter]))))
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Nodal displacements at shares of the load, joined by a cubic spline.
+
+    Attributes:
+        shares: From 0 to 1, ascending, shape (k,).
+        displacements: Of the mesh's nodes, shape (k, n, 2), mm.
+    """
+
+    shares: FloatArray
+    displacements: FloatArray
+
+    @classmethod
+    def proportional(cls, displacement: FloatArray) -> "Course":
+        """Displacements that grow in proportion to the load to those of shape (n, 2), mm."""
+        return cls(np.array([0.0, 1.0]), np.stack([np.zeros_like(displacement), displacement]))
+
+    def at(self, share: float) -> FloatArray:
+        """Displacements at a share of the load, shape (n, 2), mm."""
+        return np.asarray(self._spline(share))
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.shares, self.displacements)

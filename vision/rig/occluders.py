@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 from geometry.errors import UserError
 from vision.calibration.camera import Camera, Pose
 from vision.rig.bench import Bench
-from vision.rig.course import Course
-from vision.rig.motion import Motion
+from vision.rig.motion import Course, Motion
 from vision.rig.render import pixel_coverage
 from vision.rig.shapes import Paint, Shape, area, closed, seen_edges
 

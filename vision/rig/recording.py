@@ -13,9 +13,8 @@ from geometry.observations import Observations
 from vision.calibration.camera import Camera, Pose
 from vision.frames.frame import Image
 from vision.rig.bench import Bench
-from vision.rig.course import Course
 from vision.rig.exposure import Exposure, Light
-from vision.rig.motion import Motion
+from vision.rig.motion import Course, Motion
 from vision.rig.occluders import share_seen
 from vision.rig.render import mean_light, noise_of
 from vision.rig.shapes import Shape, centroid

@@ -11,9 +11,8 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.misfit import MarkerSettings
-from solvers.pinn.finite_basis.gate_tree import GateTree
-from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
 from solvers.pinn.finite_basis.solver import FiniteBasisSolver
+from solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
 from solvers.problem import Problem
 from solvers.shared_work import SharedWork
 from solvers.solution import Solution

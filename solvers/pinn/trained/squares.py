@@ -20,7 +20,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.assimilation.misfit import Misfit
-from solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from solvers.pinn.finite_basis.base_distance import HardConstraint
 from solvers.pinn.paper.loss import stiffness_matrix
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.pinn.threading import map_in_threads, slices

@@ -17,8 +17,8 @@ from solvers import stability
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import newton
+from solvers.pinn.finite_basis.base_distance import HardConstraint
 from solvers.pinn.finite_basis.energy import NetworkEnergy
-from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
@@ -27,8 +27,8 @@ from solvers.pinn.finite_basis.point_spacing import (
     spread_points,
 )
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
-from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
+from solvers.pinn.finite_basis.windows import ShepardWindows
 from solvers.pinn.threading import PATCH, boxes_around, cut_into_patches
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State

@@ -11,9 +11,9 @@ from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import energy as network_energy
-from solvers.pinn.finite_basis import gate_tree
-from solvers.pinn.finite_basis.gate_tree import GateTree
+from solvers.pinn.finite_basis import windows
 from solvers.pinn.finite_basis.presets import PinnLocalSolver, PinnStdSolver
+from solvers.pinn.finite_basis.windows import GateTree
 from solvers.pinn.threading import boxes_around
 from solvers.problem import Load, Problem
 from solvers.solution import Solution
@@ -70,7 +70,7 @@ def test_shares_sum_to_one_and_their_slopes_to_zero(tree, points):
     (near,) = tree.near(boxes_around([points[:1]]))
     shares, slopes = tree.values_and_gradients(points[:1], near)
     assert len(near) < tree.count
-    assert shares.sum().item() == pytest.approx(1, abs=gate_tree.NEGLIGIBLE * tree.count)
+    assert shares.sum().item() == pytest.approx(1, abs=windows.NEGLIGIBLE * tree.count)
     assert slopes.sum(dim=2).abs().max() < 1e-4
 
 
@@ -79,7 +79,7 @@ def test_encoders_that_are_left_out_have_a_negligible_share(tree, points):
     shares = tree.values(patch, torch.arange(tree.count))
     left_out = np.setdiff1d(np.arange(tree.count), tree.near(boxes_around([patch]))[0].numpy())
     assert len(left_out) > tree.count / 3
-    assert shares[:, left_out].max() <= gate_tree.NEGLIGIBLE
+    assert shares[:, left_out].max() <= windows.NEGLIGIBLE
 
 
 def test_slopes_are_those_of_automatic_differentiation(tree, points):

@@ -11,7 +11,7 @@ from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 from solvers.statistics.gaussian_process import GaussianProcessSolver
 from tests.solvers.conftest import check_gradient, observed_at
-from tests.solvers.pinn.kernels import matern
+from tests.solvers.statistics.kernels import matern
 
 
 def observed(mesh, displacement, *, deviation=0.01, hidden=()):

@@ -5,7 +5,7 @@ import pytest
 
 from geometry.mesh.point_location import LocatedPoints
 from solvers.statistics.kernel_field import SMOOTHNESS, KernelField, correlation
-from tests.solvers.pinn.kernels import matern
+from tests.solvers.statistics.kernels import matern
 
 
 def at(points):

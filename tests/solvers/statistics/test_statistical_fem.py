@@ -13,7 +13,7 @@ from solvers.problem import Load, Material, Problem
 from solvers.statistics.statistical_fem import StatFemSolver
 from solvers.statistics.statistical_posterior import log_root_determinant
 from tests.solvers.conftest import check_gradient, observed_at
-from tests.solvers.pinn.kernels import matern
+from tests.solvers.statistics.kernels import matern
 
 
 @pytest.fixture(scope="module")

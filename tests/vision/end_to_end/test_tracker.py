@@ -10,8 +10,7 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
 from vision.calibration.camera import Camera
-from vision.rig.course import Course
-from vision.rig.motion import Motion
+from vision.rig.motion import Course, Motion
 from vision.rig.occluders import cables
 from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
