@@ -22,7 +22,7 @@ from geometry.arrays import FloatArray
 from geometry.drawing.placement import renamed
 from geometry.section.loop import Loop
 from geometry.section.section import Section
-from geometry.section.thickness import boundary_samples, inner_normals, through
+from geometry.section.thickness import inner_normals, through
 
 MARKERS = 9
 SIDEWAYS = np.cos(np.radians(45))
@@ -141,8 +141,7 @@ def contact_width(outline: Loop, middle: float) -> float:
 
 
 def _principal_axis(outline: Loop) -> FloatArray:
-    points = boundary_samples(Section(outline), float(outline.lengths.sum()) / 1000).points
-    values, vectors = np.linalg.eigh(np.cov(points.T))
+    values, vectors = np.linalg.eigh(np.cov(_samples(outline)[0].T))
     return np.array([1.0, 0.0]) if values[0] > 0.9 * values[1] else np.asarray(vectors[:, 1])
 
 

@@ -17,32 +17,11 @@ AT_ONCE = 1_000_000
 """Largest number of pairs of a ray and a piece in memory."""
 
 
-class Samples(NamedTuple):
-    """Points along the boundary of a section.
-
-    Attributes:
-        points: Shape (n, 2), mm.
-        normals: Unit vectors into the body, shape (n, 2).
-        pieces: Number of each point's piece among those of all loops, shape (n,).
-        fractions: Place on the piece as a fraction of its length, shape (n,).
-    """
-
-    points: FloatArray
-    normals: FloatArray
-    pieces: IntArray
-    fractions: FloatArray
-
-
 class Crossing(NamedTuple):
-    """Rays through the material.
+    """Where rays through the material end."""
 
-    Attributes:
-        lengths: Up to the first boundary, shape (n,), mm; infinite for a ray that meets none.
-        pieces: Number of the piece that is met among those of all loops, shape (n,).
-    """
-
-    lengths: FloatArray
-    pieces: IntArray
+    lengths: FloatArray  # up to the first boundary, shape (n,), mm; infinite for a ray that meets none
+    pieces: IntArray  # number of the piece that is met among those of all loops, shape (n,)
 
 
 def wall_thickness(
@@ -62,7 +41,7 @@ def wall_thickness(
         Points of the boundary, shape (n, 2), mm, and the thickness there, shape (n,), mm; both empty for a
         triangle without cavities.
     """
-    return _widths(section.loops, spacing, corners=corners)
+    return _widths(_Pieces.of(section.loops), spacing, corners=corners)
 
 
 def cavity_widths(section: Section, spacing: float) -> tuple[FloatArray, FloatArray]:
@@ -73,73 +52,7 @@ def cavity_widths(section: Section, spacing: float) -> tuple[FloatArray, FloatAr
     """
     if not section.cavities:
         return np.empty((0, 2)), np.empty(0)
-    if all(len(cavity.straight) == len(cavity.bulges) for cavity in section.cavities):
-        return _widths([_Lines(each.ends[::-1, ::-1], each.bulges) for each in section.cavities], spacing)
-    return _widths([_reversed(cavity) for cavity in section.cavities], spacing)
-
-
-class _Lines(NamedTuple):
-    """A closed curve of straight pieces: ends (p, 2, 2) and bulges (p,), without the checks of a `Loop`."""
-
-    ends: FloatArray
-    bulges: FloatArray
-
-
-_Curves = Sequence[Loop] | Sequence[_Lines]
-
-
-def _reversed(loop: Loop) -> Loop:
-    """The same curve run the other way round, without names."""
-    return Loop(loop.points[::-1], -np.roll(loop.bulges[::-1], -1), ("",) * len(loop.points))
-
-
-def _widths(loops: _Curves, spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
-    """Lengths of the rays to the left of curves up to the next one of them."""
-    pieces = _Pieces.of(loops)
-    samples = _samples(loops, pieces, spacing)
-    crossing = _through(pieces, samples.points, samples.normals)
-    kept = np.isfinite(crossing.lengths)
-    if not corners:
-        counts = np.array([len(loop.bulges) for loop in loops])
-        kept &= ~_beyond_corner(pieces, counts, samples, crossing.pieces)
-    return samples.points[kept], crossing.lengths[kept]
-
-
-def boundary_samples(section: Section, spacing: float) -> Samples:
-    """Points on every piece of the section, at most `spacing` mm apart and half of that from its ends."""
-    return _samples(section.loops, _Pieces.of(section.loops), spacing)
-
-
-def _samples(loops: _Curves, pieces: "_Pieces", spacing: float) -> Samples:
-    if (np.abs(pieces.bulges) <= STRAIGHT).all():
-        return _samples_of_lines(pieces.start, pieces.end, spacing)
-    return _samples_of_curves([loop for loop in loops if isinstance(loop, Loop)], spacing)
-
-
-def _samples_of_lines(start: FloatArray, end: FloatArray, spacing: float) -> Samples:
-    along = end - start
-    lengths = np.hypot(*along.T)
-    counts = np.maximum(np.ceil(lengths / spacing), 1).astype(int)
-    which = np.repeat(np.arange(len(counts)), counts)
-    share = (np.arange(len(which)) - (np.cumsum(counts) - counts)[which] + 0.5) / counts[which]
-    left = np.stack([-along[:, 1], along[:, 0]], axis=1) / lengths[:, None]
-    return Samples(start[which] + share[:, None] * along[which], left[which], which, share)
-
-
-def _samples_of_curves(loops: Sequence[Loop], spacing: float) -> Samples:
-    points, normals, pieces, fractions, number = [], [], [], [], 0
-    for loop in loops:
-        counts = np.maximum(np.ceil(loop.lengths / spacing), 1).astype(int)
-        for which, count in enumerate(counts):
-            share = (np.arange(count) + 0.5) / count
-            points.append(loop.along(which, share))
-            normals.append(inner_normals(loop, which, share))
-            pieces.append(np.full(count, number + which))
-            fractions.append(share)
-        number += len(counts)
-    return Samples(
-        np.concatenate(points), np.concatenate(normals), np.concatenate(pieces), np.concatenate(fractions)
-    )
+    return _widths(_Pieces.of(section.cavities, backward=True), spacing)
 
 
 def inner_normals(loop: Loop, which: int, fractions: ArrayLike) -> FloatArray:
@@ -156,7 +69,68 @@ def through(section: Section, points: ArrayLike, directions: ArrayLike) -> Cross
     return _through(_Pieces.of(section.loops), start, ahead)
 
 
-def _through(pieces: "_Pieces", start: FloatArray, ahead: FloatArray) -> Crossing:
+class _Pieces(NamedTuple):
+    """Pieces of closed curves, p in all."""
+
+    start: FloatArray  # (p, 2), mm
+    end: FloatArray  # (p, 2), mm
+    bulges: FloatArray  # (p,)
+    centres: FloatArray  # of the arcs, (p, 2), mm; not a number for a straight piece
+    radii: FloatArray  # (p,), mm
+    following: IntArray  # number of the next piece of the curve, (p,)
+
+    @classmethod
+    def of(cls, loops: Sequence[Loop], *, backward: bool = False) -> "_Pieces":
+        """The pieces of curves, or of the curves run the other way round."""
+        turn = slice(None, None, -1 if backward else 1)
+        ends = np.concatenate([loop.ends[turn, turn] for loop in loops])
+        bulges = np.concatenate([loop.bulges[turn] for loop in loops]) * (-1 if backward else 1)
+        start, end = ends[:, 0], ends[:, 1]
+        safe = np.where(np.abs(bulges) > STRAIGHT, bulges, np.nan)
+        left = np.stack([start[:, 1] - end[:, 1], end[:, 0] - start[:, 0]], axis=1)
+        centres = 0.5 * (start + end) + left * ((1 - safe**2) / (4 * safe))[:, None]
+        last = np.cumsum([len(loop.bulges) for loop in loops])
+        following = np.arange(len(bulges)) + 1
+        following[last - 1] = last - np.diff(last, prepend=0)
+        return cls(start, end, bulges, centres, np.linalg.norm(start - centres, axis=1), following)
+
+
+def _widths(pieces: _Pieces, spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
+    """Lengths of the rays to the left of curves up to the next one of them."""
+    points, normals, own = _samples(pieces, spacing)
+    crossing = _through(pieces, points, normals)
+    kept = np.isfinite(crossing.lengths)
+    if not corners:
+        kept &= ~_beyond_corner(pieces, own, crossing.pieces)
+    return points[kept], crossing.lengths[kept]
+
+
+def _samples(pieces: _Pieces, spacing: float) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Points (n, 2) on every piece, half of `spacing` from its ends, unit vectors to the left, and pieces."""
+    along, quarter = pieces.end - pieces.start, np.arctan(pieces.bulges)
+    chords = np.hypot(*along.T)
+    curved = np.abs(pieces.bulges) > STRAIGHT
+    arcs = np.where(curved, quarter, 1.0)
+    lengths = np.where(curved, chords * 2 * arcs / np.sin(2 * arcs), chords)
+    counts = np.maximum(np.ceil(lengths / spacing), 1).astype(int)
+    own = np.repeat(np.arange(len(counts)), counts)
+    share = (np.arange(len(own)) - (np.cumsum(counts) - counts)[own] + 0.5) / counts[own]
+    points = pieces.start[own] + share[:, None] * along[own]
+    normals = np.stack([-along[:, 1], along[:, 0]], axis=1)[own] / chords[own, None]
+    bent = curved[own]
+    arc, angle = own[bent], 4 * share[bent] * quarter[own[bent]]
+    points[bent] = pieces.centres[arc] + _turned((pieces.start - pieces.centres)[arc], angle)
+    normals[bent] = _turned(normals[bent], angle - 2 * quarter[arc])
+    return points, normals, own
+
+
+def _turned(vectors: FloatArray, angles: FloatArray) -> FloatArray:
+    """Vectors (n, 2) turned by angles (n,), radians."""
+    (x, y), cosine, sine = vectors.T, np.cos(angles), np.sin(angles)
+    return np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=1)
+
+
+def _through(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
     step = max(AT_ONCE // len(pieces.bulges), 1)
     found = [
         _first(pieces, start[first : first + step], ahead[first : first + step])
@@ -165,26 +139,6 @@ def _through(pieces: "_Pieces", start: FloatArray, ahead: FloatArray) -> Crossin
     if not found:
         return Crossing(np.empty(0), np.empty(0, dtype=np.int64))
     return Crossing(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
-
-
-class _Pieces(NamedTuple):
-    """Pieces of all loops: ends (p, 2) each, bulges (p,); centres (p, 2) and radii (p,) of the arcs."""
-
-    start: FloatArray
-    end: FloatArray
-    bulges: FloatArray
-    centres: FloatArray
-    radii: FloatArray
-
-    @classmethod
-    def of(cls, loops: _Curves) -> "_Pieces":
-        ends = np.concatenate([loop.ends for loop in loops])
-        bulges = np.concatenate([loop.bulges for loop in loops])
-        start, end = ends[:, 0], ends[:, 1]
-        safe = np.where(np.abs(bulges) > STRAIGHT, bulges, np.nan)
-        left = np.stack([start[:, 1] - end[:, 1], end[:, 0] - start[:, 0]], axis=1)
-        centres = 0.5 * (start + end) + left * ((1 - safe**2) / (4 * safe))[:, None]
-        return cls(start, end, bulges, centres, np.linalg.norm(start - centres, axis=1))
 
 
 def _first(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
@@ -228,20 +182,15 @@ def _to_arcs(arcs: _Pieces, start: FloatArray, ahead: FloatArray) -> FloatArray:
     return best
 
 
-def _beyond_corner(pieces: _Pieces, counts: IntArray, samples: Samples, met: IntArray) -> BoolArray:
-    """Mask of the samples whose ray ends on the next or previous piece, beyond a corner of 90 degrees.
-
-    `counts` are the numbers of pieces of the closed curves, shape (k,).
-    """
-    following = np.arange(counts.sum()) + 1
-    following[np.cumsum(counts) - 1] = np.cumsum(counts) - counts
+def _beyond_corner(pieces: _Pieces, own: IntArray, met: IntArray) -> BoolArray:
+    """Mask of rays from pieces (n,) that meet the piece next to it (n,), beyond a corner of 90 degrees."""
     sides, turn = pieces.end - pieces.start, 2 * np.arctan(pieces.bulges)
     angle = np.arctan2(sides[:, 1], sides[:, 0])
-    bend = (angle - turn)[following] - (angle + turn)
+    bend = (angle - turn)[pieces.following] - (angle + turn)
     sharp = (bend + np.pi) % (2 * np.pi) - np.pi >= np.pi / 2 - 1e-9
-    previous = np.argsort(following)
-    ahead = (met == following[samples.pieces]) & sharp[samples.pieces]
-    behind = (met == previous[samples.pieces]) & sharp[previous[samples.pieces]]
+    previous = np.argsort(pieces.following)
+    ahead = (met == pieces.following[own]) & sharp[own]
+    behind = (met == previous[own]) & sharp[previous[own]]
     return np.asarray(ahead | behind)
 
 

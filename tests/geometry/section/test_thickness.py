@@ -7,14 +7,7 @@ import pytest
 
 from geometry.section.loop import Loop
 from geometry.section.section import Section
-from geometry.section.thickness import (
-    _samples_of_curves,
-    _samples_of_lines,
-    boundary_samples,
-    cavity_widths,
-    through,
-    wall_thickness,
-)
+from geometry.section.thickness import _Pieces, _samples, cavity_widths, through, wall_thickness
 
 
 def disc(radius: float, pieces: int = 2) -> Loop:
@@ -76,15 +69,8 @@ def test_ray_from_inside_ends_on_the_arc():
 
 def test_samples_lie_on_their_piece_and_look_into_the_body():
     ring = Section(disc(10, 3), (rectangle(-2, -2, 3, 3).reversed(),))
-    samples = boundary_samples(ring, 0.7)
-    assert ring.clearance(samples.points + 0.01 * samples.normals) == pytest.approx(0.01, rel=2e-3)
-
-
-def test_samples_of_a_polygon_are_those_of_a_curve_without_arcs():
-    loop = Loop.polygon([[0, 0], [7, 1], [9, 6], [1, 4]])
-    by_lines = _samples_of_lines(loop.ends[:, 0], loop.ends[:, 1], 0.7)
-    for one, other in zip(by_lines, _samples_of_curves([loop], 0.7), strict=True):
-        assert one == pytest.approx(other, abs=1e-12)
+    points, normals, _ = _samples(_Pieces.of(ring.loops), 0.7)
+    assert ring.clearance(points + 0.01 * normals) == pytest.approx(0.01, rel=2e-3)
 
 
 def test_the_width_of_a_cavity_is_that_of_its_own_walls():
