@@ -21,12 +21,7 @@ from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.worker import run_task
 
-FORMAT = 1
-"""Increase it when the content of the cached files changes its meaning."""
-
 TIMEOUT_S = 300.0
-ABANDONED_S = 86_400.0
-"""Age of a half-written file of the cache after which its process has ended, s."""
 
 CAD_FORMATS = ("step", "stl", "dxf", "svg")
 
@@ -50,7 +45,7 @@ def finger_mesh(
 
     Args:
         finger: The finger.
-        settings: Element sizes; the default ones if None.
+        settings: Element sizes.
         cache_dir: Folder of the cache; by default `cache_folder()`.
         timeout_s: Time limit, s.
         keep: Whether the cache keeps the mesh.
@@ -59,14 +54,14 @@ def finger_mesh(
         UserError: If meshing fails or takes too long.
     """
     settings = settings or MeshSettings()
+    if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
+        return replace(finger.mesh, depth=finger.depth)
     task: dict[str, object] = {
         "kind": "mesh",
         "what": f"meshing design {finger.name!r}",
+        "finger": finger.definition(),
         "settings": settings.model_dump(),
     }
-    if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
-        return replace(finger.mesh, depth=finger.depth)
-    task["finger"] = finger.definition()
     entry = _entry(task, finger.digest, ".npz", cache_dir)
     return _cached(entry, task, timeout_s, TriangleMesh.load, TriangleMesh.save if keep else None)
 
@@ -131,9 +126,9 @@ def cad_files(
     task: dict[str, object] = {
         "kind": "cad",
         "what": f"CAD of design {finger.name!r}",
+        "finger": finger.definition(),
         "formats": sorted(set(formats)),
     }
-    task["finger"] = finger.definition()
     entry = _entry(task, finger.digest, ".zip", cache_dir)
     contents = _cached(entry, task, timeout_s, _unpack, _pack)
     for name, content in contents.items():
@@ -150,12 +145,7 @@ def cache_folder() -> Path:
 
 @contextmanager
 def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
-    """Warn if the block cannot write to the cache, because the result itself is there.
-
-    Args:
-        folder: The cache.
-        what: What has to be done again next time, for the warning.
-    """
+    """Warn, if the block cannot write to the cache `folder`, that `what` has to be done again next time."""
     try:
         yield
     except OSError as error:
@@ -169,10 +159,10 @@ def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
 
 def cache_key(digest: str, task: dict[str, object]) -> str:
     """SHA-256 over a finger's or file's digest, task, package versions and this package's own sources."""
+    kept = {key: value for key, value in task.items() if key not in ("what", "finger", "file")}
     parts = {
-        "format": FORMAT,
         "content": digest,
-        "task": {key: value for key, value in task.items() if key not in ("what", "finger", "file")},
+        "task": kept,
         "versions": {package: _version(package) for package in MAKERS},
         "sources": sources_digest(__name__),
     }
@@ -180,7 +170,6 @@ def cache_key(digest: str, task: dict[str, object]) -> str:
 
 
 def _entry(task: dict[str, object], digest: str, suffix: str, cache_dir: Path | None) -> Path:
-    """The file of a task's result in the cache."""
     return (cache_dir or cache_folder()) / f"{task['kind']}-{cache_key(digest, task)}{suffix}"
 
 
@@ -204,7 +193,7 @@ def _cached(
     made: _Result = run_task(task, timeout_s)
     if save:
         with kept_if_possible(entry.parent, str(task["what"])):
-            remove_partials(entry.parent, older_than_s=ABANDONED_S)
+            remove_partials(entry.parent, older_than_s=86_400.0)  # after a day its process has ended
             save(made, entry)
     return made
 
@@ -218,7 +207,6 @@ def _pack(contents: dict[str, bytes], path: Path) -> None:
 
 
 def _unpack(path: Path) -> dict[str, bytes]:
-    """The files in an archive."""
     with zipfile.ZipFile(path) as archive:
         if any(Path(name).name != name for name in archive.namelist()):
             raise ValueError("a file of another folder")

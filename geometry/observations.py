@@ -8,9 +8,6 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray, frozen_array
 from geometry.errors import ShapeError, UserError
 
-LEAST_DEVIATION, LARGEST_DEVIATION = 1e-12, 1e6
-"""Smallest (far below rounding) and largest standard deviation of a marker that was measured, mm."""
-
 
 @dataclass(frozen=True, eq=False)
 class Observations:
@@ -51,12 +48,11 @@ class Observations:
         deviations = self.standard_deviations
         if (deviations < 0).any():
             raise UserError("standard deviations must be zero or more (mm)")
-        if not (
-            (deviations == 0) | (deviations >= LEAST_DEVIATION) & (deviations <= LARGEST_DEVIATION)
-        ).all():
+        low, high = 1e-12, 1e6  # far below rounding, and beyond any marker
+        if not ((deviations == 0) | (deviations >= low) & (deviations <= high)).all():
             raise UserError(
-                f"standard deviations must be 0 or from {LEAST_DEVIATION:g} to {LARGEST_DEVIATION:g} mm; set "
-                "visible to 0 at a marker that was not measured"
+                f"standard deviations must be 0 or from {low:g} to {high:g} mm; set visible to 0 at a marker "
+                "that was not measured"
             )
         if not 0 <= self.marker_radius < inf:
             raise UserError(f"the marker radius must be zero or more, got {self.marker_radius} (mm)")

@@ -1,7 +1,4 @@
-"""Reads TOML and JSON files of users and refuses an unreadable one in one line.
-
-A byte order mark, which editors of Windows write, is accepted.
-"""
+"""Reads TOML and JSON files of users; a file that cannot be read is a `UserError` of one line."""
 
 import json
 import tomllib
@@ -10,9 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import UserError
-
-LARGEST = 1e300
-"""Size of a whole number beyond which arithmetic with floats fails."""
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
@@ -31,7 +25,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 def read_json(path: Path, what: str) -> Any:
     """The content of a JSON file; see `read_toml`."""
-    return _read(path, what, _parse_json)
+    return _read(path, what, lambda text: _parsed(text, json.loads))
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -42,13 +36,6 @@ def parse_toml(text: str) -> dict[str, Any]:
     """
     content: dict[str, Any] = _parsed(text, tomllib.loads)
     return content
-
-
-def _parse_json(text: str) -> Any:
-    try:
-        return _parsed(text, json.loads)
-    except json.JSONDecodeError as error:
-        raise ValueError(f"it is not JSON ({error})") from None
 
 
 def _read(path: Path, what: str, parse: Callable[[str], Any]) -> Any:
@@ -67,11 +54,13 @@ def _parsed(text: str, parse: Callable[[str], Any]) -> Any:
         _check_numbers(content)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+    except json.JSONDecodeError as error:
+        raise ValueError(f"it is not JSON ({error})") from None
     return content
 
 
 def _check_numbers(value: Any) -> None:
-    if isinstance(value, int) and abs(value) > LARGEST:
+    if isinstance(value, int) and abs(value) > 1e300:  # arithmetic with floats fails beyond
         raise ValueError(f"it has a number of {len(str(value))} digits")
     for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
         _check_numbers(each)

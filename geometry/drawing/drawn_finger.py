@@ -38,17 +38,10 @@ PLAIN = (
 
 @dataclass(frozen=True, eq=False)
 class DrawnFinger:
-    """A finger whose section was drawn.
+    """A finger whose section was drawn; lengths and frame are those of `Finger`.
 
     Attributes:
-        name: What files and reports call it; no part of the geometry.
-        section: In the finger's frame, with its pieces `base`, `front` and, where there is one, `back`.
-        markers: Centres, ordered from base to tip, shape (m, 2), mm.
-        contact_abscissa: X of the contact's middle, mm.
-        contact_width: Extent of the contact along x, mm.
-        depth: Depth of the extrusion, mm.
-        marker_diameter: Diameter of a marker's disc, mm.
-        marker_height: How deep a marker is inlaid into the side face, mm.
+        section: With its pieces `base`, `front` and, where there is one, `back`.
         file: Name of the drawing's file.
         sha256: Hash of its content, in hexadecimal.
         note: How it was read, in words.
@@ -148,17 +141,25 @@ class DrawnFinger:
             "mesh": self.mesh.digest if self.mesh else None,
         }
 
-    def whole(self) -> dict[str, Any]:
-        """The definition with the arrays of the file's own mesh."""
-        return {**self.definition(), "mesh": _mesh_definition(self.mesh) if self.mesh else None}
-
     def save(self, path: Path) -> None:
         """Write the definition and the file's own mesh as JSON."""
-        write_text(path, json.dumps(self.whole()))
+        write_text(path, json.dumps(self._whole()))
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the whole definition, for other processes."""
-        return type(self).from_definition, (self.whole(),)
+        """Pickle the definition and the file's own mesh, for other processes."""
+        return type(self).from_definition, (self._whole(),)
+
+    def _whole(self) -> dict[str, Any]:
+        """The definition with the arrays of the file's own mesh."""
+        mesh = self.mesh
+        if mesh is None:
+            return self.definition()
+        arrays = {
+            **{name: getattr(mesh, name).tolist() for name in ("points", "triangles", "marker_nodes")},
+            "boundaries": {name: edges.tolist() for name, edges in mesh.boundaries.items()},
+            "contact_node": mesh.contact_node,
+        }
+        return {**self.definition(), "mesh": arrays}
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -220,16 +221,6 @@ class DrawnFinger:
         """The section and the facts, in a notebook."""
         facts = {meaning: value for meaning, _, value in self.facts()}
         return fact_table(f"Finger “{self.name}”", facts, png_image(self.plot()._repr_png_()))
-
-
-def _mesh_definition(mesh: TriangleMesh) -> dict[str, Any]:
-    return {
-        "points": mesh.points.tolist(),
-        "triangles": mesh.triangles.tolist(),
-        "boundaries": {name: edges.tolist() for name, edges in mesh.boundaries.items()},
-        "marker_nodes": mesh.marker_nodes.tolist(),
-        "contact_node": mesh.contact_node,
-    }
 
 
 def description_lines(finger: Finger) -> str:

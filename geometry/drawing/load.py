@@ -25,7 +25,7 @@ SUFFIXES = (".step", ".stp", ".dxf", ".svg", ".msh")
 
 
 class ContactPlace(NamedTuple):
-    """The contact in the drawing's frame."""
+    """The contact in the frame of the drawing."""
 
     middle: FloatArray  # (2,), mm
     ends: FloatArray | None  # (2, 2), mm, where the drawing has them

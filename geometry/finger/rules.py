@@ -1,7 +1,7 @@
 """Rules that a finger has to obey: each gives a margin, a message, and the parameters that can remedy it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -21,49 +21,27 @@ from geometry.finger.section import (
     tip_tangent,
 )
 
-MIN_CAVITY = 0.5
-"""Minimum clear width of a cavity, mm, for printing and meshing."""
-
-MIN_CONTACT_MARGIN = 0.5
-"""Minimum distance of the contact from the clamped base and from the apex, mm."""
-
-MIN_MARKER_WALL = 0.1
-"""Minimum material around a marker, mm."""
-
-MIN_DEPTH_LEFT = 0.2
-"""Minimum material below a marker's pocket, mm."""
-
-MIN_STRAIGHT = 1e-3
-"""Minimum straight length between two roundings, mm."""
-
-MIN_WALL = 0.2
-"""Minimum thickness of the base wall and of the walls around a slot, mm."""
+# Least lengths, mm.
+MIN_CAVITY = 0.5  # clear width of a cavity, for printing and meshing
+MIN_CONTACT_MARGIN = 0.5  # from the contact to the clamped base and to the apex
+MIN_MARKER_WALL = 0.1  # material around a marker
+MIN_DEPTH_LEFT = 0.2  # material below a marker's pocket
+MIN_STRAIGHT = 1e-3  # between two roundings
+MIN_WALL = 0.2  # of the base and around a slot
 
 
-@dataclass(frozen=True)
-class RuleResult:
-    """Outcome of a rule.
+class RuleResult(NamedTuple):
+    """Outcome of a rule."""
 
-    Attributes:
-        margin: Zero or more if the rule is obeyed, mm.
-        sentence: The fault if it is not, with the numbers.
-    """
-
-    margin: float
-    sentence: str
+    margin: float  # zero or more if the rule is obeyed, mm
+    sentence: str  # the fault if it is not, with the numbers
 
 
-@dataclass(frozen=True)
-class Rule:
-    """One condition on a finger.
-
-    Attributes:
-        check: Evaluates the rule.
-        remedies: Parameters whose change can satisfy it, the likeliest first.
-    """
+class Rule(NamedTuple):
+    """One condition on a finger."""
 
     check: Callable[[Parameters], RuleResult]
-    remedies: tuple[str, ...]
+    remedies: tuple[str, ...]  # parameters whose change can satisfy it, the likeliest first
 
 
 def cavity_length(p: Parameters) -> RuleResult:

@@ -18,12 +18,6 @@ ROUNDING = -1e-9
 STEP = 0.01
 """Step to which ranges are rounded inward, mm or degrees."""
 
-SCAN = 240
-"""Number of values tried within a parameter's bounds before bisection."""
-
-MOST_RANGES = 3
-"""Parameters whose range a message gives."""
-
 
 def check(parameters: Parameters) -> None:
     """Raise a `UserError` with the reason and the allowed ranges if a rule is broken."""
@@ -53,7 +47,7 @@ def advice(parameters: Parameters, broken: Rule) -> str:
 
 
 def obeys(parameters: Parameters, rules: Iterable[Rule] = RULES) -> bool:
-    """True if every rule is obeyed."""
+    """Whether every rule is obeyed."""
     return all(rule.check(parameters).margin >= ROUNDING for rule in rules)
 
 
@@ -64,7 +58,7 @@ def allowed_range(
 
     Args:
         parameters: The finger, allowed or not.
-        name: The parameter to vary, over its own bounds.
+        name: The parameter to vary, within its own bounds.
         rules: The rules to obey.
 
     Returns:
@@ -112,9 +106,9 @@ def _present(parameters: Parameters, name: str) -> float:
 
 def _trial_values(low: float, high: float, present: float) -> FloatArray:
     """Values from `low` to `high`, evenly and, where both are positive, also evenly in their logarithm."""
-    values = [np.linspace(low, high, SCAN), np.array([present])]
+    values = [np.linspace(low, high, 240), np.array([present])]
     if low > 0:
-        values.append(np.geomspace(low, high, SCAN // 2))
+        values.append(np.geomspace(low, high, 120))
     return np.asarray(np.unique(np.clip(np.concatenate(values), low, high)), dtype=np.float64)
 
 
@@ -133,10 +127,10 @@ def _rounded(good: Callable[[float], bool], edge: float, inward: Callable[[float
 
 
 def _ranges(parameters: Parameters, names: Iterable[str], rules: Iterable[Rule]) -> list[str]:
-    """`name low to high unit` for the first parameters that have a range, at most `MOST_RANGES`."""
+    """`name low to high unit` for the first three parameters that have a range."""
     found = ((name, allowed_range(parameters, name, rules)) for name in names)
     texts = (_in_words(name, *ends) for name, ends in found if ends is not None)
-    return list(islice(texts, MOST_RANGES))
+    return list(islice(texts, 3))
 
 
 def _in_words(name: str, start: float, stop: float) -> str:

@@ -13,15 +13,6 @@ from geometry.mesh.settings import MeshSettings
 from geometry.section.section import Section
 from geometry.section.thickness import wall_thickness
 
-THICK = 16
-"""Thickness of a wall, in element sizes, beyond which it is a solid part."""
-CLASS = 1.1
-"""Ratio of neighbouring thicknesses that are told apart."""
-CELLS = 200_000
-"""Largest number of grid points of the size field."""
-ARC = 3.0
-"""Radius of a cavity's arc over the largest element on it."""
-
 TRIES = (3.6, 4.8, 6.4)
 """Thickness over element size: the first that gives `MIN_ELEMENTS` of the mesher is taken."""
 
@@ -59,7 +50,7 @@ def size_field(
     """
     size, largest = settings.size, settings.size * settings.coarsening
     low, high = section.bounds
-    spacing = max(size, float(np.sqrt(np.prod(high - low + 4 * size) / CELLS)))
+    spacing = max(size, float(np.sqrt(np.prod(high - low + 4 * size) / 200_000)))  # grid points
     origin = low - 2 * spacing
     shape = np.ceil((high - origin) / spacing).astype(int) + 3
     field = np.full(shape, largest)
@@ -85,15 +76,16 @@ def _fine_parts(
             points = cavity.along(which, _shares(length, spacing))
             edges.append(points)
             if which not in cavity.straight:
-                found.append((points, min(size, cavity.circle(which)[1] / ARC), 0.0))
+                found.append((points, min(size, cavity.circle(which)[1] / 3), 0.0))
     if edges:
         found.append((np.concatenate(edges), size, 2 * size))
     points, thickness = wall_thickness(section, spacing)
-    wall = thickness <= THICK * size
-    points, steps = points[wall], np.floor(np.log(thickness[wall] / size) / np.log(CLASS) + 1e-9)
+    wall = thickness <= 16 * size  # what is thicker is a solid part
+    ratio = 1.1  # of neighbouring thicknesses that get sizes of their own
+    points, steps = points[wall], np.floor(np.log(thickness[wall] / size) / np.log(ratio) + 1e-9)
     for step in np.unique(steps):
-        across = float(size * CLASS**step)
-        found.append((points[steps == step], min(size, across / elements), across * CLASS))
+        across = float(size * ratio**step)
+        found.append((points[steps == step], min(size, across / elements), across * ratio))
     return found
 
 

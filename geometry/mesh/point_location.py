@@ -9,23 +9,14 @@ from scipy.spatial import cKDTree
 from geometry.arrays import FloatArray, IntArray, frozen_array
 from geometry.errors import OutsideBodyError
 
-INSIDE_TOLERANCE = 1e-9
-"""Rounding of barycentric coordinates on the boundary, far below any mesh size."""
-
 
 @dataclass(frozen=True, eq=False)
 class LocatedPoints:
-    """Points in the body with the triangle of each.
+    """Points in the body with the triangle of each."""
 
-    Attributes:
-        points: Shape (n, 2), mm.
-        cells: Numbers of the triangles, shape (n,).
-        barycentric: Barycentric coordinates in it, shape (n, 3).
-    """
-
-    points: FloatArray
-    cells: IntArray
-    barycentric: FloatArray
+    points: FloatArray  # shape (n, 2), mm
+    cells: IntArray  # numbers of the triangles, shape (n,)
+    barycentric: FloatArray  # coordinates in them, shape (n, 3)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -47,7 +38,7 @@ class Locator:
         )
 
     def locate(self, points: ArrayLike, slack: float = 0.0) -> LocatedPoints:
-        """Locate points of shape (n, 2), mm.
+        """Locate points.
 
         Args:
             points: Shape (n, 2), mm.
@@ -74,7 +65,7 @@ class Locator:
             all_three = np.concatenate([1 - local.sum(axis=2, keepdims=True), local], axis=2)
             best = all_three.min(axis=2).argmax(axis=1)
             rows = np.arange(len(todo))
-            found = all_three[rows, best].min(axis=1) >= -INSIDE_TOLERANCE
+            found = all_three[rows, best].min(axis=1) >= -1e-9  # rounding on edges
             cells[todo[found]] = candidates[rows, best][found]
             barycentric[todo[found]] = all_three[rows, best][found]
             # A triangle reaches at most _radius from its centroid: beyond it no candidate is left.

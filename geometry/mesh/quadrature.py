@@ -13,15 +13,10 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 
 @dataclass(frozen=True, eq=False)
 class Quadrature:
-    """Points and weights: the integral of f over the body is `(weights * f(points)).sum()`.
+    """Points and weights: the integral of f over the body is `(weights * f(points)).sum()`."""
 
-    Attributes:
-        location: The points, of shape (q, 2) mm, and their triangles.
-        weights: Shape (q,), mm^2.
-    """
-
-    location: LocatedPoints
-    weights: FloatArray
+    location: LocatedPoints  # the q points and their triangles
+    weights: FloatArray  # shape (q,), mm^2
 
 
 def triangle_rule(degree: int) -> tuple[FloatArray, FloatArray]:
@@ -49,9 +44,7 @@ def triangle_rule(degree: int) -> tuple[FloatArray, FloatArray]:
 def body_quadrature(mesh: TriangleMesh, degree: int = 2) -> Quadrature:
     """The element rule of `degree` in every triangle of the mesh."""
     barycentric, weights = triangle_rule(degree)
-    return Quadrature(
-        location=mesh.at_barycentric(barycentric), weights=np.outer(mesh.areas, weights).ravel()
-    )
+    return Quadrature(mesh.at_barycentric(barycentric), np.outer(mesh.areas, weights).ravel())
 
 
 def edge_quadrature(mesh: TriangleMesh, name: str, points_per_edge: int = 4) -> tuple[FloatArray, FloatArray]:

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 BOUNDARY_PREFIX = "boundary_"
 
-CHORD = 0.1
-"""Largest distance of an arc from its chord, in lengths of the mesh's longest boundary edge."""
-
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
@@ -141,12 +138,9 @@ class TriangleMesh:
         Raises:
             OutsideBodyError: If a point lies farther outside.
         """
-        return other._locator.locate(points, CHORD * self._longest_boundary_edge)
-
-    @cached_property
-    def _longest_boundary_edge(self) -> float:
         ends = self.points[np.concatenate(list(self.boundaries.values()))]
-        return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+        longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+        return other._locator.locate(points, 0.1 * longest)
 
     @cached_property
     def _locator(self) -> Locator:

@@ -26,33 +26,19 @@ class MeshInFile:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Closed curves of a file, mm, in the file's own frame.
+    """Closed curves of a file, mm, in the file's own frame; None stands for what it does not hold."""
 
-    Attributes:
-        loops: Closed curves; the name of a piece is its label in lower case.
-        unit: Length of one unit of the file's coordinates, mm.
-        note: How the file was read, in words.
-        markers: Centres of the markers, shape (m, 2), mm; empty without any.
-        marker_diameter: Their diameter, mm; None where the file has none.
-        marker_height: How deep they are inlaid, mm; None where the file does not say.
-        contact: Point that the file calls contact, shape (2,), mm, or None.
-        depth: Depth of the extrusion, mm, or None.
-        mesh: The triangle mesh, where the file holds a ready one with its boundaries named.
-        file: Name of the file.
-        sha256: Hash of its content, in hexadecimal.
-    """
-
-    loops: tuple[Loop, ...]
-    unit: float = 1.0
-    note: str = ""
-    markers: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
-    marker_diameter: float | None = None
-    marker_height: float | None = None
-    contact: FloatArray | None = None
-    depth: float | None = None
-    mesh: MeshInFile | None = None
+    loops: tuple[Loop, ...]  # the name of a piece is its label in lower case
+    unit: float = 1.0  # length of one unit of the file's coordinates, mm
+    note: str = ""  # how the file was read, in words
+    markers: FloatArray = field(default_factory=lambda: np.empty((0, 2)))  # their centres, (m, 2), mm
+    marker_diameter: float | None = None  # mm
+    marker_height: float | None = None  # depth to which they are inlaid, mm
+    contact: FloatArray | None = None  # point of that label, (2,), mm
+    depth: float | None = None  # of the extrusion, mm
+    mesh: MeshInFile | None = None  # with its boundaries named
     file: str = ""
-    sha256: str = ""
+    sha256: str = ""  # of the content, in hexadecimal
 
 
 def label_of(text: str) -> str:

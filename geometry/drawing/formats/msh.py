@@ -33,16 +33,8 @@ FACES = {
 FLAT = 1e-4
 """Largest distance of a corner from the straight line that replaces it, and from a plane, mm."""
 
-
 SAME = 0.01
 """Largest relative difference of an extruded body's two ends, and of its volume: curved sides have facets."""
-
-ALONG = 0.999
-"""Least cosine of the angle between an end face's normals and the extrusion."""
-
-
-STARTS = (b"$MeshFormat", b"$Comments")
-"""First words of a mesh. Gmsh runs any other file as a script, which may start programs."""
 
 
 class RawMesh(NamedTuple):
@@ -106,7 +98,9 @@ def _plane_mesh(raw: RawMesh, unit: float) -> Drawing:
 
 
 def _extruded_mesh(raw: RawMesh, unit: float) -> Drawing:
-    faces = _once([face for count, cells in raw.cells.items() for face in _faces(cells, count)])
+    faces = _once(
+        [part for count, cells in raw.cells.items() for face in FACES[count] for part in _rows(cells, face)]
+    )
     if not faces:
         raise UserError("its elements have no outer face; is each there twice?")
     normals, areas = _normals(raw.points, faces)
@@ -118,7 +112,7 @@ def _extruded_mesh(raw: RawMesh, unit: float) -> Drawing:
             [
                 number
                 for number, face in enumerate(faces)
-                if slope[number] > ALONG and np.abs(heights[list(face)] - end).max() < FLAT
+                if slope[number] > 0.999 and np.abs(heights[list(face)] - end).max() < FLAT
             ]
             for end in (low, high)
         ]
@@ -167,14 +161,13 @@ def _volume(raw: RawMesh) -> float:
     return volume
 
 
-def _faces(cells: IntArray, corners: int) -> Iterator[tuple[int, ...]]:
-    for face in FACES[corners]:
-        yield from map(tuple, cells[:, face].tolist())
+def _sides(cells: IntArray, corners: int) -> list[tuple[int, ...]]:
+    """Edges of triangles or quadrilaterals (k, corners)."""
+    return [side for which in range(corners) for side in _rows(cells, [which, (which + 1) % corners])]
 
 
-def _sides(cells: IntArray, corners: int) -> Iterator[tuple[int, ...]]:
-    for which in range(corners):
-        yield from map(tuple, cells[:, [which, (which + 1) % corners]].tolist())
+def _rows(cells: IntArray, corners: list[int]) -> list[tuple[int, ...]]:
+    return list(map(tuple, cells[:, corners].tolist()))
 
 
 def _once(parts: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
@@ -243,7 +236,8 @@ def _opened(path: Path) -> Iterator[Any]:
         copy = Path(folder) / "mesh.msh"
         shutil.copyfile(path, copy)
         with copy.open("rb") as file:
-            if not file.read(16).startswith(STARTS):
+            # Gmsh runs any other file as a script, which may start programs.
+            if not file.read(16).startswith((b"$MeshFormat", b"$Comments")):
                 raise UserError("it is no Gmsh mesh: its first line is not $MeshFormat")
         try:
             gmsh.merge(str(copy))

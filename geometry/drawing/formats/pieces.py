@@ -13,8 +13,6 @@ DEVIATION = 1e-3
 """Largest distance of the arcs from the ellipse or spline for which they stand, mm."""
 
 PROBES = np.linspace(0, 1, 17)[1:-1]
-DEEPEST = 24
-"""Most halvings of a curve."""
 
 FARTHEST = 1e7
 """Largest coordinate, mm. Farther away rounding is no longer far below `DEVIATION`."""
@@ -24,19 +22,12 @@ Curve = Callable[[FloatArray], FloatArray]
 
 
 class Piece(NamedTuple):
-    """A line or an arc.
+    """A line or an arc."""
 
-    Attributes:
-        start: First end, shape (2,).
-        end: Last end, shape (2,).
-        bulge: Tangent of a quarter of the arc's angle, positive to the left; zero for a line.
-        label: Name of the layer, group, part or physical group; empty without one.
-    """
-
-    start: FloatArray
-    end: FloatArray
-    bulge: float
-    label: str
+    start: FloatArray  # (2,)
+    end: FloatArray  # (2,)
+    bulge: float  # tangent of a quarter of the arc's angle, positive to the left; zero for a line
+    label: str  # name of the layer, group, part or physical group; empty without one
 
     def scaled(self, factor: float) -> "Piece":
         """The piece with every length times a factor."""
@@ -65,14 +56,14 @@ def full_circle(centre: ArrayLike, radius: float, label: str) -> list[Piece]:
 def arcs_along(curve: Curve, first: float, last: float, label: str, unit: float = 1.0) -> Iterator[Piece]:
     """Arcs through three points of a curve each, halved until none is more than `DEVIATION` off.
 
+    A curve beyond `FARTHEST` gives one line to a point out there, which the reader refuses.
+
     Args:
-        curve: The curve.
+        curve: The curve, in units of `unit` mm.
         first: Parameter of its start.
         last: Parameter of its end.
         label: Label of the pieces.
         unit: Length of one unit of the curve, mm.
-
-    Of a curve beyond `FARTHEST` only one line to a point out there comes, for the reader to refuse.
     """
     with np.errstate(all="ignore"):  # of what has no finite coordinates
         ends = curve(np.array([first, last]))
@@ -99,7 +90,7 @@ def _halved(
     bulge = _bulge(start, middle, end)
     if abs(bulge) < 1 and _deviation(start, end, bulge, curve(first + PROBES * (last - first))) <= deviation:
         yield Piece(start, end, bulge, label)
-    elif level == DEEPEST:
+    elif level == 24:  # halvings
         yield line(start, end, label)
     else:
         half = 0.5 * (first + last)

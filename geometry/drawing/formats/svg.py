@@ -19,12 +19,6 @@ from geometry.errors import UserError
 LENGTHS = {**UNITS, "": 25.4 / 96, "px": 25.4 / 96, "pt": 25.4 / 72, "pc": 25.4 / 6}
 """Units of `width` and `height`, mm; a number without one is in pixels."""
 
-MOST_ELEMENTS = 100_000
-"""Elements of a drawing, those that are copied by `use` counted as often as they are."""
-
-LINK = "{http://www.w3.org/1999/xlink}href"
-INKSCAPE_LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
-
 
 def read_svg(path: Path, units: str | None = None) -> Drawing:
     """The closed curves of an SVG file; x as in the file, y upward.
@@ -77,12 +71,12 @@ def _check_copies(root: ET.Element) -> None:
         if element not in sizes:
             sizes[element] = inf  # while it is open, that is, if it contains itself
             # svgelements, too, takes any sign in place of the link's #
-            link = element.get("href", element.get(LINK, ""))[1:]
+            link = element.get("href", element.get("{http://www.w3.org/1999/xlink}href", ""))[1:]
             copied = by_id.get(link) if _tag(element) == "use" else None
             sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
         return sizes[element]
 
-    if (count := size(root)) > MOST_ELEMENTS:
+    if (count := size(root)) > 100_000:  # a copy counts as often as it is made
         what = "an element contains itself" if count == inf else f"its copies make {count:.0f} elements"
         raise UserError(f"{what}; draw each curve once")
 
@@ -151,7 +145,8 @@ def _shapes(group: Any, label: str) -> Iterator[tuple[Any, str]]:
 
 def _name(element: Any) -> str:
     own = element.values.get("attributes", {})
-    for text in (own.get("id"), element.id, own.get(INKSCAPE_LABEL)):
+    inkscape = own.get("{http://www.inkscape.org/namespaces/inkscape}label")
+    for text in (own.get("id"), element.id, inkscape):
         if text and label_of(text) in (*LABELS, "outline"):
             return label_of(text)
     return ""
