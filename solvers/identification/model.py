@@ -203,7 +203,7 @@ class ResponseModel:
 
 
 @dataclass(frozen=True, eq=False)
-class Measurement:
+class MarkerData:
     """Displacements of m markers and, if known, the force."""
 
     points: FloatArray  # Markers at rest, shape (m, 2), mm
@@ -221,7 +221,7 @@ class Measurement:
         observations: Observations,
         radius: float | None,
         reaction: tuple[float, float] | None,
-    ) -> "Measurement":
+    ) -> "MarkerData":
         """All markers that were seen; see `MarkerSettings.marker_radius` for the radius, mm."""
         points = observations.points[observations.visible]
         if not len(points):
@@ -235,7 +235,7 @@ class Measurement:
             reaction,
         )
 
-    def only(self, numbers: IntArray) -> "Measurement":
+    def only(self, numbers: IntArray) -> "MarkerData":
         """The measurement of some of its markers, by their numbers among those that were seen."""
         chosen = np.isin(self.kept, numbers)
         return replace(
@@ -265,7 +265,7 @@ class MarkerModel:
         wall_rows: Of its change by the motion of each wall, shape (k, m, 2, *shape), per mm.
     """
 
-    def __init__(self, model: ResponseModel, measurement: Measurement) -> None:
+    def __init__(self, model: ResponseModel, measurement: MarkerData) -> None:
         self.measurement, self.unknowns, body = measurement, model.unknowns, model.body
         points, means = disc_quadrature(measurement.points, measurement.radius)
         location, motion = self.unknowns.problem.mesh.locate(points), self.unknowns.motion
@@ -275,7 +275,7 @@ class MarkerModel:
         self.wall_rows = np.array(wall_rows).reshape(-1, *self.rows.shape)
 
     def predicted(self, response: Response) -> Prediction:
-        """Values in the order of `Measurement.observed`, shape (n,), and their derivatives (n, p)."""
+        """Values in the order of `MarkerData.observed`, shape (n,), and their derivatives (n, p)."""
         hypothesis, state, slopes = response.hypothesis, response.state, response.slopes
         by = self.unknowns.slopes(response.values)
         rows = self.rows + np.tensordot(hypothesis.changes, self.wall_rows, axes=1)

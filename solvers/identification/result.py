@@ -20,7 +20,7 @@ from solvers.assimilation.estimation import LEVEL, Estimate
 from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.elasticity import LawName
 from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
-from solvers.identification.model import Measurement, Response, ResponseModel
+from solvers.identification.model import MarkerData, Response, ResponseModel
 from solvers.problem import Problem
 from solvers.solution import Estimated, IdentifiedForce, Solution, Status, Uncertainty, unstable_phrase
 
@@ -34,7 +34,7 @@ class Fit(NamedTuple):
     model: ResponseModel  # The finger of that law as a function of the unknowns
     estimate: Estimate  # Values, covariance, residuals
     response: Response  # The equilibrium there
-    measurement: Measurement  # The markers that were believed
+    measurement: MarkerData  # The markers that were believed
     exact: bool  # Whether the equilibrium was found to the last digit, and by the finest discretisation
     # The fit by a coarser discretisation, whose difference estimates the error of this one
     coarser: "Fit | None" = None

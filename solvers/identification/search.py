@@ -16,7 +16,7 @@ from geometry.observations import Observations
 from solvers.assimilation.estimation import COST_CHANGE, Prediction, estimate
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
-from solvers.identification.model import EXACT, MarkerModel, Measurement, Response, ResponseModel
+from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
 from solvers.identification.result import Fit, Identified
 from solvers.identification.transfer import transferred
 from solvers.identification.unknowns import DEFAULT, Unknowns, parse_unknowns
@@ -124,12 +124,12 @@ class Identifier:
         self.parameters = first.unknowns.parameters(first.flexibility(), settings.prior)
         self._known: dict[LawName, Fit] = {}
 
-    def measurement(self, observations: Observations) -> Measurement:
+    def measurement(self, observations: Observations) -> MarkerData:
         """The markers that were seen and, if the settings have one, the reaction."""
         chosen, reaction = self._settings, None
         if chosen.reaction is not None:
             reaction = chosen.reaction, chosen.reaction_error * abs(chosen.reaction)
-        return Measurement.of(self._mesh, observations, chosen.marker_radius, reaction)
+        return MarkerData.of(self._mesh, observations, chosen.marker_radius, reaction)
 
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
         """The unknowns under every law, and the laws' probabilities.
@@ -185,7 +185,7 @@ class Identifier:
         measurement = self.measurement(observations)
         return Identified.ranked([self._shifted(fit, measurement) for fit in found.fits], {})
 
-    def _shifted(self, fit: Fit, measurement: Measurement) -> Fit:
+    def _shifted(self, fit: Fit, measurement: MarkerData) -> Fit:
         """The fit to a measurement, to first order about another fit."""
         about = fit.response
         predicted, slopes = MarkerModel(fit.model, measurement).predicted(about)
@@ -203,7 +203,7 @@ class Identifier:
             coarser=fit.coarser and self._shifted(fit.coarser, measurement),
         )
 
-    def _rough(self, measurement: Measurement) -> list[Fit]:
+    def _rough(self, measurement: MarkerData) -> list[Fit]:
         """A fit of every law with φ = 1: the first one to its end, the others in a few steps from it."""
         law, *others = self.models
         first = self._fit(law, measurement, self._known.get(law), rounds=1)
@@ -229,7 +229,7 @@ class Identifier:
     def _fit(
         self,
         law: LawName,
-        measurement: Measurement,
+        measurement: MarkerData,
         near: Fit | None,
         start: FloatArray | None = None,
         **limits: int,

@@ -25,7 +25,7 @@ from geometry.errors import ShapeError, UserError
 from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation_of, quantile_of, values_of
 from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
 from solvers.elasticity import LawName
-from solvers.identification.model import MarkerModel, Measurement, ResponseModel
+from solvers.identification.model import MarkerData, MarkerModel, ResponseModel
 from solvers.identification.unknowns import CONTACT
 
 NEAR = 0.3
@@ -104,7 +104,7 @@ class ForceTracker:
         self._parameters = model.unknowns.parameters(model.flexibility())
         self._bounds = np.array([parameter.bounds for parameter in self._parameters]).T
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
-        measurement = Measurement(points, still, still, inside, np.arange(len(points)))
+        measurement = MarkerData(points, still, still, inside, np.arange(len(points)))
         self._markers = MarkerModel(model, measurement)
         self._of_finger = ~np.isin(names, CONTACT)
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))

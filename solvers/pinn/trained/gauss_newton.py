@@ -43,7 +43,7 @@ COLUMNS = 512
 """Columns of a matrix product that a thread takes at once."""
 
 
-class Step(NamedTuple):
+class TrainingStep(NamedTuple):
     """State after a step."""
 
     parameters: torch.Tensor  # Shape (2, parameters)
@@ -54,9 +54,9 @@ class Step(NamedTuple):
 
 def sampled_steps(
     squares: Squares, start: torch.Tensor, points: int, steps: int, seed: int
-) -> Iterator[Step]:
+) -> Iterator[TrainingStep]:
     """Steps of all parameters, from samples that grow evenly to `points` points."""
-    draw, now = Draw(squares.body, seed), Step(start, squares.value(start), FIRST_DAMPING, 0.0)
+    draw, now = Draw(squares.body, seed), TrainingStep(start, squares.value(start), FIRST_DAMPING, 0.0)
     every = torch.arange(start.shape[1]).expand(2, -1)
     for number in range(steps):
         sample = draw.points(max(points * (number + 1) // steps, 1))
@@ -77,9 +77,9 @@ def sampled_steps(
 
 def subset_steps(
     squares: Squares, start: torch.Tensor, chosen: int, points: int, steps: int, seed: int
-) -> Iterator[Step]:
+) -> Iterator[TrainingStep]:
     """Steps of `chosen` parameters of each network, the matrix from `points` points."""
-    draw, now = Draw(squares.body, seed), Step(start, squares.value(start), LATER_DAMPING, 0.0)
+    draw, now = Draw(squares.body, seed), TrainingStep(start, squares.value(start), LATER_DAMPING, 0.0)
     for number in range(steps):
         _, gradient = squares.value_and_gradient(now.parameters)
         subset = draw.parameters(start.shape[1], chosen)
@@ -148,7 +148,9 @@ def _damped_solution(matrix: FloatArray, right: FloatArray, damping: float) -> F
     return np.asarray(torch.cholesky_solve(torch.from_numpy(right)[:, None], factor)[:, 0].numpy())
 
 
-def _next(squares: Squares, now: Step, tried: list[tuple[float, torch.Tensor | None]]) -> Step:
+def _next(
+    squares: Squares, now: TrainingStep, tried: list[tuple[float, torch.Tensor | None]]
+) -> TrainingStep:
     """The least energy along the directions that go with dampings; the damping grows if there is none."""
     best = now._replace(damping=now.damping * REFUSED, length=0.0)
     for damping, direction in tried:
@@ -159,7 +161,7 @@ def _next(squares: Squares, now: Step, tried: list[tuple[float, torch.Tensor | N
             there = now.parameters - length * direction
             value = squares.value(there)
             if value < best.value:
-                best = Step(there, value, damping, length)
+                best = TrainingStep(there, value, damping, length)
             if value > last:
                 break
             last = value

@@ -17,7 +17,7 @@ from solvers.energy_and_force import energy_and_force
 from solvers.pinn.network_solver import NetworkSolver
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.pinn.threading import map_in_threads, pool, slices
-from solvers.pinn.trained.gauss_newton import Step, sampled_steps, subset_steps
+from solvers.pinn.trained.gauss_newton import TrainingStep, sampled_steps, subset_steps
 from solvers.pinn.trained.squares import PIECE, Squares
 from solvers.pinn.trained.streams import Streams
 from solvers.problem import Problem
@@ -114,7 +114,7 @@ class TrainedPinnSolver(NetworkSolver):
     def _minimised(self) -> str:
         return "energy and misfit" if self.assimilates else "energy"
 
-    def _steps(self, squares: Squares, start: torch.Tensor) -> Iterator[Step]:
+    def _steps(self, squares: Squares, start: torch.Tensor) -> Iterator[TrainingStep]:
         for step in sampled_steps(squares, start, self.sample_points, self.sampled_steps, self.seed):
             start = step.parameters
             yield step

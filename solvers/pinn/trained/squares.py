@@ -32,7 +32,7 @@ PIECE = 512
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class NetworkFrame:
     """What the networks see of a point: its scaled position, and the factor of the clamped base."""
 
     origin: torch.Tensor  # Position that is scaled to zero, shape (2,), mm
@@ -92,7 +92,7 @@ class Squares:
     """Half the sum of squares, of parameters of shape (2, parameters)."""
 
     shape: ModifiedMlp  # Of the networks
-    frame: Frame  # What they see
+    frame: NetworkFrame  # What they see
     body: Sample  # Quadrature points; their weights are areas
     contact: Sample  # Points of the contact; their weights give its displacement
     # Displacement of the contact, shape (2,), mm; a component that is free has the value NaN
@@ -122,7 +122,7 @@ class Squares:
             base_length: Length of the factor of the base, mm.
             dtype: Of the arithmetic.
         """
-        frame = Frame.of(problem.mesh, base_length)
+        frame = NetworkFrame.of(problem.mesh, base_length)
         rule = body_quadrature(problem.mesh)
         contact, functional = contact_functional(problem)
         if misfit is None:

@@ -9,7 +9,7 @@ from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import FemBody, FemIdSolver
-from solvers.identification.model import EXACT, MarkerModel, Measurement, ResponseModel
+from solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
 from solvers.identification.unknowns import CONTACT, DEFAULT, Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
@@ -56,7 +56,7 @@ def markers(problem, model):
 def marked(model):
     """The default finger's markers in a model."""
     observed = observed_at(model.unknowns.problem.mesh.markers, np.zeros((9, 2)), NOISE)
-    return MarkerModel(model, Measurement.of(model.unknowns.problem.mesh, observed, None, None))
+    return MarkerModel(model, MarkerData.of(model.unknowns.problem.mesh, observed, None, None))
 
 
 def values_of(unknowns, changed=VALUES):
@@ -70,7 +70,7 @@ def test_a_measurement_of_some_markers_is_the_one_without_the_others(problem):
     seen = np.arange(9) != 4
     observed = replace(observed_at(problem.mesh.markers, moved, NOISE), visible=seen)
     kept = np.array([0, 2, 3, 6, 7])
-    found = Measurement.of(problem.mesh, observed, None, None).only(kept)
+    found = MarkerData.of(problem.mesh, observed, None, None).only(kept)
     np.testing.assert_array_equal(found.kept, kept)
     np.testing.assert_array_equal(found.displacements, moved[seen][kept])
     assert found.noise.shape == (10,)
