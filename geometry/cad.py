@@ -12,18 +12,12 @@ import cadquery as cq
 from cadquery.occ_impl.exporters.dxf import DxfDocument
 
 from geometry.arrays import FloatArray
-from geometry.finger.contact import outline_with_contact
-from geometry.finger.finger import Finger
+from geometry.finger.finger import Finger, outline_with_contact
 from geometry.finger.svg import section_svg
 from geometry.section.loop import Loop
 
-BODY_COLOUR = (0.15, 0.15, 0.17)
-MARKER_COLOUR = (0.95, 0.25, 0.1)
 LABELLED = {"base": 5, "contact": 30}
 """Layers of a DXF file that name parts of the outline, with their colours' numbers."""
-
-STL_TOLERANCE = 0.01
-"""Largest distance of an STL facet from the surface, mm."""
 
 
 def section_face(finger: Finger) -> cq.Face:
@@ -53,9 +47,9 @@ def assembly(finger: Finger) -> cq.Assembly:
     """The named and coloured parts `body`, `marker-1`, `marker-2`, ..."""
     body, markers = solids(finger)
     whole = cq.Assembly(name="finger")
-    whole.add(body, name="body", color=cq.Color(*BODY_COLOUR))
+    whole.add(body, name="body", color=cq.Color(0.15, 0.15, 0.17))
     for number, marker in enumerate(markers, start=1):
-        whole.add(marker, name=f"marker-{number}", color=cq.Color(*MARKER_COLOUR))
+        whole.add(marker, name=f"marker-{number}", color=cq.Color(0.95, 0.25, 0.1))
     return whole
 
 
@@ -71,7 +65,7 @@ def write_stl(finger: Finger, folder: Path) -> list[Path]:
     body, markers = solids(finger)
     paths = [folder / "finger-body.stl", folder / "finger-markers.stl"]
     for shape, path in zip((body, cq.Compound.makeCompound(markers)), paths, strict=True):
-        shape.exportStl(str(path), tolerance=STL_TOLERANCE, angularTolerance=0.1)
+        shape.exportStl(str(path), tolerance=0.01, angularTolerance=0.1)  # mm, rad
     return paths
 
 
@@ -115,12 +109,6 @@ WRITERS: Mapping[str, Callable[[Finger, Path], list[Path]]] = {
 }
 """The writer of each format, into a folder."""
 
-ENDS = {".step": b"END-ISO-10303-21;", ".dxf": b"EOF", ".svg": b"</svg>"}
-"""Last characters of the files."""
-
-STL_HEAD, STL_TRIANGLE = 84, 50
-"""Bytes of a binary STL file before its triangles, whose number comes last, and of each triangle."""
-
 
 def cad_contents(finger: Finger, formats: Sequence[str]) -> dict[str, bytes]:
     """The contents of a finger's CAD files in some formats, by name."""
@@ -132,10 +120,11 @@ def cad_contents(finger: Finger, formats: Sequence[str]) -> dict[str, bytes]:
 def _whole(path: Path) -> bytes:
     """The content of a file; an `OSError` if it has no end: OpenCASCADE does not say that a disk is full."""
     content = path.read_bytes()
-    if path.suffix == ".stl":
-        whole = len(content) == STL_HEAD + STL_TRIANGLE * int.from_bytes(content[80:84], "little")
+    if path.suffix == ".stl":  # a head, whose last number counts the triangles, and 50 bytes for each
+        whole = len(content) == 84 + 50 * int.from_bytes(content[80:84], "little")
     else:
-        whole = content.rstrip().endswith(ENDS[path.suffix])
+        end = {".step": b"END-ISO-10303-21;", ".dxf": b"EOF", ".svg": b"</svg>"}[path.suffix]
+        whole = content.rstrip().endswith(end)
     if not whole:
         raise OSError(EIO, "a part was not written; is the disk full?", str(path))
     return content

@@ -15,7 +15,7 @@ from geometry.drawing.description import Description, description_beside, load_d
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.drawing.formats.chain import straightened
 from geometry.drawing.formats.drawing import LABELS, Drawing, label_of, place
-from geometry.drawing.placement import placed, renamed, with_part
+from geometry.drawing.placement import placed, with_part
 from geometry.drawing.ready_mesh import ready_mesh
 from geometry.errors import UserError
 from geometry.section.loop import Loop
@@ -98,7 +98,7 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
     """The finger of a drawing with a description; a `UserError` says what does not fit."""
     labelled = body(drawing.loops)
     outline, clamp_source = _clamped(labelled.outline, description, drawing.unit)
-    cavities = tuple(straightened(renamed(loop, [""] * len(loop.points))) for loop in labelled.cavities)
+    cavities = tuple(straightened(loop.renamed([""] * len(loop.points))) for loop in labelled.cavities)
     section = Section(outline, cavities)
     contact = _contact(drawing, labelled.outline, section, description)
     which, fraction = check_contact(outline, contact.middle)
@@ -160,14 +160,14 @@ def _clamped(outline: Loop, description: Description, unit: float) -> tuple[Loop
     """The outline with its clamp as the pieces `base` and no other name, and the clamp's source."""
     given = description.clamp
     if isinstance(given, tuple):
-        outline = straightened(renamed(outline, [""] * len(outline.points)))
+        outline = straightened(outline.renamed([""] * len(outline.points)))
         for pair in given:
             outline = with_part(outline, [unit * np.array(point) for point in pair], "base")
         source = "given"
     else:
         label = label_of(given) if given else "base"
         held = [name == label or LABELS.get(name) == label for name in outline.names]
-        outline = straightened(renamed(outline, ("base" if each else "" for each in held)))
+        outline = straightened(outline.renamed("base" if each else "" for each in held))
         source = "given" if given else "drawn"
         if not any(held) and given:
             raise UserError(
@@ -200,17 +200,11 @@ def _contact(drawing: Drawing, labelled: Loop, section: Section, description: De
 
 def _run(loop: Loop, pieces: list[int]) -> tuple[FloatArray, FloatArray]:
     """Middle (2,) and ends (2, 2) of a run of pieces."""
-    count = len(loop.points)
-    first = next((which for which in pieces if (which - 1) % count not in pieces), pieces[0])
-    run = [first]
-    while (run[-1] + 1) % count in pieces and len(run) < len(pieces):
-        run.append((run[-1] + 1) % count)
-    if len(run) < len(pieces):
+    run, *others = loop.runs(pieces)
+    if others:
         raise UserError("the contact is in several parts; call one connected part of the outline contact")
-    ends = np.cumsum(loop.lengths[run])
-    step = int(np.searchsorted(ends, ends[-1] / 2))
-    fraction = 1 - (ends[step] - ends[-1] / 2) / loop.lengths[run[step]]
-    return loop.along(run[step], fraction)[0], np.stack([loop.ends[run[0], 0], loop.ends[run[-1], 1]])
+    middle = loop.along(*loop.place_in(run, float(loop.lengths[run].sum()) / 2))[0]
+    return middle, np.stack([loop.ends[run[0], 0], loop.ends[run[-1], 1]])
 
 
 def _markers(

@@ -1,6 +1,6 @@
 """Rotation, reflection and shift of a drawing into the finger's frame; names of the parts of its outline."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,11 +99,6 @@ def _rounded(loop: Loop) -> Loop:
     return Loop(np.round(loop.points, ROUND) + 0.0, loop.bulges, loop.names)
 
 
-def renamed(loop: Loop, names: Iterable[str]) -> Loop:
-    """The curve with other names."""
-    return Loop(loop.points, loop.bulges, tuple(names))
-
-
 def with_part(loop: Loop, ends: Sequence[FloatArray], name: str) -> Loop:
     """The curve with a name for its part between two points, the shorter way, mm."""
     for point in ends:
@@ -116,7 +111,7 @@ def with_part(loop: Loop, ends: Sequence[FloatArray], name: str) -> Loop:
         )
     ways = [run_between(first, last, len(loop.points)), run_between(last, first, len(loop.points))]
     shorter = min(ways, key=lambda way: float(loop.lengths[way].sum()))
-    return renamed(loop, (name if which in shorter else own for which, own in enumerate(loop.names)))
+    return loop.renamed((name if which in shorter else own for which, own in enumerate(loop.names)))
 
 
 def on_curve(loop: Loop, point: FloatArray, name: str) -> tuple[int, float]:
@@ -156,7 +151,7 @@ def with_front(loop: Loop, contact: FloatArray) -> Loop:
         while loop.names[current] != "base" and _faces(loop, current) and current not in run:
             run.add(current)
             current = (current + step) % len(loop.points)
-    return renamed(loop, ("front" if number in run else own for number, own in enumerate(loop.names)))
+    return loop.renamed(("front" if number in run else own for number, own in enumerate(loop.names)))
 
 
 def with_back(loop: Loop) -> Loop:

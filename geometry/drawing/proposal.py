@@ -19,7 +19,6 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.drawing.placement import renamed
 from geometry.section.loop import Loop
 from geometry.section.section import Section
 from geometry.section.thickness import inner_normals, through
@@ -52,8 +51,8 @@ def with_clamp(outline: Loop) -> Loop:
         (end for end in ends if end.width >= 0.8 * widest),
         key=lambda end: (len(end.pieces), round(end.width * abs(float(end.normal @ axis)), 6), -end.x),
     )
-    return renamed(
-        outline, ("base" if number in best.pieces else name for number, name in enumerate(outline.names))
+    return outline.renamed(
+        "base" if number in best.pieces else name for number, name in enumerate(outline.names)
     )
 
 
@@ -82,7 +81,7 @@ def contact_point(section: Section) -> FloatArray:
 
 def marker_places(section: Section, count: int) -> FloatArray:
     """Proposed centres of markers, shape (count, 2), mm, in a section with a clamp."""
-    runs = _free_runs(section.outline)
+    runs = section.outline.runs(which for which, name in enumerate(section.outline.names) if name != "base")
     lengths = np.array([float(section.outline.lengths[run].sum()) for run in runs])
     long = np.flatnonzero(lengths >= lengths.max() / 2)
     shares = np.round(count * np.cumsum(lengths[long]) / lengths[long].sum())
@@ -107,13 +106,10 @@ def _along(section: Section, run: list[int], count: int) -> FloatArray:
 
 def _below(section: Section, run: list[int], along: FloatArray) -> FloatArray:
     """Places with most material around them below points of a run, given by arc length (n,), mm: (n, 2)."""
-    outline = section.outline
-    ends = np.cumsum(outline.lengths[run])
-    places = []
+    outline, places = section.outline, []
     for each in along:
-        step = int(np.searchsorted(ends, each))
-        fraction = 1 - (ends[step] - each) / outline.lengths[run[step]]
-        point, normal = outline.along(run[step], fraction)[0], inner_normals(outline, run[step], fraction)[0]
+        which, fraction = outline.place_in(run, each)
+        point, normal = outline.along(which, fraction)[0], inner_normals(outline, which, fraction)[0]
         inward = point + np.linspace(0, _deepest(section, point, normal), 81)[1:, None] * normal
         places.append(inward[int(np.round(section.clearance(inward), 6).argmax())])
     return np.array(places).reshape(-1, 2)
@@ -173,16 +169,13 @@ def _with_lowest_part(outline: Loop) -> Loop:
     points, _, along = _samples(outline)
     middle = along[int(np.round(points[:, 1], 6).argmin())]
     for along in ((middle - total / 12) % total, (middle + total / 12) % total):
-        ends = np.cumsum(outline.lengths)
-        piece = int(np.searchsorted(ends, along))
-        fraction = 1 - (ends[piece] - along) / outline.lengths[piece]
+        piece, fraction = outline.place_in(range(len(outline.points)), along)
         if 1e-9 < fraction < 1 - 1e-9:
             outline = outline.split(piece, [fraction])
     ends = np.cumsum(outline.lengths)
     away = (ends - outline.lengths / 2 - middle + total / 2) % total - total / 2
-    return renamed(
-        outline,
-        ("base" if abs(far) < total / 12 else name for far, name in zip(away, outline.names, strict=True)),
+    return outline.renamed(
+        "base" if abs(far) < total / 12 else name for far, name in zip(away, outline.names, strict=True)
     )
 
 
@@ -231,20 +224,3 @@ def _mid_span(section: Section, which: int, clamp: FloatArray) -> FloatArray:
     reach = [float(((cavity.flattened()[0] - near) @ along).max()) for cavity in section.cavities]
     reach = [min(each, length) for each in reach if each > 0]
     return np.asarray(near + along * 0.5 * max(reach, default=length))
-
-
-def _free_runs(outline: Loop) -> list[list[int]]:
-    """Runs of pieces between clamped ones, in the outline's direction."""
-    count = len(outline.points)
-    starts = [
-        which
-        for which in range(count)
-        if outline.names[which] != "base" and outline.names[which - 1] == "base"
-    ]
-    runs = []
-    for start in starts:
-        run = [start]
-        while outline.names[(run[-1] + 1) % count] != "base":
-            run.append((run[-1] + 1) % count)
-        runs.append(run)
-    return runs

@@ -2,7 +2,10 @@
 
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+
 from geometry.arrays import FloatArray
+from geometry.section.loop import Loop
 from geometry.section.section import Section
 
 if TYPE_CHECKING:
@@ -79,3 +82,18 @@ class Finger(Protocol):
 
     def plot(self) -> "Figure":
         """The section to scale, with its markers and the contact, as a matplotlib figure."""
+
+
+def outline_with_contact(finger: Finger) -> Loop:
+    """The outline with corners at the contact's ends and middle, and its pieces between named `contact`."""
+    (low, high), loop = finger.contact_ends, finger.section.outline
+    nearest = 1e-7  # distance of two places that are one, mm
+    for x in (low, finger.contact_abscissa, high):
+        which, fraction = Section(loop).front_place(x)
+        if nearest < fraction * loop.lengths[which] < loop.lengths[which] - nearest:
+            loop = loop.split(which, [fraction])
+    for which in loop.pieces("front"):
+        ends = np.sort(loop.ends[which, :, 0])
+        if ends[0] > low - nearest and ends[1] < high + nearest:
+            loop = loop.named(which, "contact")
+    return loop

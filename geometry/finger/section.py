@@ -29,13 +29,13 @@ class Line:
 
 
 @lru_cache(maxsize=64)
-def finger_section(parameters: Parameters) -> Section:
+def finger_section(p: Parameters) -> Section:
     """The section of a finger whose parameters obey the rules.
 
     The outline has the pieces `base`, `back`, `tip` and `front`, with a foot `foot`.
     """
-    cavities = tuple(_rounded(cell, parameters.fillet_radius).reversed() for cell in cells(parameters))
-    return Section(finger_outline(parameters), cavities)
+    cavities = tuple(_rounded(cell, p.fillet_radius).reversed() for cell in cells(p))
+    return Section(finger_outline(p), cavities)
 
 
 def front_line(distance: float) -> Line:
@@ -43,60 +43,58 @@ def front_line(distance: float) -> Line:
     return Line(np.array([0.0, -distance]), np.array([1.0, 0.0]))
 
 
-def base_line(parameters: Parameters, distance: float) -> Line:
+def base_line(p: Parameters, distance: float) -> Line:
     """The line `distance` mm inside the base line, toward the back."""
-    inward, along = _base_frame(parameters)
+    inward, along = _base_frame(p)
     return Line(distance * inward, along)
 
 
 @lru_cache(maxsize=64)
-def back_line(parameters: Parameters, distance: float) -> Line:
+def back_line(p: Parameters, distance: float) -> Line:
     """The line `distance` mm inside the back face, toward the tip."""
-    base, apex = base_corners(parameters)[1], np.array([parameters.height, 0.0])
+    base, apex = base_corners(p)[1], np.array([p.height, 0.0])
     along = (apex - base) / np.linalg.norm(apex - base)
     return Line(apex + distance * np.array([-along[1], along[0]]), along)
 
 
-def tip_line(parameters: Parameters) -> Line:
+def tip_line(p: Parameters) -> Line:
     """The line between cavities and tip, parallel to the base, `tip_length` from the apex along the front."""
-    _, along = _base_frame(parameters)
-    return Line(np.array([parameters.height - parameters.tip_length, 0.0]), along)
+    _, along = _base_frame(p)
+    return Line(np.array([p.height - p.tip_length, 0.0]), along)
 
 
-def base_corners(parameters: Parameters) -> FloatArray:
+def base_corners(p: Parameters) -> FloatArray:
     """Front and back end of the base line, shape (2, 2), mm."""
-    _, along = _base_frame(parameters)
-    return np.array([[0.0, 0.0], parameters.base_width * along])
+    _, along = _base_frame(p)
+    return np.array([[0.0, 0.0], p.base_width * along])
 
 
-def cells(parameters: Parameters) -> tuple[FloatArray, ...]:
+def cells(p: Parameters) -> tuple[FloatArray, ...]:
     """Cavities from base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise.
 
     Their corners are the front and the back one nearer the base, then the back and the front one nearer the
     tip.
     """
-    return _quadrilaterals(parameters)[::2]
+    return _quadrilaterals(p)[::2]
 
 
-def ribs(parameters: Parameters) -> tuple[FloatArray, ...]:
+def ribs(p: Parameters) -> tuple[FloatArray, ...]:
     """Ribs between the walls' inner faces, corners in the order of `cells`, each of shape (4, 2), mm."""
-    return _quadrilaterals(parameters)[1::2]
+    return _quadrilaterals(p)[1::2]
 
 
-def rib_feet(parameters: Parameters) -> FloatArray:
+def rib_feet(p: Parameters) -> FloatArray:
     """Abscissae of the rib axes on the front wall's inner face, shape (rib_count,), mm.
 
     Without `rib_start` and `rib_pitch`, equal pitch over the cavity's length there, which is an assumption:
     the paper gives no spacing.
     """
-    p = parameters
     start = cavity_ends(p)[0] + rib_pitch(p) if p.rib_start is None else p.rib_start
     return np.asarray(start + rib_pitch(p) * np.arange(p.rib_count), dtype=np.float64)
 
 
-def rib_pitch(parameters: Parameters) -> float:
+def rib_pitch(p: Parameters) -> float:
     """Distance of neighbouring rib axes along the front wall, mm."""
-    p = parameters
     if p.rib_pitch is not None:
         return p.rib_pitch
     start, end = cavity_ends(p)
@@ -104,40 +102,37 @@ def rib_pitch(parameters: Parameters) -> float:
 
 
 @lru_cache(maxsize=64)
-def cavity_ends(parameters: Parameters) -> tuple[float, float]:
+def cavity_ends(p: Parameters) -> tuple[float, float]:
     """Abscissae between which cavities and ribs lie along the front wall's inner face, mm."""
-    p = parameters
     inner = front_line(p.front_thickness)
     sides = base_line(p, p.base_thickness), tip_line(p)
     start, end = (float(inner.meets(side)[0]) for side in sides)
     return start, end
 
 
-def rib_slope(parameters: Parameters) -> float:
+def rib_slope(p: Parameters) -> float:
     """Angle of the ribs from the front wall's normal, positive toward the tip, degrees."""
-    p = parameters
     return p.rib_angle + (p.base_tilt if p.rib_reference == "base" else 0.0)
 
 
-def rib_direction(parameters: Parameters) -> FloatArray:
+def rib_direction(p: Parameters) -> FloatArray:
     """Unit vector along the ribs from front to back, shape (2,).
 
     A positive angle leans toward the tip: x grows from the front wall to the back wall.
     """
-    angle = np.radians(rib_slope(parameters))
+    angle = np.radians(rib_slope(p))
     return np.array([np.sin(angle), -np.cos(angle)])
 
 
-def rib_axes(parameters: Parameters) -> FloatArray:
+def rib_axes(p: Parameters) -> FloatArray:
     """Ends of the rib axes on the front and the back wall's centre line, shape (rib_count, 2, 2), mm."""
-    p = parameters
     lines = _rib_lines(p, rib_feet(p))
     ends = (front_line(p.front_thickness / 2), back_line(p, p.back_thickness / 2))
     return np.stack([lines.meets(end) for end in ends], axis=1)
 
 
 @lru_cache(maxsize=64)
-def marker_positions(parameters: Parameters) -> FloatArray:
+def marker_positions(p: Parameters) -> FloatArray:
     """Centres of the markers, ordered from base to tip, shape (m, 2), mm.
 
     `joints`: where each rib's axis meets either wall's centre line, and one in the middle of the solid tip,
@@ -147,7 +142,6 @@ def marker_positions(parameters: Parameters) -> FloatArray:
     The paper shows nine markers, printed with the finger, without positions; its group tracks the eight rib
     ends and the tip in later code (csiro-robotics/Sim2Real_CFM_Soft_robotic).
     """
-    p = parameters
     if p.marker_layout == "front":
         x = (p.height - tip_tangent(p)) * np.arange(1, p.marker_count + 1) / (p.marker_count + 1)
         points = np.stack([x, np.full_like(x, -p.front_thickness / 2)], axis=1)
@@ -158,15 +152,15 @@ def marker_positions(parameters: Parameters) -> FloatArray:
     return np.asarray(points, dtype=np.float64)
 
 
-def apex_angle(parameters: Parameters) -> float:
+def apex_angle(p: Parameters) -> float:
     """Angle between front and back face, radians."""
-    along = back_line(parameters, 0.0).direction
+    along = back_line(p, 0.0).direction
     return float(np.arctan2(along[1], along[0]))
 
 
-def tip_tangent(parameters: Parameters) -> float:
+def tip_tangent(p: Parameters) -> float:
     """Distance along the front and the back face from the apex to where the tip's rounding starts, mm."""
-    return float(parameters.tip_radius / np.tan(apex_angle(parameters) / 2))
+    return float(p.tip_radius / np.tan(apex_angle(p) / 2))
 
 
 def corner_angles(corners: FloatArray) -> FloatArray:
@@ -201,9 +195,8 @@ def _rib_lines(p: Parameters, feet: FloatArray) -> Line:
     return Line(np.stack([feet, np.full_like(feet, -p.front_thickness)], axis=-1), rib_direction(p))
 
 
-def finger_outline(parameters: Parameters) -> Loop:
+def finger_outline(p: Parameters) -> Loop:
     """The outline from the base's front corner, counter-clockwise."""
-    p = parameters
     points, names = _base_side(p)
     apex, tangent = np.array([p.height, 0.0]), tip_tangent(p)
     points.append(base_corners(p)[1])

@@ -3,8 +3,7 @@
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.finger.contact import outline_with_contact
-from geometry.finger.finger import Finger
+from geometry.finger.finger import Finger, outline_with_contact
 from geometry.section.loop import Loop
 
 LABELLED = {"base": "#0072b2", "contact": "#d55e00"}

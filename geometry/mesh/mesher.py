@@ -12,8 +12,7 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 from geometry.atomic import write_bytes
 from geometry.errors import UserError
-from geometry.finger.contact import CONTACT, outline_with_contact
-from geometry.finger.finger import Finger
+from geometry.finger.finger import Finger, outline_with_contact
 from geometry.mesh.boundary import (
     are_among,
     boundary_edges,
@@ -97,7 +96,7 @@ def _named(finger: Finger, found: Triangulation) -> TriangleMesh:
     triangles = counter_clockwise(points, found.triangles)
     edges = boundary_edges(triangles)
     names = {name: list(nodes) for name, nodes in found.edges.items() if name}
-    names["front"] = [*names.get("front", []), *names[CONTACT]]
+    names["front"] = [*names.get("front", []), *names["contact"]]
     boundaries = {name: edges[are_among(edges, np.array(nodes))] for name, nodes in names.items()}
     middle = finger.section.front_point(finger.contact_abscissa)[None]
     contact_node = int(_nodes_at(points, middle, "middle of the contact")[0])

@@ -1,6 +1,6 @@
 """A closed curve of straight lines and circular arcs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -146,10 +146,13 @@ class Loop:
         sign = np.sign(np.linalg.det(turn))
         return type(self)(self.points @ turn.T + np.asarray(shift), sign * self.bulges, self.names)
 
+    def renamed(self, names: Iterable[str]) -> Self:
+        """The curve with other names of its pieces."""
+        return type(self)(self.points, self.bulges, tuple(names))
+
     def named(self, which: int, name: str) -> Self:
         """The curve with another name of one piece."""
-        names = (*self.names[:which], name, *self.names[which + 1 :])
-        return type(self)(self.points, self.bulges, names)
+        return self.renamed((*self.names[:which], name, *self.names[which + 1 :]))
 
     def split(self, which: int, fractions: Sequence[float]) -> Self:
         """The curve with piece `which` cut at fractions of its length, between 0 and 1 and rising."""
@@ -164,6 +167,23 @@ class Loop:
     def pieces(self, name: str) -> Iterator[int]:
         """Numbers of the pieces with a name."""
         return (which for which, own in enumerate(self.names) if own == name)
+
+    def runs(self, chosen: Iterable[int]) -> list[list[int]]:
+        """Some pieces as runs of neighbours, each in the curve's direction."""
+        count, left = len(self.points), set(chosen)
+        runs = []
+        for start in sorted(which for which in left if (which - 1) % count not in left) or [min(left)]:
+            run = [start]
+            while (following := (run[-1] + 1) % count) in left and following != start:
+                run.append(following)
+            runs.append(run)
+        return runs
+
+    def place_in(self, run: Sequence[int], along: float) -> tuple[int, float]:
+        """The piece, and the fraction of its length, at an arc length, mm, from the start of a run."""
+        ends = np.cumsum(self.lengths[list(run)])
+        step = int(np.searchsorted(ends, along))
+        return run[step], float(1 - (ends[step] - along) / self.lengths[run[step]])
 
     def beside_arc(self, which: int, points: FloatArray) -> BoolArray:
         """Mask of the points (k, 2), mm, beyond the chord of arc `which`, on the side of the arc."""

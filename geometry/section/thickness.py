@@ -147,7 +147,7 @@ def _first(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
         lengths = np.full((len(start), len(pieces.bulges)), np.inf)
         straight = np.setdiff1d(np.arange(len(pieces.bulges)), curved)
         lengths[:, straight] = _to_lines(pieces.start[straight], pieces.end[straight], start, ahead)
-        lengths[:, curved] = _to_arcs(_Pieces(*(each[curved] for each in pieces)), start, ahead)
+        lengths[:, curved] = _to_arcs(pieces, curved, start, ahead)
     else:
         lengths = _to_lines(pieces.start, pieces.end, start, ahead)
     nearest = lengths.argmin(axis=1)
@@ -167,17 +167,18 @@ def _to_lines(first: FloatArray, last: FloatArray, start: FloatArray, ahead: Flo
     return np.asarray(np.where(hit, length, np.inf))
 
 
-def _to_arcs(arcs: _Pieces, start: FloatArray, ahead: FloatArray) -> FloatArray:
-    """Lengths of rays (n, 2) to p arcs, shape (n, p), mm; infinite where they miss."""
-    apart = start[:, None] - arcs.centres
+def _to_arcs(pieces: _Pieces, curved: IntArray, start: FloatArray, ahead: FloatArray) -> FloatArray:
+    """Lengths of rays (n, 2) to the curved pieces (p,), shape (n, p), mm; infinite where they miss."""
+    first, last, radii = pieces.start[curved], pieces.end[curved], pieces.radii[curved]
+    apart = start[:, None] - pieces.centres[curved]
     middle = -(apart * ahead[:, None]).sum(axis=-1)
     with np.errstate(invalid="ignore"):  # a ray that misses the circle
-        half = np.sqrt(middle**2 - (apart**2).sum(axis=-1) + arcs.radii**2)
+        half = np.sqrt(middle**2 - (apart**2).sum(axis=-1) + radii**2)
     best = np.full(middle.shape, np.inf)
     for length in (middle - half, middle + half):
-        away = start[:, None] + length[..., None] * ahead[:, None] - arcs.start
-        beyond = -np.sign(arcs.bulges) * _cross(arcs.end - arcs.start, away)
-        hit = (length > TOUCH) & (beyond >= -1e-9 * arcs.radii)
+        away = start[:, None] + length[..., None] * ahead[:, None] - first
+        beyond = -np.sign(pieces.bulges[curved]) * _cross(last - first, away)
+        hit = (length > TOUCH) & (beyond >= -1e-9 * radii)
         best = np.where(hit & (length < best), length, best)
     return best
 

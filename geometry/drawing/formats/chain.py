@@ -203,14 +203,10 @@ def _marked(loops: tuple[Loop, ...], mark: Piece) -> tuple[Loop, ...]:
     first, last = (corner_at(loop, point) for point in (mark.start, mark.end))
     _, under, _, _ = nearest_piece([loop], middle)
     names = list(loop.names)
-    for which in (
-        run_between(first, last, len(names))
-        if _holds(first, last, under, len(names))
-        else (run_between(last, first, len(names)))
-    ):
+    way = run_between(first, last, len(names))
+    for which in way if under in way else run_between(last, first, len(names)):
         names[which] = mark.label
-    renamed = Loop(loop.points, loop.bulges, tuple(names))
-    return (*loops[:number], renamed, *loops[number + 1 :])
+    return (*loops[:number], loop.renamed(names), *loops[number + 1 :])
 
 
 def cut_at(loop: Loop, which: int, fraction: float) -> Loop:
@@ -227,7 +223,3 @@ def corner_at(loop: Loop, point: FloatArray) -> int:
 def run_between(first: int, last: int, count: int) -> list[int]:
     """Numbers of the pieces from corner `first` to corner `last`, along the curve."""
     return [(first + step) % count for step in range((last - first) % count)]
-
-
-def _holds(first: int, last: int, which: int, count: int) -> bool:
-    return (which - first) % count < (last - first) % count
