@@ -7,14 +7,10 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, MeshSettings, UserError, load_design
-from geometry.cad import write_dxf as export_dxf
-from geometry.cad import write_step as export_step
-from geometry.cad import write_svg as export_svg
+from geometry import Design, MeshSettings, UserError
 from geometry.drawing.checks import least_thickness
 from geometry.drawing.description import Description, load_description
 from geometry.drawing.drawn_finger import DrawnFinger, description_lines
-from geometry.drawing.formats.pieces import full_circle
 from geometry.drawing.load import finger_from_file
 from geometry.mesh.mesher import build_mesh
 from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, rectangle, write_beam_mesh, write_dxf, write_svg
@@ -33,36 +29,6 @@ def ring_file(path, outer=20.0, inner=15.0):
 
 def clamped_length(finger):
     return sum(loop.lengths[which] for loop, which in finger.section.named("base"))
-
-
-@pytest.mark.parametrize("export", [export_step, export_dxf, export_svg])
-def test_a_design_comes_back_in_its_own_frame(tmp_path, export):
-    design = Design()
-    finger = finger_from_file(export(design, tmp_path)[0])
-    assert str(finger.placement) == "none"
-    assert finger.section.area == pytest.approx(design.section.area, rel=1e-9)
-    np.testing.assert_allclose(np.sort(finger.section.outline.points, axis=0), [[0, -30], [0, 0], [90, 0]])
-    assert finger.contact_abscissa == pytest.approx(design.contact_abscissa)
-    assert finger.contact_width == design.contact_width
-    np.testing.assert_allclose(finger.markers, design.markers, atol=1e-9)
-    assert clamped_length(finger) == pytest.approx(30)
-
-
-@pytest.mark.parametrize("export", [export_dxf, export_svg])
-@pytest.mark.parametrize(
-    "design",
-    [Design(contact_position=60, contact_width=5), load_design("csiro")],
-    ids=["contact elsewhere", "csiro"],
-)
-def test_exports_name_the_clamp_and_the_contact(tmp_path, export, design):
-    finger = finger_from_file(export(design, tmp_path)[0])
-    assert finger.section.area == pytest.approx(design.section.area, rel=1e-9)
-    assert (finger.sources["clamp"], finger.sources["contact"]) == ("drawn", "drawn")
-    back = finger.placement.inverse  # x = 0 is at the foot, which the design has at negative x
-    assert back([[finger.contact_abscissa, 0]])[0] == pytest.approx((design.contact_abscissa, 0), abs=1e-9)
-    assert finger.contact_width == pytest.approx(design.contact_width)
-    assert clamped_length(finger) == pytest.approx(clamped_length(design))
-    np.testing.assert_allclose(back(finger.markers), design.markers, atol=1e-9)
 
 
 @pytest.mark.parametrize("path", FILES, ids=IDS)
@@ -166,6 +132,8 @@ def test_ring(tmp_path):
     assert moved.digest != finger.digest
     with pytest.raises(UserError, match="not on the front face"):
         finger.at_contact(finger.contact_abscissa + 30)
+    mesh = build_mesh(finger, MeshSettings(size=1.5, coarsening=2))
+    assert mesh.areas.sum() == pytest.approx(np.pi * (400 - 225), rel=1e-2)
 
 
 def test_labels_of_the_file_beat_proposals_and_the_description_beats_both(tmp_path):
@@ -239,17 +207,13 @@ def test_mesh_with_groups_is_taken_as_it_is(tmp_path):
     assert mesh.markers == pytest.approx(np.array([[50, -5]]))
     assert mesh.points[mesh.contact_node] == pytest.approx([42, 0])
     assert (finger.contact_abscissa, finger.contact_width) == pytest.approx((42, 4))
+    unmarked = finger_from_file(write_beam_mesh(tmp_path / "unmarked.msh", groups=("base", "contact")))
+    np.testing.assert_array_equal(unmarked.mesh.markers, unmarked.markers)  # proposed, at its nodes
     finger.save(tmp_path / "finger.json")
     assert DrawnFinger.load(tmp_path / "finger.json").digest == finger.digest
     assert pickle.loads(pickle.dumps(finger)).digest == finger.digest
     assert finger.definition()["mesh"] == mesh.digest
     assert finger.at_contact(30).mesh is None
-
-
-def test_markers_of_a_ready_mesh_are_its_nodes(tmp_path):
-    finger = finger_from_file(write_beam_mesh(tmp_path / "beam.msh", groups=("base", "contact")))
-    assert finger.mesh is not None
-    np.testing.assert_array_equal(finger.mesh.markers, finger.markers)
 
 
 @pytest.mark.parametrize("path", FILES, ids=IDS)
@@ -280,20 +244,3 @@ def test_drawn_fingers_are_meshed(path):
     assert mesh.areas.sum() == pytest.approx(finger.section.area, rel=1e-3)
     assert mesh.boundary_length("base") == pytest.approx(clamped_length(finger), rel=1e-6)
     np.testing.assert_allclose(mesh.markers, finger.markers, atol=1e-9)
-
-
-def test_ring_is_meshed(tmp_path):
-    finger = finger_from_file(ring_file(tmp_path / "ring.dxf"))
-    mesh = build_mesh(finger, MeshSettings(size=1.5, coarsening=2))
-    assert mesh.areas.sum() == pytest.approx(np.pi * (400 - 225), rel=1e-2)
-
-
-def test_drawn_and_parametric_csiro_agree():
-    """The preset was measured on the same mesh by others."""
-    drawn, preset = finger_from_file(CSIRO), load_design("csiro")
-    assert drawn.section.area == pytest.approx(preset.section.area, rel=5e-3)
-
-
-def test_circle_pieces_close():
-    first, second = full_circle([1, 2], 3, "")
-    assert first.end == pytest.approx(second.start)
