@@ -4,13 +4,12 @@ import base64
 from collections.abc import Mapping
 from html import escape
 
-LEFT = 'style="text-align:left"'
-
 
 def fact_table(title: str, facts: Mapping[str, object], picture: str = "") -> str:
     """A heading, a picture as HTML, and a table with a row for each fact."""
+    left = 'style="text-align:left"'
     rows = "".join(
-        f"<tr><th {LEFT}>{escape(name)}</th><td {LEFT}>{escape(str(fact))}</td></tr>"
+        f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(str(fact))}</td></tr>"
         for name, fact in facts.items()
     )
     return f"<div><strong>{escape(title)}</strong><div>{picture}</div><table>{rows}</table></div>"

@@ -12,9 +12,6 @@ from geometry.errors import UserError
 from geometry.machine_memory import free_memory_gb, limit_memory
 from geometry.processes import Pool, ProcessFailed
 
-OUT_OF_MEMORY = ("bad_alloc", "MemoryError", "Cannot allocate memory", "out of memory")
-"""Last words of a process that got no memory."""
-
 
 def run_task(task: Mapping[str, Any], timeout_s: float) -> Any:
     """Run a task in this process's worker, wait for it and return its result.
@@ -36,7 +33,8 @@ def run_task(task: Mapping[str, Any], timeout_s: float) -> Any:
         raise UserError(f"{what} was ended after {timeout_s:g} s; use larger elements, or allow more time")
     most_gb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 / 1e9
     crowded = answer.exit_code < 0 and most_gb > 0.8 * memory_gb  # Gmsh crashes where it gets no more
-    if crowded or any(word in answer.reason for word in OUT_OF_MEMORY):
+    last_words = ("bad_alloc", "MemoryError", "Cannot allocate memory", "out of memory")
+    if crowded or any(words in answer.reason for words in last_words):
         raise _too_large(what, memory_gb)
     raise UserError(f"{what} failed (exit code {answer.exit_code}): {answer.reason}")
 

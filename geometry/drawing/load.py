@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
@@ -71,22 +72,9 @@ def read_drawing(path: Path, units: str | None = None, plane: str | None = None)
         raise UserError(f"{path.name} is plane already; a plane cuts solids of STEP files only")
     try:
         digest = file_digest(path)
-        if suffix in (".step", ".stp"):
-            from geometry.drawing.formats.step import read_step
-
-            drawing = read_step(path, units, plane)
-        elif suffix == ".dxf":
-            from geometry.drawing.formats.dxf import read_dxf
-
-            drawing = read_dxf(path, units)
-        elif suffix == ".svg":
-            from geometry.drawing.formats.svg import read_svg
-
-            drawing = read_svg(path, units)
-        else:
-            from geometry.drawing.formats.msh import read_msh
-
-            drawing = read_msh(path, units)
+        kind = suffix[1:].replace("stp", "step")
+        read = getattr(import_module(f"geometry.drawing.formats.{kind}"), f"read_{kind}")
+        drawing: Drawing = read(path, units, plane) if kind == "step" else read(path, units)
     except OSError as error:
         raise UserError(f"cannot read the drawing {path}: {error.strerror}") from None
     except UserError as error:
@@ -106,9 +94,9 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
     section, placement = placed(section, which, fraction)
     if contact.ends is None:
         x = float(placement(outline.along(which, fraction))[0, 0])
+        proposed = proposal.contact_width(section.outline, x)
         width, width_source = _first(
-            given=_scaled(description.contact_width, drawing.unit),
-            proposed=proposal.contact_width(section.outline, x),
+            given=_scaled(description.contact_width, drawing.unit), proposed=proposed
         )
     else:
         ends = placement(contact.ends)[:, 0]
@@ -118,14 +106,10 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
                 f"the contact begins and ends at {place(contact.ends[0])}; call only the part contact that "
                 "the indenter touches"
             )
-    depth, depth_source = _first(
-        given=_scaled(description.depth, drawing.unit), drawn=drawing.depth, proposed=20.0
-    )
-    height, height_source = _first(
-        given=_scaled(description.marker_height, drawing.unit),
-        drawn=drawing.marker_height,
-        proposed=0.6,
-    )
+    given = _scaled(description.depth, drawing.unit)
+    depth, depth_source = _first(given=given, drawn=drawing.depth, proposed=20.0)
+    given = _scaled(description.marker_height, drawing.unit)
+    height, height_source = _first(given=given, drawn=drawing.marker_height, proposed=0.6)
     markers = placement(points)
     markers = markers[np.lexsort((-markers[:, 1], markers[:, 0]))]
     mesh = ready_mesh(drawing.mesh, placement, section, markers, x) if drawing.mesh else None

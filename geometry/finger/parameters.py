@@ -26,14 +26,6 @@ def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meani
     )
 
 
-LEAST = 0.01
-"""Least radius or height, mm, of what can be left out by 0; smaller ones could not be meshed."""
-
-MAX_NAMES = 120
-"""Characters of the names that a message lists."""
-NUMERIC = (int, float, int | None, float | None)
-
-
 class CheckedModel(BaseModel):
     """A frozen model that refuses invalid values in one line.
 
@@ -46,12 +38,16 @@ class CheckedModel(BaseModel):
 
     def __init__(self, *unnamed: Any, **values: Any) -> None:
         if unnamed:
-            names = shorten(", ".join(type(self).model_fields), MAX_NAMES, placeholder=" ...")
+            names = shorten(", ".join(type(self).model_fields), 120, placeholder=" ...")
             given = " ".join(reprlib.repr(unnamed[0]).split())
             raise UserError(f"{type(self).__name__} takes values by name only ({names}), not {given}")
         for name, value in values.items():
             field = type(self).model_fields.get(name)
-            if isinstance(value, bool) and field and field.annotation in NUMERIC:
+            if (
+                isinstance(value, bool)
+                and field
+                and field.annotation in (int, float, int | None, float | None)
+            ):
                 values[name] = str(value).lower()  # no number, though Python has it as 0 or 1
         try:
             super().__init__(**values)
@@ -139,8 +135,8 @@ class Parameters(CheckedModel):
     @field_validator("tip_radius", "fillet_radius", "foot_height")
     @classmethod
     def _left_out_or_there(cls, length: float) -> float:
-        if 0 < length < LEAST:
-            raise ValueError(f"give 0 to leave it out, or at least {LEAST:g} mm")
+        if 0 < length < 0.01:  # could not be meshed
+            raise ValueError("give 0 to leave it out, or at least 0.01 mm")
         return length
 
     @property
@@ -170,10 +166,7 @@ class Parameters(CheckedModel):
 def parameter_info(
     name: str, key: Literal["unit", "symbol", "low", "high"], model: type[BaseModel] = Parameters
 ) -> Any:
-    """Unit, symbol or bound of a model's parameter; an empty text where it has none.
-
-    A parameter that goes by another name in files has none by that name.
-    """
+    """Unit, symbol or bound of a model's parameter; an empty text where there is none."""
     field = model.model_fields.get(name)
     extra = field.json_schema_extra if field else None
     return extra.get(key, "") if isinstance(extra, dict) else ""

@@ -9,9 +9,6 @@ from geometry.finger.design import Design, by_parameter_name
 from geometry.finger.parameters import SYMBOLS, Parameters, unknown_parameter, with_symbol
 from geometry.text_files import read_toml
 
-OPTIONAL = tuple(name for name, field in Parameters.model_fields.items() if field.default is None)
-"""Parameters that may be None."""
-
 FOLDER = Path(__file__).parent.parent / "designs"
 """Folder of the presets, one TOML file each."""
 
@@ -60,7 +57,8 @@ def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
             raise UserError(unknown_parameter(key, Parameters))
         if name in overrides:
             raise UserError(f"{with_symbol(name)} is set twice; set it once")
-        overrides[name] = None if name in OPTIONAL and value.lower() == "none" else value
+        optional = Parameters.model_fields[name].default is None
+        overrides[name] = None if optional and value.lower() == "none" else value
     return overrides
 
 

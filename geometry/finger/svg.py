@@ -9,12 +9,6 @@ from geometry.section.loop import Loop
 LABELLED = {"base": "#0072b2", "contact": "#d55e00"}
 """Paths that name parts of the outline, with their colours."""
 
-STROKE = 0.4
-"""Width of their lines, mm."""
-
-MARGIN = 2.0
-"""White space around the section, mm."""
-
 
 def section_svg(finger: Finger) -> str:
     """The section in SVG, with the groups `outline` and `markers`; one user unit is 1 mm, y points up.
@@ -23,15 +17,14 @@ def section_svg(finger: Finger) -> str:
     """
     shape, named = finger.section, outline_with_contact(finger)
     parts = "\n".join(
-        f'  <path id="{label}" fill="none" stroke="{colour}" stroke-width="{STROKE}" '
-        f'd="{_parts(named, label)}"/>'
+        f'  <path id="{label}" fill="none" stroke="{colour}" stroke-width="0.4" d="{_parts(named, label)}"/>'
         for label, colour in LABELLED.items()
     )
     circles = "\n".join(
         f'    <circle cx="{x!r}" cy="{y!r}" r="{finger.marker_radius!r}"/>'
         for x, y in finger.markers.tolist()
     )
-    (left, bottom), (right, top) = shape.bounds + np.array([[-MARGIN], [MARGIN]])
+    (left, bottom), (right, top) = shape.bounds + np.array([[-2.0], [2.0]])  # a margin, mm
     width, height = right - left, top - bottom
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" width="{width:g}mm" height="{height:g}mm"

@@ -16,9 +16,6 @@ from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.section.section import Section
 
-ON_ARC = 1e-6
-"""Maximum distance of a node from an arc that it lies on, mm."""
-
 
 def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = None) -> TriangleMesh:
     """The mesh with the marked triangles cut in four, and others as conformity requires.
@@ -92,7 +89,7 @@ def _middles(mesh: TriangleMesh, cut: BoolArray, section: Section | None) -> Flo
         for which in np.setdiff1d(np.arange(len(loop.points)), loop.straight):
             centre, radius = loop.circle(int(which))
             off = np.abs(np.linalg.norm(ends - centre, axis=2) - radius)
-            chord = np.flatnonzero(outside[cut] & (off < ON_ARC).all(axis=1))
+            chord = np.flatnonzero(outside[cut] & (off < 1e-6).all(axis=1))
             chord = chord[loop.beside_arc(int(which), middles[chord])]
             ray = middles[chord] - centre
             middles[chord] = centre + radius * ray / np.linalg.norm(ray, axis=1, keepdims=True)

@@ -23,13 +23,6 @@ from geometry.mesh.boundary import (
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 
-SHARE = {"front": 1.0, "back": 1.0, "rib": 0.5, "base": 1.0}
-"""Motion of a face of each wall per change of the wall's thickness."""
-SLIGHT = np.radians(1.0)
-"""Turn of the boundary below which a point is not on an arc."""
-PARALLEL = np.sin(np.radians(15.0))
-"""Sine of the angle of two faces below which a corner between them moves by their mean."""
-
 
 @dataclass(frozen=True, eq=False)
 class WallMotion:
@@ -57,7 +50,7 @@ class WallMotion:
         for name, mask in parts.items():
             moved = np.zeros((len(mesh.points), 2))
             for loop in loops:
-                moved[loop] = _loop_motion(mesh, loop, mask, SHARE[name])
+                moved[loop] = _loop_motion(mesh, loop, mask, 0.5 if name == "rib" else 1.0)
             if not moved.any():
                 continue
             names.append(f"{name}_thickness")
@@ -150,7 +143,7 @@ def _breaks(along: FloatArray, lengths: FloatArray, thickness: float) -> BoolArr
         np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], (before * along).sum(axis=1))
     )
     mean_length = 0.5 * (lengths + np.roll(lengths, 1))
-    tight = (turn > SLIGHT) & (mean_length < turn * thickness)
+    tight = (turn > np.radians(1.0)) & (mean_length < turn * thickness)
     return np.asarray((turn > CORNER_ANGLE) | tight)
 
 
@@ -183,7 +176,7 @@ def _bend(last: int, first: int, count: int) -> IntArray:
 
 def _corner(one: FloatArray, other: FloatArray, speed: float, next_speed: float) -> FloatArray:
     """Motion of the corner of two faces with outer normals, each moved along its own: shape (2,)."""
-    if abs(one[0] * other[1] - one[1] * other[0]) < PARALLEL:
+    if abs(one[0] * other[1] - one[1] * other[0]) < np.sin(np.radians(15.0)):  # almost parallel
         return np.asarray(0.5 * (speed * one + next_speed * other))
     return np.linalg.solve(np.stack([one, other]), np.array([speed, next_speed]))
 

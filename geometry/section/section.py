@@ -22,17 +22,15 @@ DEVIATION = 1e-5
 class Section:
     """A plane body between an outline and cavities; the body is on the left of every curve.
 
-    Attributes:
-        outline: Counter-clockwise. Its pieces `base` are clamped and its pieces `front` face the indenter: x
-            falls along them. Other names are free.
-        cavities: Clockwise.
+    The outline's pieces `base` are clamped and its pieces `front` face the indenter: x falls along them.
+    Other names are free.
 
     Raises:
         UserError: If a curve runs the wrong way round.
     """
 
-    outline: Loop
-    cavities: tuple[Loop, ...] = ()
+    outline: Loop  # counter-clockwise
+    cavities: tuple[Loop, ...] = ()  # clockwise
 
     def __post_init__(self) -> None:
         if self.outline.area <= 0 or any(cavity.area >= 0 for cavity in self.cavities):

@@ -13,9 +13,6 @@ from geometry.section.section import Section
 TOUCH = 1e-7
 """Length of a ray within which it is still at its own start, mm."""
 
-AT_ONCE = 1_000_000
-"""Largest number of pairs of a ray and a piece in memory."""
-
 
 class Crossing(NamedTuple):
     """Where rays through the material end."""
@@ -131,7 +128,7 @@ def _turned(vectors: FloatArray, angles: FloatArray) -> FloatArray:
 
 
 def _through(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
-    step = max(AT_ONCE // len(pieces.bulges), 1)
+    step = max(1_000_000 // len(pieces.bulges), 1)  # pairs of a ray and a piece in memory
     found = [
         _first(pieces, start[first : first + step], ahead[first : first + step])
         for first in range(0, len(start), step)

@@ -17,12 +17,6 @@ from geometry.section.loop import STRAIGHT, Loop
 JOIN = 1e-3
 """Largest distance of two ends that count as one, mm."""
 
-ON_CURVE = 1e-2
-"""Largest distance of a label's line from the curve that it names, mm."""
-
-SMALLEST, LARGEST = 1.0, 2000.0
-"""Extents of a finger, mm."""
-
 
 def closed_loops(pieces: Sequence[Piece], markings: frozenset[str] = frozenset()) -> tuple[Loop, ...]:
     """Closed curves from pieces in any order and direction, mm.
@@ -143,11 +137,9 @@ def _check_extent(pieces: Sequence[Piece]) -> None:
             f"a coordinate is not finite or beyond {FARTHEST:g} mm; draw the section near the origin"
         )
     extent = float(np.ptp(ends, axis=0).max())
-    if not SMALLEST <= extent <= LARGEST:
-        other = "metres for millimetres" if extent < SMALLEST else "micrometres for millimetres"
-        raise UserError(
-            f"the drawing measures {extent:.4g} mm, not {SMALLEST:g} to {LARGEST:g} mm: {other}? give units"
-        )
+    if not 1 <= extent <= 2000:
+        other = "metres for millimetres" if extent < 1 else "micrometres for millimetres"
+        raise UserError(f"the drawing measures {extent:.4g} mm, not 1 to 2000 mm: {other}? give units")
 
 
 def _check_twice(pieces: Sequence[Piece], nodes: IntArray, places: FloatArray) -> None:
@@ -195,7 +187,7 @@ def _marked(loops: tuple[Loop, ...], mark: Piece) -> tuple[Loop, ...]:
         _, which, fraction, distance = nearest_piece([loop], point)
         off.append(distance)
         loop = cut_at(loop, which, fraction)
-    if max(off) > ON_CURVE:
+    if max(off) > 0.01:
         raise UserError(
             f"the line {mark.label!r} from {place(mark.start)} to {place(mark.end)} is {max(off):.3g} mm off "
             "every boundary; draw it on the boundary"
