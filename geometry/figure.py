@@ -25,6 +25,8 @@ WIDTH = 5.5
 SMALL = 8.1
 """Smallest type, points: 5 points in a journal's column of 3.4 inches, the least that journals print."""
 
+DPI = 300
+NOTEBOOK_DPI = 150
 LEFT, RIGHT, TITLE, BELOW = 0.55, 0.12, 0.3, 0.45
 """Margins of the axes of `body_figure`, inches."""
 
@@ -78,7 +80,7 @@ class Figure(MplFigure):
     """
 
     def __init__(self, height: float) -> None:
-        super().__init__(figsize=(WIDTH, height), dpi=300, facecolor="white")
+        super().__init__(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
         FigureCanvasAgg(self)
 
     def draw(self, renderer: RendererBase) -> None:
@@ -104,7 +106,7 @@ class Figure(MplFigure):
         """The picture in a notebook."""
         buffer = BytesIO()
         with mpl.rc_context(_RC):
-            self.savefig(buffer, format="png", dpi=150)
+            self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
         return buffer.getvalue()
 
 
