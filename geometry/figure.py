@@ -84,7 +84,7 @@ class Figure(MplFigure):
         FigureCanvasAgg(self)
 
     def draw(self, renderer: RendererBase) -> None:
-        """Draw with the project's settings, whatever those of the process are."""
+        """Draw with the project's settings, whatever settings the process has."""
         with mpl.rc_context(_RC):
             super().draw(renderer)
 

@@ -17,7 +17,7 @@ def free_memory_gb() -> float:
 def limit_memory(more_gb: float) -> None:
     """Let this process take so much more memory, GB, and no more: then it runs out without its neighbours.
 
-    Where the system does not tell what the process has, there is no limit.
+    Systems without `/proc` set no limit.
     """
     try:
         status = Path("/proc/self/status").read_text(encoding="ascii")

@@ -226,7 +226,7 @@ class DrawnFinger:
 def description_lines(finger: Finger) -> str:
     """Clamp, contact and markers of a finger as the lines of a description.
 
-    Those of a drawn finger are in its file's coordinates, those of another in its own frame, mm.
+    A drawn finger has them in its file's coordinates, another finger in its own frame, mm.
     """
     drawn = finger if isinstance(finger, DrawnFinger) else None
     place = drawn.placement.inverse if drawn else np.asarray

@@ -1,4 +1,4 @@
-"""Proposes a clamp, a contact and markers where a drawing has none; the same drawing gets the same ones.
+"""Proposes a clamp, a contact and markers where a drawing has none; one drawing gets one proposal.
 
 Clamp: the flat end. Straight pieces on the convex hull that face along the outline's principal axis, within
 45 degrees, are ends; of those that are at least 0.8 as wide as the widest the one in most pieces (two feet

@@ -29,7 +29,7 @@ class Design(Parameters):
 
     @property
     def section(self) -> Section:
-        """The section, whose outline has the pieces `base`, `back`, `tip`, `front` and those of a foot."""
+        """The section; its outline has the pieces `base`, `back`, `tip`, `front`, and those of a foot."""
         return finger_section(self)
 
     @property

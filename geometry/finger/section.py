@@ -148,7 +148,7 @@ def marker_positions(p: Parameters) -> FloatArray:
     else:
         points = np.concatenate([rib_axes(p).reshape(-1, 2), _tip_middle(p)[None]])
         points = points[np.lexsort((-points[:, 1], points[:, 0]))]
-    points.setflags(write=False)  # the same for all who ask
+    points.setflags(write=False)  # the cache hands out one array
     return np.asarray(points, dtype=np.float64)
 
 
@@ -235,7 +235,7 @@ def _base_side(p: Parameters) -> tuple[list[FloatArray], list[str]]:
 
 
 def _without_steps(points: list[FloatArray], names: list[str]) -> tuple[list[FloatArray], list[str]]:
-    """The corners without pieces of no length, such as those of a slot as wide as its opening."""
+    """The corners without pieces of no length: a slot as wide as its opening has such."""
     kept = [
         which
         for which in range(len(points))

@@ -5,7 +5,7 @@ conformity asks, each through its longest edge before any other. No angle gets s
 one of the first mesh, however often this is repeated.
 
 Source: M.-C. Rivara, Algorithms for refining triangular grids suitable for adaptive and multigrid techniques,
-Int. J. Numer. Meth. Engng 20 (1984) 745-756; the bound is that of I. G. Rosenberg, F. Stenger, A lower bound
+Int. J. Numer. Meth. Engng 20 (1984) 745-756; the bound is by I. G. Rosenberg, F. Stenger, A lower bound
 on the angles of triangles constructed by bisecting the longest side, Math. Comp. 29 (1975) 390-395.
 """
 

@@ -130,7 +130,7 @@ class TriangleMesh:
         return self._locator.locate(points)
 
     def locate_on(self, other: "TriangleMesh", points: ArrayLike) -> LocatedPoints:
-        """The location on another mesh of the same body of points of this one.
+        """Locates points of this mesh on another mesh of one body.
 
         Both meshes replace arcs by chords, so that a point may lie beyond the other's boundary: up to a tenth
         of this mesh's longest boundary edge it counts to the nearest triangle.
@@ -151,13 +151,13 @@ class TriangleMesh:
         return self.at_barycentric(np.full((1, 3), 1 / 3))
 
     def at_barycentric(self, barycentric: ArrayLike) -> LocatedPoints:
-        """The same barycentric points in every triangle.
+        """The points of one barycentric rule in every triangle.
 
         Args:
             barycentric: Shape (q, 3).
 
         Returns:
-            t * q points, those of one triangle next to each other.
+            t * q points, triangle by triangle.
         """
         rule = frozen_array(barycentric, dtype=np.float64, shape=(None, 3), name="barycentric")
         points = np.einsum("qc,tcx->tqx", rule, self.points[self.triangles]).reshape(-1, 2)

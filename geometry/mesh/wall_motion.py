@@ -92,7 +92,7 @@ def _cavities(mesh: TriangleMesh) -> list[IntArray]:
 
 
 def _loop_motion(mesh: TriangleMesh, loop: IntArray, mask: BoolArray, share: float) -> FloatArray:
-    """Motion of a cavity's nodes (n, 2) when the triangles of a mask are those of the thicker wall."""
+    """Motion of a cavity's nodes (n, 2) when the wall of the masked triangles thickens."""
     along = mesh.points[np.roll(loop, -1)] - mesh.points[loop]
     lengths = np.linalg.norm(along, axis=1)
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / lengths[:, None]  # out of the body

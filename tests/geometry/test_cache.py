@@ -31,10 +31,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def entry_of(folder: Path) -> Path:
-    return next(folder.glob("mesh-*.npz"))
-
-
 def test_second_call_is_read_from_the_cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("geometry.cache.run_task", None)  # a second run would fail
     mesh = finger_mesh(Design(name="another-name"), settings=COARSE, cache_dir=folder)
@@ -63,7 +59,7 @@ def test_worker_gives_the_same_mesh_as_meshing_here(folder: Path) -> None:
     ],
 )
 def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypatch) -> None:  # type: ignore[no-untyped-def]
-    entry = entry_of(folder)
+    (entry,) = folder.glob("mesh-*.npz")
     good, mesh = entry.read_bytes(), TriangleMesh.load(entry)
     rebuilt = []
 

@@ -65,7 +65,7 @@ def _plain(entities: list[Any]) -> Iterator[Any]:
 
 
 def _layer(entity: Any) -> str:
-    """The layer of an entity; that of the format where it has none."""
+    """The layer of an entity; `0`, the format's default, where it has none."""
     try:
         return str(entity.dxf.layer)
     except DXFError:  # of a kind that ezdxf does not know

@@ -42,7 +42,7 @@ def read_step(path: Path, units: str | None = None, plane: str | None = None) ->
 
     Args:
         path: The file.
-        units: What the file's mm really are; None means mm.
+        units: Unit in which the file's numbers are read; None means mm.
         plane: Plane of the cut, such as `z = 6`; None means across an extruded solid.
     """
     bodies, markers = _parts(path)
@@ -146,7 +146,7 @@ def _directions(solid: cq.Solid) -> list[FloatArray]:
 
 
 def _is_extruded(solid: cq.Solid, normal: FloatArray) -> bool:
-    """Whether every face is parallel to a direction or a plane across it."""
+    """Whether every face is parallel to the direction `normal`, or plane and across it."""
     for face in solid.Faces():
         if face.geomType() == "PLANE":
             slopes = [abs(float(_array(face.normalAt()) @ normal))]

@@ -24,7 +24,7 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     """The closed curves of an SVG file; x as in the file, y upward.
 
     Lines and circular arcs are exact, other curves become arcs within 1e-3 mm; transformations are applied.
-    An element carries its own name or that of its nearest named group, of those that mean something:
+    An element carries its own name or, without one, its nearest group's. These names mean something:
     `outline`, `base` or `clamp`, `front`, `contact`, `markers`.
 
     Args:

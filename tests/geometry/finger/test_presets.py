@@ -41,12 +41,6 @@ def test_override_replaces_what_a_file_says_by_the_other_name(tmp_path: Path) ->
     assert load_design(str(path)).height == 100
 
 
-def bad_toml(tmp_path: Path) -> Path:
-    path = tmp_path / "bad.toml"
-    path.write_text("height = = 3")
-    return path
-
-
 @pytest.mark.parametrize(
     ("settings", "text"),
     [
@@ -86,7 +80,9 @@ def test_unknown_preset_lists_those_there_are() -> None:
 
 
 def test_missing_and_broken_files_give_one_line(tmp_path: Path) -> None:
-    for path, text in ((tmp_path / "none.toml", "no design file"), (bad_toml(tmp_path), "cannot read")):
+    bad = tmp_path / "bad.toml"
+    bad.write_text("height = = 3")
+    for path, text in ((tmp_path / "none.toml", "no design file"), (bad, "cannot read")):
         with pytest.raises(UserError, match=text) as refused:
             load_design(path)
         assert "\n" not in str(refused.value)

@@ -123,8 +123,7 @@ def test_every_node_is_found(mesh: TriangleMesh) -> None:
     np.testing.assert_allclose(found.barycentric.max(axis=1), 1, atol=1e-9)
 
 
-def test_points_are_inside_exactly_where_the_section_is() -> None:
-    mesh = build_default()
+def test_points_are_inside_exactly_where_the_section_is(default_mesh: TriangleMesh) -> None:
     body = Polygon([(0, 0), (0, -30), (90, 0)], holes=cells(Design()))
     rng = np.random.default_rng(6)
     points = rng.uniform([-5, -35], [95, 5], size=(1500, 2))
@@ -133,16 +132,11 @@ def test_points_are_inside_exactly_where_the_section_is() -> None:
         if body.exterior.distance(Point(*point)) < 1e-6:
             continue
         try:
-            mesh.locate(point[None])
+            default_mesh.locate(point[None])
             located = True
         except OutsideBodyError:
             located = False
         assert located == inside, point
-
-
-def build_default() -> TriangleMesh:
-
-    return build_mesh(Design(), MeshSettings(size=1.0, coarsening=2))
 
 
 def test_point_in_a_cavity_is_named_in_the_error(default_mesh: TriangleMesh) -> None:
