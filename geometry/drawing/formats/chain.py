@@ -1,7 +1,8 @@
-"""Chains loose lines and arcs into closed curves by their ends."""
+"""Chains loose lines and arcs into closed curves by their ends, and sorts markers and contact from them."""
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -9,13 +10,56 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.drawing.formats.drawing import place
+from geometry.drawing.formats.drawing import LABELS, Drawing, place
 from geometry.drawing.formats.pieces import FARTHEST, Piece, is_near
 from geometry.errors import UserError
 from geometry.section.loop import STRAIGHT, Loop
 
 JOIN = 1e-3
 """Largest distance of two ends that count as one, mm."""
+
+
+class Marks:
+    """Markers and contact, as a reader comes across them."""
+
+    def __init__(self) -> None:
+        self._centres: list[FloatArray] = []
+        self._diameters: list[float] = []
+        self._contact: FloatArray | None = None
+
+    def took(self, centre: FloatArray | None, diameter: float, label: str) -> bool:
+        """Keep a circle or, with no diameter, a point as a mark; False if it is none."""
+        if centre is None:
+            return False
+        if label == "markers":
+            self._centres.append(centre)
+            self._diameters.append(diameter)
+        elif label == "contact":
+            if self._contact is not None:
+                raise UserError(f"two points are called contact, {place(self._contact)} and {place(centre)}")
+            self._contact = centre
+        return label in ("markers", "contact")
+
+    def drawing(self, pieces: Sequence[Piece], **facts: Any) -> Drawing:
+        """The drawing with its curves closed.
+
+        Raises:
+            UserError: If a curve does not close, the markers differ in diameter, or one is no circle.
+        """
+        if strange := next((piece for piece in pieces if piece.label == "markers"), None):
+            raise UserError(f"the marker at {place(strange.start)} is no circle; draw circles or points")
+        sizes = [diameter for diameter in self._diameters if diameter > 0]
+        if sizes and np.ptp(sizes) > 1e-3:
+            raise UserError(
+                f"the markers have diameters from {min(sizes):.4g} to {max(sizes):.4g} mm; give all the same"
+            )
+        return Drawing(
+            loops=closed_loops(pieces, frozenset(LABELS) - {"markers"}),  # which may lie on top
+            markers=np.array(self._centres).reshape(-1, 2),
+            marker_diameter=float(np.mean(sizes)) if sizes else None,
+            contact=self._contact,
+            **facts,
+        )
 
 
 def closed_loops(pieces: Sequence[Piece], markings: frozenset[str] = frozenset()) -> tuple[Loop, ...]:

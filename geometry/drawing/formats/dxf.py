@@ -11,8 +11,8 @@ import numpy as np
 from ezdxf.lldxf.const import DXFError
 
 from geometry.arrays import FloatArray
+from geometry.drawing.formats.chain import Marks
 from geometry.drawing.formats.drawing import UNITS, Drawing, label_of
-from geometry.drawing.formats.marks import Marks
 from geometry.drawing.formats.pieces import Curve, Piece, arc_through, arcs_along, full_circle, line
 from geometry.errors import UserError
 
