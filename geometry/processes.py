@@ -43,15 +43,10 @@ Output = TypeVar("Output")
 
 @dataclass(frozen=True)
 class ProcessFailed:
-    """A task without an answer; its traceback, if it had one, is on standard error.
+    """A task without an answer; its traceback, if it had one, is on standard error."""
 
-    Attributes:
-        exit_code: Of its process, negative for the signal that ended it; None if the task took too long.
-        reason: Last line that a `captured` process wrote, or a file that could not be read or written.
-    """
-
-    exit_code: int | None
-    reason: str = ""
+    exit_code: int | None  # of its process, negative for the signal that ended it; None after the time limit
+    reason: str = ""  # last line of a `captured` process, or a file that could not be read or written
 
     @property
     def message(self) -> str:

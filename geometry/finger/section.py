@@ -72,8 +72,7 @@ def base_corners(p: Parameters) -> FloatArray:
 def cells(p: Parameters) -> tuple[FloatArray, ...]:
     """Cavities from base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise.
 
-    Their corners are the front and the back one nearer the base, then the back and the front one nearer the
-    tip.
+    Corners: front and back one near the base, then back and front one near the tip.
     """
     return _quadrilaterals(p)[::2]
 

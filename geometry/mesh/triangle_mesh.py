@@ -119,10 +119,7 @@ class TriangleMesh:
         return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
     def locate(self, points: ArrayLike) -> LocatedPoints:
-        """The triangle and the barycentric coordinates of points in the body.
-
-        Args:
-            points: Shape (n, 2), mm.
+        """The triangle and the barycentric coordinates of points in the body, shape (n, 2), mm.
 
         Raises:
             OutsideBodyError: If a point lies outside the body.
@@ -151,14 +148,7 @@ class TriangleMesh:
         return self.at_barycentric(np.full((1, 3), 1 / 3))
 
     def at_barycentric(self, barycentric: ArrayLike) -> LocatedPoints:
-        """The points of one barycentric rule in every triangle.
-
-        Args:
-            barycentric: Shape (q, 3).
-
-        Returns:
-            t * q points, triangle by triangle.
-        """
+        """The points of one barycentric rule (q, 3) in every triangle: t * q points, triangle by triangle."""
         rule = frozen_array(barycentric, dtype=np.float64, shape=(None, 3), name="barycentric")
         points = np.einsum("qc,tcx->tqx", rule, self.points[self.triangles]).reshape(-1, 2)
         return LocatedPoints(

@@ -28,18 +28,14 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 class WallMotion:
     """Motions of a mesh by the thickness of each of its k walls.
 
-    Attributes:
-        mesh: The drawn mesh.
-        names: `front_thickness`, `back_thickness`, `rib_thickness`, `base_thickness`, those that the body
-            has: none without cavities or without a boundary called `back`.
-        thickness: Drawn thickness of each, shape (k,), mm: where the wall is thinnest, for ribs their mean.
-        nodal: Motion of the mesh's nodes per mm of change, shape (k, N, 2), mm.
+    The walls are called `front_thickness`, `back_thickness`, `rib_thickness` and `base_thickness`; a body
+    without cavities or without a boundary called `back` has none.
     """
 
-    mesh: TriangleMesh
-    names: tuple[str, ...]
-    thickness: FloatArray
-    nodal: FloatArray
+    mesh: TriangleMesh  # as drawn
+    names: tuple[str, ...]  # of the walls that the body has
+    thickness: FloatArray  # as drawn, (k,), mm: where the wall is thinnest, for ribs their mean
+    nodal: FloatArray  # motion of the nodes per mm of change, (k, N, 2), mm
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> "WallMotion":
