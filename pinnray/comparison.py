@@ -23,14 +23,14 @@ SHOWN = {
 """Columns of `table` that a notebook shows, with their headings."""
 
 
-class Comparison(comparison.Comparison):
+class Comparison(comparison.Results):
     """The results of several solvers for one finger, with `table`, `plot` and `report`.
 
     `comparison["fem"]` is the result of one solver.
     """
 
     @classmethod
-    def of(cls, finished: comparison.Comparison) -> Self:
+    def of(cls, finished: comparison.Results) -> Self:
         """Give a finished comparison its pictures and report."""
         return cls(**{each.name: getattr(finished, each.name) for each in fields(finished)})
 

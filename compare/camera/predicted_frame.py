@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import marker_errors
 from compare.figures import Picture
@@ -32,7 +32,7 @@ RIM = [patheffects.withStroke(linewidth=1.3, foreground=INK)]
 """Keeps it legible on a light finger, which it hides as little as possible."""
 
 
-def predicted_frame(folder: Path, comparison: Comparison, tracking: Tracking, image: Image) -> Picture:
+def predicted_frame(folder: Path, comparison: Results, tracking: Tracking, image: Image) -> Picture:
     """Write `predicted.png` into a folder.
 
     Args:
@@ -56,7 +56,7 @@ def predicted_frame(folder: Path, comparison: Comparison, tracking: Tracking, im
     )
 
 
-def draw_predictions(comparison: Comparison, tracking: Tracking, image: Image) -> Figure:
+def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> Figure:
     """Draw the outline of every solver's deformed finger into a frame, one panel each."""
     plane = tracking.final_plane or tracking.plane
     nodes = comparison.mesh.points
@@ -112,6 +112,6 @@ def _markers(axes: Axes, tracking: Tracking, computed: FloatArray) -> None:
         axes.plot(*computed.T, "x", ms=4, color=colour, mew=size)
 
 
-def _name(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:
+def _name(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
     note = errors_note(evaluation, comparison.observations)
     axes.set_title(f"{evaluation.label_at_markers}: {note}", size=SMALL)

@@ -1,4 +1,4 @@
-"""The output files of a cross-validation: numbers, tables, pictures and the report."""
+"""The output files of a cross-validation: numbers, tables, charts and the report."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

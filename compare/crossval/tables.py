@@ -1,4 +1,4 @@
-"""A cross-validation as tables for the terminal and the report."""
+"""A cross-validation as tables for the terminal and the report, and its conclusions in sentences."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace

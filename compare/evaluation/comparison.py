@@ -30,7 +30,7 @@ TRUTH = "truth"
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Results:
     """The results of several solvers for one finger under one load; `comparison["fem"]` is one of them."""
 
     design: Finger

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from geometry.errors import UserError
 from solvers.shared_work import SharedWork
 
@@ -35,7 +35,7 @@ class Picture:
 
 def draw_all(
     folder: Path,
-    comparison: Comparison,
+    comparison: Results,
     progress: Callable[[float, str], None] = lambda done, what: None,
     formats: Collection[str] = (),
 ) -> list[Picture]:

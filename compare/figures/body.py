@@ -1,4 +1,4 @@
-"""Parts that the pictures of the body share: pixels, outline, clamped base, scale bar, colour bar.
+"""Parts that the pictures of the body share: colour scales, outline, clamped base, scale bar, colour bar.
 
 A panel has a strip below the body for a note and a scale bar, so that neither lies on a body of any shape.
 """

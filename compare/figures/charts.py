@@ -1,4 +1,4 @@
-"""Charts of the records that solvers keep on their way: energy, and losses of trained networks."""
+"""Charts: errors at the markers, force of the indenter, energy and losses on the way to a solution."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import ForceCurve, MarkerErrors, follows_load, held_out_errors, marker_errors
 from compare.figures.style import (
@@ -51,7 +51,7 @@ def approaches_reference(group: Group) -> bool:
     return column == "energy" and not abscissa.startswith("load")
 
 
-def draw_energy(comparison: Comparison) -> Figure | None:
+def draw_energy(comparison: Results) -> Figure | None:
     """Draw every solver's record, a row for each kind; beside it the distance from the reference's energy.
 
     None without a record.
@@ -135,7 +135,7 @@ def readable(name: str) -> str:
     return names.get(name, name.replace("_", " "))
 
 
-def draw_losses(comparison: Comparison) -> Figure | None:
+def draw_losses(comparison: Results) -> Figure | None:
     """Draw a chart for each term of the loss, with a line for every solver that has it (Fig. 7 of the paper).
 
     None without a record.
@@ -262,7 +262,7 @@ CIRCLE: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3.2, "mfc": "white", "m
 """Look of a training error, which is seen even where the error vanishes."""
 
 
-def draw_marker_errors(comparison: Comparison) -> Figure:
+def draw_marker_errors(comparison: Results) -> Figure:
     """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one scale.
 
     Bars: at markers that the solver was not given. Circles: at markers that it was given.

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import matplotlib as mpl
 import numpy as np
 
-from compare.evaluation.comparison import TRUTH, Comparison
+from compare.evaluation.comparison import TRUTH, Results
 from compare.evaluation.evaluation import Evaluation, field_difference, weighted_percentile
 from compare.evaluation.metrics import COMPONENTS
 from compare.figures import body
@@ -85,7 +85,7 @@ def difference_scale(
     return symmetric([difference], mesh.areas)
 
 
-def draw_field(comparison: Comparison, quantity: FieldQuantity) -> Figure:
+def draw_field(comparison: Results, quantity: FieldQuantity) -> Figure:
     """Draw a quantity on the undeformed body: a row a solver, its difference from the reference beside it.
 
     The last row is the truth where the markers are simulated.
@@ -155,7 +155,7 @@ def excess_scale(mesh: TriangleMesh, densities: Sequence[FloatArray]) -> Scale:
     return Scale(high / 10**DECADES, high, mpl.colormaps["viridis"], log=True)
 
 
-def draw_excess(comparison: Comparison) -> Figure | None:
+def draw_excess(comparison: Results) -> Figure | None:
     """Draw the density of the excess energy of every solver that has one; None if none has."""
     mesh = comparison.mesh
     entries = [

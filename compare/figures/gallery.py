@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import IN_SAMPLE, Evaluation
 from compare.evaluation.metrics import ForceCurve, force_curves, held_out_errors
 from compare.figures.body import PERCENT
@@ -33,7 +33,7 @@ class Illustration(NamedTuple):
     alt: str
 
 
-def _overlay(comparison: Comparison) -> Illustration:
+def _overlay(comparison: Results) -> Illustration:
     observations = comparison.observations
     cylinder = "" if comparison.load.radius is None else " Grey circle: the cylinder where it ends."
     circles = f"Circles: {observations.label} marker positions. " if observations.known else ""
@@ -51,7 +51,7 @@ def _overlay(comparison: Comparison) -> Illustration:
     )
 
 
-def _marker_errors(comparison: Comparison) -> Illustration | None:
+def _marker_errors(comparison: Results) -> Illustration | None:
     observations = comparison.observations
     if not observations.known:
         return None
@@ -77,7 +77,7 @@ def _marker_errors(comparison: Comparison) -> Illustration | None:
     )
 
 
-def _field(comparison: Comparison, quantity: FieldQuantity) -> Illustration:
+def _field(comparison: Results, quantity: FieldQuantity) -> Illustration:
     reference = comparison.reference.label
     mixed = (
         " The solvers have different laws: strain is Green-Lagrange where it is finite, stress is Cauchy."
@@ -107,7 +107,7 @@ def _field(comparison: Comparison, quantity: FieldQuantity) -> Illustration:
     )
 
 
-def _force_displacement(comparison: Comparison) -> Illustration | None:
+def _force_displacement(comparison: Results) -> Illustration | None:
     depth = comparison.design.depth
     if not (curves := force_curves(comparison.evaluations, comparison.load)):
         return None
@@ -130,7 +130,7 @@ def _force_displacement(comparison: Comparison) -> Illustration | None:
     )
 
 
-def _excess(comparison: Comparison) -> Illustration | None:
+def _excess(comparison: Results) -> Illustration | None:
     if (figure := draw_excess(comparison)) is None:
         return None
     return Illustration(
@@ -149,7 +149,7 @@ def _excess(comparison: Comparison) -> Illustration | None:
     )
 
 
-def _energy(comparison: Comparison) -> Illustration | None:
+def _energy(comparison: Results) -> Illustration | None:
     if (figure := draw_energy(comparison)) is None:
         return None
     return Illustration(
@@ -163,7 +163,7 @@ def _energy(comparison: Comparison) -> Illustration | None:
     )
 
 
-def _losses(comparison: Comparison) -> Illustration | None:
+def _losses(comparison: Results) -> Illustration | None:
     if (figure := draw_losses(comparison)) is None:
         return None
     return Illustration(
@@ -182,7 +182,7 @@ def _losses(comparison: Comparison) -> Illustration | None:
     )
 
 
-def _design(comparison: Comparison) -> Illustration:
+def _design(comparison: Results) -> Illustration:
     finger = comparison.design
     symbols = " under the paper’s symbols" if any(symbol for _, symbol, _ in finger.facts()) else ""
     return Illustration(
@@ -194,7 +194,7 @@ def _design(comparison: Comparison) -> Illustration:
     )
 
 
-def _mesh(comparison: Comparison) -> Illustration:
+def _mesh(comparison: Results) -> Illustration:
     numbers = mesh_numbers(comparison.mesh)
     return Illustration(
         draw_mesh(comparison.mesh),
@@ -206,7 +206,7 @@ def _mesh(comparison: Comparison) -> Illustration:
     )
 
 
-GALLERY: dict[str, tuple[str, Callable[[Comparison], Illustration | None]]] = {
+GALLERY: dict[str, tuple[str, Callable[[Results], Illustration | None]]] = {
     "overlay": ("picture of the deformed finger", _overlay),
     "marker_errors": ("chart of the errors at the markers", _marker_errors),
     **{each.name: (f"picture of {each.name}", partial(_field, quantity=each)) for each in QUANTITIES},
@@ -220,7 +220,7 @@ GALLERY: dict[str, tuple[str, Callable[[Comparison], Illustration | None]]] = {
 """By file name: words for the progress line, and the function; it gives None if there is nothing to draw."""
 
 
-def draw(comparison: Comparison, name: str) -> Illustration:
+def draw(comparison: Results, name: str) -> Illustration:
     """One picture of a comparison by its name.
 
     Raises:
@@ -239,12 +239,12 @@ def each_of(quantity: str, evaluations: Iterable[Evaluation], value: Callable[[E
     return f"{quantity}: {', '.join(f'{each.label} {value(each):.3g}' for each in evaluations)}."
 
 
-def _given(comparison: Comparison) -> str:
+def _given(comparison: Results) -> str:
     """The meaning of the mark beside a solver's name, if there is one."""
     return f"{IN_SAMPLE}. " if any(evaluation.in_sample for evaluation in comparison.evaluations) else ""
 
 
-def _simulated(comparison: Comparison) -> str:
+def _simulated(comparison: Results) -> str:
     observations = comparison.observations
     if observations.label != "simulated":
         return ""

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import body
@@ -23,7 +23,7 @@ HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
 """Heights in inches: heading and legend; the name above a panel; the colour bar."""
 
 
-def draw_overlay(comparison: Comparison) -> Figure:
+def draw_overlay(comparison: Results) -> Figure:
     """Draw every solver's deformed finger, one panel each, at true scale."""
     mesh, evaluations = comparison.mesh, comparison.evaluations
     across, up = np.ptp(mesh.points, axis=0)
@@ -65,7 +65,7 @@ def draw_overlay(comparison: Comparison) -> Figure:
     return drawn
 
 
-def overlay_extent(comparison: Comparison, width: float) -> Extent:
+def overlay_extent(comparison: Results, width: float) -> Extent:
     """The extent of a panel, `width` inches wide, mm.
 
     It shows the body before and after in every converged solution, and all markers.
@@ -87,7 +87,7 @@ def _magnitude(mesh: TriangleMesh, evaluation: Evaluation) -> FloatArray:
     return np.asarray(size[mesh.triangles].mean(axis=1))
 
 
-def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, evaluation: Evaluation) -> None:
+def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Results, evaluation: Evaluation) -> None:
     mesh, observations = comparison.mesh, comparison.observations
     deformed = mesh.points + evaluation.node_displacement
     body.prepare(axes, canvas.extent)
@@ -116,7 +116,7 @@ def errors_note(evaluation: Evaluation, observations: Observations) -> str:
     return f"MAE{kind}: u {errors.mae_u:.3f}, v {errors.mae_v:.3f} mm"
 
 
-def _motion(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:
+def _motion(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
     """The path of the contact, on average, or of a cylinder, which is drawn where it ends."""
     mesh, load = comparison.mesh, comparison.load
     nodes = np.unique(mesh.boundary("contact"))

@@ -1,4 +1,4 @@
-"""The job of a comparison, and its checks before anything is computed."""
+"""A comparison to make, and the checks that refuse an impossible one before anything is computed."""
 
 import sys
 from collections.abc import Collection, Mapping, Sequence

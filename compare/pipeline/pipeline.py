@@ -10,7 +10,7 @@ from typing import Any
 from compare.camera.film import Film
 from compare.evaluation.branches import with_branches
 from compare.evaluation.certification import with_certificates
-from compare.evaluation.comparison import Comparison, supported_solvers
+from compare.evaluation.comparison import Results, supported_solvers
 from compare.evaluation.deformed_body import with_body_checks
 from compare.evaluation.metrics import force_curves, pick_reference, write_force_displacement
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
@@ -41,7 +41,7 @@ from vision.frames.frame import Frame
 from vision.measurements import write_measurements
 
 
-def run(job: Job, stages: Stages) -> Comparison:
+def run(job: Job, stages: Stages) -> Results:
     """Make the comparison and write its output folder.
 
     Raises:
@@ -78,7 +78,7 @@ def run(job: Job, stages: Stages) -> Comparison:
     return comparison
 
 
-def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
+def compute(job: Job, stages: Stages, folder: Path) -> Results:
     """Mesh, solve and evaluate a checked job without film; solutions and checkpoints go into the folder.
 
     Raises:
@@ -112,7 +112,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         evaluations = with_certificates(list(outcome.evaluations.values()), problem)
         evaluations, impossible = with_body_checks(evaluations, mesh, truth)
         evaluations, branches = with_branches(evaluations, problem)
-    return Comparison(
+    return Results(
         design=job.design,
         mesh=mesh,
         observations=observations,
@@ -148,7 +148,7 @@ def _without_markers(
 
 
 def _write(
-    folder: Path, job: Job, comparison: Comparison, stages: Stages, photographs: Sequence[Picture] = ()
+    folder: Path, job: Job, comparison: Results, stages: Stages, photographs: Sequence[Picture] = ()
 ) -> None:
     """Write every file of a comparison but its solutions; photographs of the tracking are for the report."""
     if comparison.adaptation is not None:
@@ -173,7 +173,7 @@ def _write(
         write_run(folder, record)
 
 
-def _provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) -> dict[str, Any]:
+def _provenance(folder: Path, job: Job, comparison: Results, stages: Stages) -> dict[str, Any]:
     """Times, and the causes of the numbers: hashes, settings, seeds, devices, versions, machine."""
     adaptation, settings = comparison.adaptation, comparison.settings
     return {

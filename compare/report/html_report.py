@@ -17,7 +17,7 @@ from jinja2 import Template
 from numpy.typing import NDArray
 
 from compare.evaluation.certification import REGION_RADIUS
-from compare.evaluation.comparison import TRUTH, Comparison, unsupported_remarks
+from compare.evaluation.comparison import TRUTH, Results, unsupported_remarks
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, indistinct, reference_differences, truth_differences
 from compare.figures import Picture
@@ -74,7 +74,7 @@ class Packed:
         return _base64(b"".join(self._pieces))
 
 
-def viewer(comparison: Comparison) -> dict[str, Any] | None:
+def viewer(comparison: Results) -> dict[str, Any] | None:
     """Manifest, packed arrays and library of the viewer; None where there is no field to show.
 
     There are no solvers whose field is not finite, and no quantities beyond the `BUDGET`.
@@ -108,7 +108,7 @@ def viewer(comparison: Comparison) -> dict[str, Any] | None:
 
 
 def _solver(
-    evaluation: Evaluation, comparison: Comparison, quantities: Sequence[FieldQuantity], packed: Packed
+    evaluation: Evaluation, comparison: Results, quantities: Sequence[FieldQuantity], packed: Packed
 ) -> dict[str, Any]:
     """A solver's fields; of a solver that is not the reference, their differences from it."""
     mesh, reference = comparison.mesh, comparison.reference
@@ -166,7 +166,7 @@ def _base64(data: bytes) -> str:
 
 def write_report(
     path: Path,
-    comparison: Comparison,
+    comparison: Results,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
     numbers: Mapping[str, Any] | None = None,
@@ -176,7 +176,7 @@ def write_report(
 
 
 def report_html(
-    comparison: Comparison,
+    comparison: Results,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
     numbers: Mapping[str, Any] | None = None,
@@ -219,7 +219,7 @@ def _template() -> Template:
     return environment.get_template("report.html.j2")
 
 
-def _entry(evaluation: Evaluation, comparison: Comparison) -> dict[str, object]:
+def _entry(evaluation: Evaluation, comparison: Results) -> dict[str, object]:
     """One solver's part of the tables."""
     reference, truth = comparison.reference, comparison.truth
     differences = reference_differences(evaluation, reference)

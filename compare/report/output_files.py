@@ -13,7 +13,7 @@ import numpy as np
 import pyvista
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation, FieldDifference, ReferenceDifferences
 from compare.evaluation.metrics import (
     COMPONENTS,
@@ -32,7 +32,7 @@ SCHEMA = 1
 """Keys may be added to a schema; a key that is renamed or removed makes a new one."""
 
 
-def metrics(comparison: Comparison) -> dict[str, Any]:
+def metrics(comparison: Results) -> dict[str, Any]:
     """The content of `metrics.json`.
 
     `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was
@@ -59,7 +59,7 @@ def metrics(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _solver(evaluation: Evaluation, comparison: Comparison) -> dict[str, Any]:
+def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
     observations, reference, truth = comparison.observations, comparison.reference, comparison.truth
     errors, held_out = marker_errors(evaluation, observations), held_out_errors(evaluation, observations)
     differences = reference_differences(evaluation, reference)

@@ -1,4 +1,4 @@
-"""The numbers of a comparison as CSV files, among them Table I of the paper.
+"""The numbers of a comparison as CSV files and for the terminal, among them Table I of the paper.
 
 The paper gives all nine markers to the solver that assimilates them, and judges it by the same nine: that is
 a training error. Errors at markers that a solver was not given are other columns here.
@@ -10,7 +10,7 @@ from typing import NamedTuple
 from rich.table import Table
 
 from compare.evaluation.certificate import Certificate
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation, ReferenceDifferences
 from compare.evaluation.metrics import (
     MEANS,
@@ -58,7 +58,7 @@ def printed_rows(finger: Finger) -> tuple[Row, ...]:
     return PRINTED if same else ()
 
 
-def table_one(comparison: Comparison) -> list[Row]:
+def table_one(comparison: Results) -> list[Row]:
     """A row of Table I for each solver of this run."""
     rows, observations = [], comparison.observations
     for evaluation in comparison.evaluations:
@@ -74,7 +74,7 @@ def millimetres(error: float, printed: bool = False) -> str:
     return text.removesuffix("0") if printed else text
 
 
-def write_table_one(path: Path, comparison: Comparison) -> None:
+def write_table_one(path: Path, comparison: Results) -> None:
     """Write a row a solver, then `printed_rows`; cells without a number are empty."""
     own = [(each.solver, int(each.converged)) for each in comparison.evaluations]
     printed = printed_rows(comparison.design)
@@ -88,7 +88,7 @@ def write_table_one(path: Path, comparison: Comparison) -> None:
     write_csv(path, rows)
 
 
-def write_markers(path: Path, comparison: Comparison) -> None:
+def write_markers(path: Path, comparison: Results) -> None:
     """Write a row a marker: its place and observed motion, every solver's displacement and its errors.
 
     The cells of observations and errors are empty at markers that were not seen; those of held-out errors
@@ -119,7 +119,7 @@ def write_markers(path: Path, comparison: Comparison) -> None:
     write_csv(path, rows)
 
 
-def write_summary(path: Path, comparison: Comparison) -> None:
+def write_summary(path: Path, comparison: Results) -> None:
     """Write a row a solver: errors at the markers, distances over the body, energy, reaction, status."""
     write_csv(path, [_summary(evaluation, comparison) for evaluation in comparison.evaluations])
 
@@ -132,7 +132,7 @@ def seconds(evaluation: Evaluation) -> str:
     return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
 
 
-def _summary(evaluation: Evaluation, comparison: Comparison) -> dict[str, Cell]:
+def _summary(evaluation: Evaluation, comparison: Results) -> dict[str, Cell]:
     observations, reference, truth = comparison.observations, comparison.reference, comparison.truth
     errors, to = marker_errors(evaluation, observations), reference_differences(evaluation, reference)
     row: dict[str, Cell] = {"solver": evaluation.solver, "converged": int(evaluation.converged)}
@@ -185,7 +185,7 @@ def _differences(what: str, differences: ReferenceDifferences) -> dict[str, Cell
     }
 
 
-def marker_table(comparison: Comparison) -> Table:
+def marker_table(comparison: Results) -> Table:
     """Mean absolute errors at the markers; below, for the paper's finger, the paper's own numbers."""
     observations, printed = comparison.observations, printed_rows(comparison.design)
     seen, count = int(observations.visible.sum()), len(observations.visible)
@@ -211,7 +211,7 @@ def marker_table(comparison: Comparison) -> Table:
     return table
 
 
-def body_table(comparison: Comparison) -> Table:
+def body_table(comparison: Results) -> Table:
     """Distances over the body, error of the force, and time."""
     evaluations, reference, truth = comparison.evaluations, comparison.reference, comparison.truth
     lines = [f"from ref.: relative L² difference of the displacement from {reference.label}."]

@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from compare.evaluation.certificate import Certificate
 from compare.evaluation.certification import REGIONS
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, truth_differences
 from compare.runtime.tables import distance, number, percent
@@ -24,7 +24,7 @@ LAW_WORDS = {
 }
 
 
-def material_rows(comparison: Comparison) -> list[tuple[str, str]]:
+def material_rows(comparison: Results) -> list[tuple[str, str]]:
     """The material in words, and the solvers of each law where they differ."""
     material = comparison.material
     constants = f"plane {material.plane}; E = {material.young:g} MPa, Poisson’s ratio {material.poisson:g}"
@@ -245,7 +245,7 @@ def _reported(certificate: Certificate) -> str:
     return f"It reports {percent(missed)} less energy than that least: {reason}."
 
 
-def truth_sentences(comparison: Comparison) -> list[str]:
+def truth_sentences(comparison: Results) -> list[str]:
     """Sentences on the change that given markers make to displacement and stress, against the reference.
 
     Empty without a truth, without such a solver, or if the reference was given the markers too.

@@ -1,4 +1,4 @@
-"""The output folder: always one complete result, the last or the new one.
+"""The output folder: one complete result, the last or the new one; or the finished parts of a long job.
 
 A run writes into `NAME.partial`, which carries a mark and replaces the output folder `NAME` at the end. A
 killed run leaves there its finished solutions and the checkpoints of the solver in training, from which a

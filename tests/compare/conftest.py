@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import evaluated
 from geometry.arrays import FloatArray
@@ -160,11 +160,11 @@ def observations(observe: Callable[..., Observations], fem: Evaluation) -> Obser
 
 
 @pytest.fixture(scope="session")
-def compared(mesh: TriangleMesh, observations: Observations) -> Callable[..., Comparison]:
+def compared(mesh: TriangleMesh, observations: Observations) -> Callable[..., Results]:
     """`compared(fem, pinn, truth=..., ...)`: their comparison; the first is the reference."""
 
-    def make(*evaluations: Evaluation, **changes: Any) -> Comparison:
-        return replace(Comparison(Design(), mesh, observations, evaluations, evaluations[0]), **changes)
+    def make(*evaluations: Evaluation, **changes: Any) -> Results:
+        return replace(Results(Design(), mesh, observations, evaluations, evaluations[0]), **changes)
 
     return make
 

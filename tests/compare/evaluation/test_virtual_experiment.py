@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.truths import TRUTHS, UnfinishedExperimentError, virtual_experiment
 from compare.pipeline.job import Job
 from geometry.cache import finger_mesh
@@ -212,7 +212,7 @@ def unfinished(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.pipeline.pipeline.virtual_experiment", stops)
 
 
-def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Comparison:
+def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Results:
     solvers = [make_solver(name) for name in names]
     return compare(Job(Design(), solvers, spare, MeshSettings(size=1.0), out=out))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import evaluated
 from compare.figures.gallery import draw
@@ -26,7 +26,7 @@ from tests.fingers import beam, ring
 FINGERS: dict[str, Finger] = {"ring": ring(), "beam": beam(), "csiro": load_design("csiro")}
 
 
-def compared(finger: Finger) -> Comparison:
+def compared(finger: Finger) -> Results:
     """Two solvers with a known field, on a coarse mesh."""
     mesh = build_mesh(finger, MeshSettings(size=2.0))
     evaluations = [_evaluation(mesh, name, scale) for name, scale in (("fem", 0.02), ("pinn-std", 0.021))]
@@ -39,7 +39,7 @@ def compared(finger: Finger) -> Comparison:
         simulated=True,
         marker_radius=0.8,
     )
-    return Comparison(finger, mesh, observations, evaluations, evaluations[0])
+    return Results(finger, mesh, observations, evaluations, evaluations[0])
 
 
 def _evaluation(mesh: TriangleMesh, name: str, scale: float) -> Evaluation:
@@ -56,12 +56,12 @@ def _evaluation(mesh: TriangleMesh, name: str, scale: float) -> Evaluation:
 
 
 @pytest.fixture(scope="module", params=FINGERS)
-def comparison(request: pytest.FixtureRequest) -> Comparison:
+def comparison(request: pytest.FixtureRequest) -> Results:
     return compared(FINGERS[request.param])
 
 
 @pytest.fixture(scope="module")
-def pages(comparison: Comparison) -> dict[str, Page]:
+def pages(comparison: Results) -> dict[str, Page]:
     names = ("overlay", "von_mises", "strain_xx", "mesh", "design", "marker_errors")
     return {name: page_of(draw(comparison, name).figure) for name in names}
 

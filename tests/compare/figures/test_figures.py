@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from compare.evaluation.certification import with_certificates
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import FORMATS, draw_all
@@ -32,7 +32,7 @@ def certificate_of(evaluation: Evaluation, mesh: TriangleMesh) -> Evaluation:
 
 
 @pytest.fixture(scope="module")
-def comparison(mesh, fem, pinn, failed, observe, compared) -> Comparison:
+def comparison(mesh, fem, pinn, failed, observe, compared) -> Results:
     """Three solvers, of which one followed the load and failed, with one marker not seen."""
     steps = np.array([0.0, 0.2, 0.6])
     record = {"load_fraction": steps, "energy": steps**2, "reaction_x": 0 * steps, "reaction_y": -(steps**2)}
@@ -42,7 +42,7 @@ def comparison(mesh, fem, pinn, failed, observe, compared) -> Comparison:
 
 
 @pytest.fixture(scope="module")
-def drawings(comparison: Comparison) -> dict[str, Illustration]:
+def drawings(comparison: Results) -> dict[str, Illustration]:
     """All pictures of the comparison; no network of it has losses to draw."""
     drawings = {name: draw(comparison) for name, (_, draw) in GALLERY.items()}
     return {name: drawing for name, drawing in drawings.items() if drawing is not None}
@@ -108,7 +108,7 @@ def test_a_picture_shows_itself_in_a_notebook(drawings: dict[str, Illustration])
         ("losses", "losses: no solver of this comparison has data for the chart of the losses"),
     ],
 )
-def test_a_picture_that_there_is_not(comparison: Comparison, name: str, message: str) -> None:
+def test_a_picture_that_there_is_not(comparison: Results, name: str, message: str) -> None:
     with pytest.raises(UserError, match=message):
         draw(comparison, name)
 

@@ -4,7 +4,7 @@ from io import StringIO
 
 from rich.console import Console
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.pipeline.job import Job
 from compare.pipeline.pipeline import run
 from compare.runtime.stages import Stages
@@ -14,6 +14,6 @@ def quiet() -> Stages:
     return Stages(Console(file=StringIO()), quiet=True)
 
 
-def compare(job: Job) -> Comparison:
+def compare(job: Job) -> Results:
     with quiet() as stages:
         return run(job, stages)

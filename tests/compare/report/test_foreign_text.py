@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.figures import Picture
 from compare.pipeline.job import Job, checked
 from compare.report.html_report import report_html
@@ -46,7 +46,7 @@ class Elements(HTMLParser):
 
 
 @pytest.fixture
-def hostile(fem, pinn, observe, compared) -> Comparison:
+def hostile(fem, pinn, observe, compared) -> Results:
     """A comparison in which every text that a solver, a file or a user can set is hostile."""
     said = {"message": HOSTILE, "stats": {HOSTILE: HOSTILE, "seconds": 1.0}}
     evaluations = [replace(each, solver=f"{each.solver}{HOSTILE}", **said) for each in (fem, pinn)]
@@ -63,7 +63,7 @@ def hostile(fem, pinn, observe, compared) -> Comparison:
     )
 
 
-def test_the_report_escapes_every_text_of_others(hostile: Comparison, tmp_path: Path) -> None:
+def test_the_report_escapes_every_text_of_others(hostile: Results, tmp_path: Path) -> None:
     path = tmp_path / 'a <b> & "c".png'
     path.write_bytes(PNG)
     picture = Picture(path, HOSTILE, HOSTILE, HOSTILE)
@@ -105,7 +105,7 @@ def test_the_page_of_runs_takes_pictures_alone(hostile, tmp_path, monkeypatch, c
     assert runs == []
 
 
-def test_a_run_with_a_link_is_not_read(hostile: Comparison, tmp_path: Path) -> None:
+def test_a_run_with_a_link_is_not_read(hostile: Results, tmp_path: Path) -> None:
     write_json(tmp_path / "run" / "metrics.json", metrics(hostile))
     write_json(tmp_path / "run" / "run.json", {})
     (tmp_path / "mine.png").write_bytes(b"")

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from compare.evaluation.certification import with_certificates
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
 from compare.report import html_report
@@ -52,7 +52,7 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def content(fem, pinn, compared) -> Comparison:
+def content(fem, pinn, compared) -> Results:
     return compared(fem, pinn)
 
 
@@ -74,7 +74,7 @@ def pictures(tmp_path: Path) -> list[Picture]:
 
 
 def render(
-    comparison: Comparison,
+    comparison: Results,
     pictures: Sequence[Picture] = (),
     provenance: Mapping[str, object] = {"seed": 17, "versions": {"numpy": "1.26.4"}},
 ) -> str:
@@ -86,7 +86,7 @@ def test_the_page_is_balanced_and_has_every_part_that_it_links(page):
     assert {link[1:] for link in page.values("href")} <= set(page.values("id"))
 
 
-def test_it_asks_for_nothing_from_outside(content: Comparison, pictures: list[Picture]) -> None:
+def test_it_asks_for_nothing_from_outside(content: Results, pictures: list[Picture]) -> None:
     html = render(content, pictures)
     assert "<link" not in html
     packed = r'(?<=id="viewer-data">)[^<]*|(?<=id="viewer-library">)[^<]*'
@@ -117,18 +117,18 @@ def test_the_page_says_what_was_compared_and_found(page, expected):
     ("preset", "words"),
     [("fast", "random hidden weights"), ("paper", "training"), ("trained", "all weights")],
 )
-def test_a_network_is_called_what_it_is(content: Comparison, preset: str, words: str) -> None:
+def test_a_network_is_called_what_it_is(content: Results, preset: str, words: str) -> None:
     text = Page(render(replace(content, settings={"fem": {}, "pinn-std": {"preset": preset}}))).text
     assert re.search(f"pinn-std: [^.]*{words}[^.]*\\(preset {preset}\\)", text)
 
 
-def test_every_picture_has_its_caption(content: Comparison, pictures: list[Picture]) -> None:
+def test_every_picture_has_its_caption(content: Results, pictures: list[Picture]) -> None:
     page = Page(render(content, pictures))
     assert "Figure 1. Deformed finger. Two fingers." in page.text
     assert page.values("alt") == ["Deformed finger. Largest displacement, mm: fem 9."]
 
 
-def test_simulated_displacements_are_warned_of(content: Comparison) -> None:
+def test_simulated_displacements_are_warned_of(content: Results) -> None:
     page = Page(render(content))
     assert "simulated" in page.values("id")
     assert "Simulated by another solver." in page.text
@@ -143,13 +143,13 @@ def test_measured_displacements_are_not(content, observe, fem):
 
 
 @pytest.mark.parametrize(("kind", "warned"), [("point", True), ("mean", False)])
-def test_a_point_load_is_said_to_have_no_limit(content: Comparison, kind: str, warned: bool) -> None:
+def test_a_point_load_is_said_to_have_no_limit(content: Results, kind: str, warned: bool) -> None:
     page = Page(render(replace(content, load=Load(kind=kind))))
     assert ("point-load" in page.values("id")) is warned
 
 
 @pytest.mark.parametrize("given", [True, False])
-def test_errors_on_assimilated_markers_are_training_errors(content: Comparison, given: bool) -> None:
+def test_errors_on_assimilated_markers_are_training_errors(content: Results, given: bool) -> None:
     fem, pinn = content.evaluations
     page = Page(render(replace(content, evaluations=[fem, replace(pinn, in_sample=given)])))
     assert ("in-sample" in page.values("id")) is given
@@ -173,14 +173,14 @@ def test_stress_is_held_against_the_truth_only_where_that_is_known(content, simu
     assert ("Nearer in von Mises stress: pinn-std." in page.text) is simulated
 
 
-def test_a_solver_that_failed_is_marked_everywhere(content: Comparison, failed: Evaluation) -> None:
+def test_a_solver_that_failed_is_marked_everywhere(content: Results, failed: Evaluation) -> None:
     page = Page(render(replace(content, evaluations=[*content.evaluations, failed])))
     assert "fem-nonlinear did not converge. Stopped after 20 steps; try more load_steps." in page.text
     bare = re.findall(r"fem-nonlinear(?! \(not converged\)| did not converge)", page.text)
     assert bare == []
 
 
-def test_the_certificate_has_a_sentence_and_its_numbers(content: Comparison, mesh: TriangleMesh) -> None:
+def test_the_certificate_has_a_sentence_and_its_numbers(content: Results, mesh: TriangleMesh) -> None:
     """A network with the energy of fem times 1.21 at the same places: a given field, and far from balance."""
     evaluations = with_certificates(content.evaluations, Problem(mesh))
     page = Page(render(replace(content, evaluations=evaluations, reference=evaluations[0])))
@@ -227,7 +227,7 @@ def test_refinement_is_told_round_by_round(content, mesh, tolerance, warned):
     assert page.unbalanced == []
 
 
-def test_a_single_solver_is_compared_with_nothing(content: Comparison, fem: Evaluation) -> None:
+def test_a_single_solver_is_compared_with_nothing(content: Results, fem: Evaluation) -> None:
     text = Page(render(replace(content, evaluations=[fem]))).text
     assert "nothing to compare it with" in text
 
@@ -238,7 +238,7 @@ def test_foreign_text_stays_text(content, observe, fem):
     assert foreign.count("<script") == render(content).count("<script")
 
 
-def test_it_is_written_atomically(content: Comparison, tmp_path: Path) -> None:
+def test_it_is_written_atomically(content: Results, tmp_path: Path) -> None:
     html_report.write_report(tmp_path / "out" / "report.html", content, [], {})
     assert (tmp_path / "out" / "report.html").read_text(encoding="utf-8") == render(content, provenance={})
     assert len(list((tmp_path / "out").iterdir())) == 1

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.report.output_files import metrics
 from compare.report.summary import RunAnswer, answers
@@ -20,7 +20,7 @@ TRUST, MARKERS, CONVERGED = (
 )
 
 
-def asked(comparison: Comparison, **said: dict[str, str]) -> dict[str, RunAnswer]:
+def asked(comparison: Results, **said: dict[str, str]) -> dict[str, RunAnswer]:
     return {answer.question: answer for answer in answers(metrics(comparison), **said)}
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import marker_errors, reference_differences
 from compare.report.tables import (
@@ -22,7 +22,7 @@ from geometry import Design, load_design
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 Rows = list[dict[str, str]]
-Comparing = Callable[..., Comparison]
+Comparing = Callable[..., Results]
 UNITS = ("_mm", "_MPa", "_1", "_N_mm_per_mm", "_N_per_mm", "_s", "_rel_l2", "_rel")
 WITHOUT_UNIT = {"marker", "observations", "visible", "solver", "converged", "reference", "status"}
 WITHOUT_UNIT |= {"misses_energy", "in_sample"}

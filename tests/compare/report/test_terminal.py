@@ -8,11 +8,11 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.report.tables import body_table, marker_table
 
-Comparing = Callable[..., Comparison]
+Comparing = Callable[..., Results]
 
 
 def printed(table: Table, *, width: int = 80) -> str:
