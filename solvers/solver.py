@@ -36,6 +36,10 @@ class UnsupportedProblemError(UserError):
     """The solver does not support the problem."""
 
 
+class NoSolutionError(UserError):
+    """A solver looked for a solution of a sound problem and found none; says what was tried."""
+
+
 class SolverFailedError(UserError):
     """A solver raised an exception, the cause of this one."""
 

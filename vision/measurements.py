@@ -2,26 +2,31 @@
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import hypot
 from pathlib import Path
 
 import numpy as np
 
+from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
-from geometry.observations import Observations
+from geometry.observations import FIXED, HAND_HELD, Observations, Registration
 
 POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")
 REQUIRED = (*POSITION, *DISPLACEMENT)
 OPTIONAL = {"std_u_mm": 0.0, "std_v_mm": 0.0, "visible": 1.0}
+CLICKED = 0.05
+"""Median standard deviation, mm, from which points were set by hand: fixed cameras do better."""
 SMALLEST_DISTANCE = 1e-3
 """Distance below which two markers are the same one, mm: less than a camera tells apart."""
 LARGEST = 1e6
 """Size of a coordinate or displacement that cannot be of a finger, mm."""
 SIMULATED_MARK = "# simulated"
 SOURCE_MARK = "# source: "
+PICTURES = {"pressed": "# pressed picture: ", "drawn": "# picture at rest: "}
+"""Marks of the comments that say how well the pictures' frames are known."""
 
 
 def write_measurements(path: Path, observations: Observations) -> None:
@@ -33,6 +38,10 @@ def write_measurements(path: Path, observations: Observations) -> None:
         if observations.simulated:
             file.write(f"{SIMULATED_MARK}\n")
         file.write(f"{SOURCE_MARK}{' '.join(observations.source.split())}\n")
+        for picture, mark in PICTURES.items():
+            known = getattr(observations, picture)
+            if known != _unsaid(observations.simulated, observations.standard_deviations)[picture]:
+                file.write(f"{mark}{known}\n")
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["marker", *REQUIRED, *OPTIONAL])
         columns = zip(
@@ -53,7 +62,10 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     The columns `x_mm, y_mm` (initial position in the finger's frame) and `u_mm, v_mm` (displacement, final
     minus initial) are needed; `std_u_mm, std_v_mm` (standard deviations) and `visible` (1 or 0) may be left
     out. Only the position is read of a marker that is not visible. Comment lines start with `#`;
-    `# source: TEXT` names the origin of the numbers, `# simulated` means that no camera was involved.
+    `# source: TEXT` names the origin of the numbers, `# simulated` means that no camera was involved;
+    `# pressed picture: TEXT` says how well the pressed picture's frame is known in that at rest, and
+    `# picture at rest: TEXT` how well that one's is in the drawing, in words of `Registration.parse`. Where
+    nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose points were `CLICKED`.
 
     Raises:
         UserError: If the file cannot be read, a column is missing, a value is no number
@@ -90,19 +102,40 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     columns = {name: np.array([marker[name] for marker in markers]) for name in (*REQUIRED, *OPTIONAL)}
     if not columns["visible"].any():
         raise UserError(f"{path}: none of the markers is visible; at least one is needed")
-    sources = [found[1] for comment in comments if (found := re.match(r"#\s*source:\s*(.*)", comment, re.I))]
+    sources = _said(comments, SOURCE_MARK)
+    simulated = any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in comments)
+    seen = columns["visible"] == 1
+    deviations = np.column_stack([columns["std_u_mm"], columns["std_v_mm"]])
     try:
+        known = _unsaid(simulated, deviations)
+        for picture, mark in PICTURES.items():
+            if said := _said(comments, mark):
+                known[picture] = Registration.parse(said[0])
         return Observations(
             points=np.column_stack([columns["x_mm"], columns["y_mm"]]),
             displacements=np.column_stack([columns["u_mm"], columns["v_mm"]]),
-            standard_deviations=np.column_stack([columns["std_u_mm"], columns["std_v_mm"]]),
-            visible=columns["visible"] == 1,
+            standard_deviations=deviations,
+            visible=seen,
             source=sources[0] if sources else f"measurements from {path.name}",
-            simulated=any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in comments),
+            simulated=simulated,
             marker_radius=marker_radius,
+            **known,
         )
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
+
+
+def _unsaid(simulated: bool, deviations: FloatArray) -> dict[str, Registration]:
+    """Registrations of pictures of which nothing is said, for standard deviations (m, 2), mm; zero unseen."""
+    known = deviations[(deviations > 0).any(axis=1)]
+    clicked = not simulated and len(known) > 0 and float(np.median(known)) >= CLICKED
+    return {"pressed": HAND_HELD if clicked else FIXED, "drawn": FIXED}
+
+
+def _said(comments: Sequence[str], mark: str) -> list[str]:
+    """What comments say that begin with a mark."""
+    words = re.escape(mark.strip("# ")).replace("\\ ", r"\s+")
+    return [found[1] for each in comments if (found := re.match(rf"#\s*{words}\s*(.*)", each, re.I))]
 
 
 def _lines(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:

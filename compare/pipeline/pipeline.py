@@ -124,12 +124,15 @@ def compute(job: Job, stages: Stages, folder: Path) -> Results:
         adaptation=adaptation,
         settings={each.name: each.settings() for each in solvers if each.name in outcome.evaluations},
         unsupported=unsupported | outcome.unsupported,
-        failed={
-            name: f"{fault}; its traceback is in {ERRORS}/{name}.txt"
-            for name, fault in outcome.failed.items()
-        },
+        failed={name: _with_traceback(folder, name, reason) for name, reason in outcome.failed.items()},
         warnings=[*unit_remarks(problem), *remarks, *impossible, *branches],
     )
+
+
+def _with_traceback(folder: Path, name: str, reason: str) -> str:
+    """Why a solver failed, and the file of its exception's traceback if there is one."""
+    trace = Path(ERRORS) / f"{name}.txt"
+    return f"{reason}; its traceback is in {trace}" if (folder / trace).exists() else reason
 
 
 def _without_markers(

@@ -24,6 +24,7 @@ from geometry.processes import Pool, ProcessFailed, end_with_parent
 from solvers.problem import Problem
 from solvers.shared_work import SharedWork
 from solvers.solver import (
+    NoSolutionError,
     Progress,
     Solver,
     SolverFailedError,
@@ -51,7 +52,7 @@ class Outcome:
 
     evaluations: dict[str, Evaluation] = field(default_factory=dict)
     unsupported: dict[str, str] = field(default_factory=dict)  #: Reasons of those that do not support it.
-    failed: dict[str, str] = field(default_factory=dict)  #: Exceptions of those that raised one.
+    failed: dict[str, str] = field(default_factory=dict)  #: Reasons of those that have no result.
 
 
 def solve_all(
@@ -154,14 +155,20 @@ class _Part:
                 if solver.name not in self.job.spare:
                     raise
                 outcome.unsupported[solver.name] = str(error)
-            except SolverFailedError as error:
+            except (NoSolutionError, SolverFailedError) as error:
                 if solver.name == self.job.reference:
                     raise
-                (self.folder / ERRORS).mkdir(exist_ok=True)
-                trace = "".join(traceback.format_exception(error.__cause__))
-                write_text(self.folder / ERRORS / f"{solver.name}.txt", trace)
-                outcome.failed[solver.name] = str(error)
+                outcome.failed[solver.name] = self._reason(solver, error)
         return outcome
+
+    def _reason(self, solver: Solver, error: UserError) -> str:
+        """Why a solver has no result; of an exception the traceback is written."""
+        if isinstance(error, NoSolutionError):
+            return f"{solver.name} found no solution: {error}"
+        (self.folder / ERRORS).mkdir(exist_ok=True)
+        trace = "".join(traceback.format_exception(error.__cause__))
+        write_text(self.folder / ERRORS / f"{solver.name}.txt", trace)
+        return str(error)
 
     def _in_context(self, solver: Solver, fem: Evaluation | None) -> Solver:
         """Give a trained solver the folder of its checkpoints and the energy of `fem` under its law."""

@@ -7,6 +7,7 @@ is the place of the contact; with the tangent K there,
 
 A marker is at a fixed place P of the drawn body; where the walls have moved by W, the material there was
 drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
+`solvers.assimilation.registration` has what pictures show of that whose frames are unknown.
 """
 
 from dataclasses import dataclass, replace
@@ -23,6 +24,7 @@ from solvers.constrained_elimination import ConstrainedElimination
 from solvers.identification.body import Body, Linearised
 from solvers.identification.boundary import Clamp, RigidMotion
 from solvers.identification.unknowns import Hypothesis, Unknowns
+from solvers.solver import NoSolutionError
 
 MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""
@@ -57,7 +59,7 @@ class ResponseModel:
         still = np.zeros(len(self.unknowns.motion.names))
         rest = self.body.linearised(np.zeros(self.body.shape), self.unknowns.problem.material.lame, still)
         if rest is None:
-            raise UserError("the finger is inside out before it is loaded")
+            raise NoSolutionError("the finger is inside out before it is loaded")
         rows = self._traction(*self.unknowns.place)[0]
         pressed = np.tensordot(self.unknowns.directions[0], rows, axes=1)
         return float((pressed * rest.solve(pressed[None])[0]).sum())
@@ -89,7 +91,7 @@ class ResponseModel:
         hypothesis = response.hypothesis
         there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
         if there is None:
-            raise UserError("the finger that was found is inside out")
+            raise NoSolutionError("the finger that was found is inside out")
         rows = self._traction(hypothesis.position, hypothesis.width)[0]
         held = ConstrainedElimination(rows, there.solve(rows))
         return held.unstable(there.negative())
@@ -262,7 +264,8 @@ class MarkerModel:
 
     Attributes:
         rows: Of the markers' mean displacement in the drawn body, shape (m, 2, *shape).
-        wall_rows: Of its change by the motion of each wall, shape (k, m, 2, *shape), per mm.
+        moved_rows: Of its change by what moves a marker in the body, shape (k, m, 2, *shape): the motion of
+            each wall, per mm, and the values of the similarity between picture and drawing, if it is unknown.
     """
 
     def __init__(self, model: ResponseModel, measurement: MarkerData) -> None:
@@ -271,21 +274,33 @@ class MarkerModel:
         location, motion = self.unknowns.problem.mesh.locate(points), self.unknowns.motion
         shifts = [motion.shifts(location, one) for one in np.eye(len(motion.names))]
         self.rows = body.displacement_rows(points, means)
-        wall_rows = [-body.gradient_rows(points, means[:, :, None] * shift) for shift in shifts]
-        self.wall_rows = np.array(wall_rows).reshape(-1, *self.rows.shape)
+        moved_rows = [-body.gradient_rows(points, means[:, :, None] * shift) for shift in shifts]
+        if any(name.startswith("drawn") for name in self.unknowns.names):
+            still = self.unknowns.similarity("drawn", {})
+            moved_rows += [body.gradient_rows(points, means[:, :, None] * by) for by in still.slopes(points)]
+        self.moved_rows = np.array(moved_rows).reshape(-1, *self.rows.shape)
 
     def predicted(self, response: Response) -> Prediction:
         """Values in the order of `MarkerData.observed`, shape (n,), and their derivatives (n, p)."""
         hypothesis, state, slopes = response.hypothesis, response.state, response.slopes
         by = self.unknowns.slopes(response.values)
-        rows = self.rows + np.tensordot(hypothesis.changes, self.wall_rows, axes=1)
+        points, pressed, drawing = self.measurement.points, hypothesis.pressed, hypothesis.drawn
+        count = len(self.moved_rows)
+        moves = np.append(hypothesis.changes, drawing.values)[:count]
+        by_moves = np.concatenate([by.changes, by.drawn], axis=1)[:, :count]
+        rows = self.rows + np.tensordot(moves, self.moved_rows, axes=1)
         drawn = np.tensordot(rows, state, axes=state.ndim)
         axes = tuple(range(1, slopes.ndim)), tuple(range(2, rows.ndim))
         drawn_slopes = np.tensordot(slopes, rows, axes=axes)
-        drawn_slopes += np.tensordot(by.changes, np.tensordot(self.wall_rows, state, axes=state.ndim), axes=1)
-        places = self.measurement.points + drawn
-        moved = response.motion.moved(places) - self.measurement.points
-        moved_slopes = response.motion.slopes(places, drawn_slopes)
+        drawn_slopes += np.tensordot(by_moves, np.tensordot(self.moved_rows, state, axes=state.ndim), axes=1)
+        drawn_slopes += np.tensordot(by.drawn, drawing.slopes(points), axes=1)
+        places = drawing.moved(points) + drawn
+        seen = drawing.undone(response.motion.moved(places))  # in the frame of the picture at rest
+        seen_slopes = response.motion.slopes(places, drawn_slopes)
+        seen_slopes -= np.tensordot(by.drawn, drawing.slopes(seen), axes=1)
+        seen_slopes = seen_slopes @ np.linalg.inv(drawing.matrix).T @ pressed.matrix.T
+        seen_slopes += np.tensordot(by.pressed, pressed.slopes(seen), axes=1)
+        moved, moved_slopes = pressed.moved(seen) - points, seen_slopes
         values, derivatives = moved.ravel(), moved_slopes.reshape(len(moved_slopes), -1).T
         if self.measurement.reaction is None:
             return values, derivatives

@@ -82,14 +82,17 @@ class Identified:
     # Markers that contradict the others and were not used: number among those seen, and their computed
     # minus their observed displacement, shape (2,), mm
     doubtful: Mapping[int, FloatArray]
+    lost: Sequence[LawName] = ()  # Laws of which no equilibrium was found near the markers
 
     @classmethod
-    def ranked(cls, fits: Sequence[Fit], doubtful: Mapping[int, FloatArray]) -> "Identified":
+    def ranked(
+        cls, fits: Sequence[Fit], doubtful: Mapping[int, FloatArray], lost: Sequence[LawName] = ()
+    ) -> "Identified":
         """The fits, given in any order."""
         ordered = sorted(fits, key=lambda fit: -fit.log_evidence)
         logs = np.array([fit.log_evidence for fit in ordered])
         weights = np.exp(logs - logs.max())
-        return cls(ordered, weights / weights.sum(), doubtful)
+        return cls(ordered, weights / weights.sum(), doubtful, lost)
 
     @property
     def best(self) -> Fit:
@@ -220,6 +223,7 @@ class Identified:
         if len(self.fits) > 1:
             shares = zip(self.fits, self.probabilities, strict=True)
             parts.append("law " + ", ".join(f"{fit.law} {share:.1%}" for fit, share in shares) + " probable")
+        parts += [f"no equilibrium of the {law} law was found near the markers" for law in self.lost]
         for number, off in self.doubtful.items():
             far = np.linalg.norm(off)
             parts.append(

@@ -9,11 +9,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
+from scipy.stats import chi2
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.estimation import COST_CHANGE, Prediction, estimate
+from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Prediction, estimate
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
@@ -22,7 +23,7 @@ from solvers.identification.transfer import transferred
 from solvers.identification.unknowns import DEFAULT, Unknowns, parse_unknowns
 from solvers.problem import Problem
 from solvers.solution import Solution
-from solvers.solver import Progress, silent
+from solvers.solver import NoSolutionError, Progress, silent
 
 LAWS: tuple[LawName, ...] = ("neo-hookean", "st-venant-kirchhoff")
 """The laws of finite strain to choose from."""
@@ -34,6 +35,9 @@ QUICK = 4
 
 IMPROBABLE = 15.0
 """Logarithm of the ratio of evidences from which on a law is not fitted to the end."""
+
+MOST_LOST = 8
+"""Hypotheses without equilibrium at which a search ends: near a limit load there are ever more of them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,20 +143,31 @@ class Identifier:
         """
         self._progress = progress
         rough = self._rough(self.measurement(observations))
-        best = max(rough, key=lambda fit: fit.log_evidence)
-        fit, doubtful = self._believed(self._settled(best))
+        lost = [law for law in self.models if law not in {each.law for each in rough}]
+        for best in sorted(rough, key=lambda fit: -fit.log_evidence):
+            try:
+                fit, doubtful = self._believed(self._settled(best))
+                break
+            except NoSolutionError as error:
+                lost.append(best.law)
+                if len(lost) == len(self.models):
+                    raise error
         fits = [fit]
-        for other in rough:
-            if other.law == fit.law:
-                continue
-            other = self._fit(other.law, fit.measurement, fit, rounds=1, steps=QUICK)
-            # Laws are compared by fits to the end, unless one could not be probable even there.
-            if self._shifted(other, fit.measurement).log_evidence > fit.log_evidence - IMPROBABLE:
-                other = self._fit(other.law, fit.measurement, other)
-            fits.append(other)
+        for law in (law for law in self.models if law != fit.law and law not in lost):
+            try:
+                fits.append(self._rival(law, fit))
+            except NoSolutionError:
+                lost.append(law)
         for each in fits:
             self._known.setdefault(each.law, each)
-        return Identified.ranked(fits, doubtful)
+        return Identified.ranked(fits, doubtful, lost)
+
+    def _rival(self, law: LawName, fit: Fit) -> Fit:
+        """The fit of another law, to its end unless it could not be probable even there."""
+        other = self._fit(law, fit.measurement, fit, rounds=1, steps=QUICK)
+        if self._shifted(other, fit.measurement).log_evidence > fit.log_evidence - IMPROBABLE:
+            other = self._fit(law, fit.measurement, other)
+        return other
 
     def start_from(self, fit: Fit) -> None:
         """Start the next search from a fit, whose response has a state of this discretisation."""
@@ -183,7 +198,7 @@ class Identifier:
     def updated(self, found: Identified, observations: Observations) -> Identified:
         """The unknowns for observations near those of fits, to first order: no equilibrium is solved."""
         measurement = self.measurement(observations)
-        return Identified.ranked([self._shifted(fit, measurement) for fit in found.fits], {})
+        return Identified.ranked([self._shifted(fit, measurement) for fit in found.fits], {}, found.lost)
 
     def _shifted(self, fit: Fit, measurement: MarkerData) -> Fit:
         """The fit to a measurement, to first order about another fit."""
@@ -204,25 +219,46 @@ class Identifier:
         )
 
     def _rough(self, measurement: MarkerData) -> list[Fit]:
-        """A fit of every law with φ = 1: the first one to its end, the others in a few steps from it."""
-        law, *others = self.models
-        first = self._fit(law, measurement, self._known.get(law), rounds=1)
-        return [first] + [
-            self._fit(each, measurement, self._known.get(each, first), rounds=1, steps=QUICK)
-            for each in others
-        ]
+        """A fit of every law with φ = 1: the first one to its end, the others in a few steps from it.
+
+        Laws are left out that have no equilibrium near the markers.
+        """
+        found: list[Fit] = []
+        for law in self.models:
+            steps = QUICK if found else MAX_STEPS
+            near = self._known.get(law, found[0] if found else None)
+            try:
+                found.append(self._fit(law, measurement, near, rounds=1, steps=steps))
+            except NoSolutionError as error:
+                reason = error
+        if not found:
+            raise reason
+        return found
 
     def _settled(self, rough: Fit) -> Fit:
-        """The fit of a law; where it explains little, the best of several from other places of contact."""
+        """The fit of a law; where it does not explain the markers, the best of several from other contacts.
+
+        A wide contact is far from the start, in width and force; a place farther away counts where little
+        is explained.
+        """
         if rough.estimate.converged:
             return rough
         best = self._fit(rough.law, rough.measurement, rough)
-        if best.estimate.inflation < 10 or "position" not in self._names or self._known:
+        if best.estimate.inflation == 1 or self._known:
             return best
-        for away in (-2.0, 2.0):  # standard deviations of the prior
-            start = np.zeros(len(self._names))
-            start[self._names.index("position")] = away
-            other = self._fit(rough.law, rough.measurement, None, start)
+        # Standard deviations of the prior
+        others = [("width", 3.0)] + [
+            ("position", away) for away in (-2.0, 2.0) if best.estimate.inflation > 10
+        ]
+        for name, away in others:
+            if name not in self._names:
+                continue
+            start = best.estimate.z.copy() if name == "width" else np.zeros(len(self._names))
+            start[self._names.index(name)] = away
+            try:
+                other = self._fit(rough.law, rough.measurement, None, start)
+            except NoSolutionError:
+                continue
             best = max(best, other, key=lambda fit: fit.log_evidence)
         return best
 
@@ -246,13 +282,23 @@ class Identifier:
             if found is None and model.evaluations == first:  # another law's start was too far away
                 model.restart(None)
                 found = model.response(values)
-            return None if found is None else markers.predicted(found)
+            if found is not None:
+                reached[values.tobytes()] = found
+                return markers.predicted(found)
+            lost.append(values)
+            if len(lost) > MOST_LOST:
+                raise nothing
+            return None
 
         if near is not None:
             start = near.estimate.z
         elif start is None:
             start = self._pressed(model, markers)
-        first = model.evaluations + 1
+        first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
+        nothing = NoSolutionError(
+            f"no equilibrium of the {law} law was found near the markers, from rest or from the force of a "
+            "linear finger; see whether the markers are of this finger and load, or take a smaller prior"
+        )
         found = estimate(
             predict,
             measurement.observed,
@@ -262,13 +308,11 @@ class Identifier:
             cost_change=self._cost_change,
             **limits,
         )
+        if (rough := reached.get(found.values.tobytes())) is None:
+            raise nothing
+        model.restart(rough)
         exact = model.response(found.values, EXACT)
-        response = exact or model.response(found.values)
-        if response is None:
-            raise UserError(
-                f"no equilibrium of the {law} law was found near the markers; take a smaller prior"
-            )
-        return Fit(model, found, response, measurement, exact is not None)
+        return Fit(model, found, exact or rough, measurement, exact is not None)
 
     def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
         """Standardised values with the normal force that a linear finger would need, the rest as expected."""
@@ -290,7 +334,7 @@ class Identifier:
         """
         doubtful: dict[int, FloatArray] = {}
         most = len(fit.measurement.kept) // 3
-        while fit.estimate.inflation > 1 and len(doubtful) < most:
+        while not _explained(fit) and len(doubtful) < most:
             found, measurement = fit.estimate, fit.measurement
             pairs = np.arange(2 * len(measurement.kept)).reshape(-1, 2)
             drops = [
@@ -302,12 +346,19 @@ class Identifier:
                 break
             number = int(measurement.kept[worst])
             without = self._fit(fit.law, measurement.only(np.delete(measurement.kept, worst)), fit)
-            if 2 * without.estimate.inflation > found.inflation:
+            if 2 * without.estimate.inflation > found.inflation and not _explained(without):
                 break
             computed, _ = MarkerModel(without.model, measurement).predicted(without.response)
             doubtful[number] = (computed - measurement.observed)[pairs[worst]]
             fit = without
         return fit, doubtful
+
+
+def _explained(fit: Fit) -> bool:
+    """Whether noise and priors explain the markers: neither is φ above one, nor are the values far astray."""
+    found = fit.estimate
+    cost = float(found.residuals @ found.residuals + found.z @ found.z)
+    return found.inflation == 1 and cost < chi2.ppf(1 - 1e-3, len(found.residuals))
 
 
 def carried(response: Response, state: FloatArray) -> Response:

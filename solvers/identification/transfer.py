@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.errors import UserError
 from solvers.identification.field import IdentifiedField
 from solvers.identification.model import EXACT, Response, ResponseModel
 from solvers.problem import Problem, contact_ends
 from solvers.solution import Solution
+from solvers.solver import NoSolutionError
 
 
 def transferred(solution: Solution, problem: Problem, other: Problem) -> Solution:
@@ -73,4 +73,4 @@ def _response(model: ResponseModel, start: Response, share: float, shift: float)
         if abs(missed) < 1e-5:
             return response
         scale += missed / float(direction @ response.contact_slopes @ into)
-    raise UserError("no equilibrium of the identified finger was found at the other load")
+    raise NoSolutionError("no equilibrium of the identified finger was found at the other load")

@@ -1,6 +1,6 @@
 """The unknowns of the inverse problem, their priors, and the finger and contact that they describe."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import log
 from typing import NamedTuple
@@ -10,7 +10,9 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.wall_motion import WallMotion
+from geometry.observations import FIXED
 from solvers.assimilation.estimation import Parameter
+from solvers.assimilation.registration import PARTS, Similarity, registration_parameters
 from solvers.elasticity import Lame, lame_derivatives
 from solvers.identification.boundary import FrontTraction
 from solvers.problem import Material, Problem, contact_ends
@@ -33,6 +35,8 @@ class Hypothesis:
     lame: Lame  # Lamé constants, MPa
     changes: FloatArray  # Of the walls' thickness, shape (k,), mm
     softness: float  # Compliance of the base over Young's modulus, mm/MPa
+    pressed: Similarity  # Takes the picture at rest to the pressed one
+    drawn: Similarity  # Takes the picture at rest to the drawing
 
 
 class HypothesisSlopes(NamedTuple):
@@ -45,20 +49,30 @@ class HypothesisSlopes(NamedTuple):
     moduli: FloatArray
     changes: FloatArray
     softness: FloatArray
+    pressed: FloatArray  # By the values of the similarities, shape (p, 4)
+    drawn: FloatArray
 
 
 class Unknowns:
     """The p unknowns of a problem, in order, and the hypothesis that their values describe.
 
     Args:
-        problem: It has the values of everything else; its load only gives the drawn contact.
+        problem: It has the values of everything else; its load only gives the drawn contact, its observations
+            only how well the frames of their pictures are known.
         names: Some of `NAMES`; a finger without cavities has no walls to be found.
     """
 
     def __init__(self, problem: Problem, names: Sequence[str]) -> None:
         self.problem = problem
         self.traction, self.motion = FrontTraction(problem.mesh), WallMotion.of(problem.mesh)
-        self.names = tuple(name for name in names if name not in WALLS or name in self.motion.names)
+        seen = problem.observations
+        self._centre = np.zeros(2) if seen is None else seen.points.mean(axis=0)
+        self._pictures = [
+            *registration_parameters("pressed", FIXED if seen is None else seen.pressed),
+            *registration_parameters("drawn", FIXED if seen is None else seen.drawn),
+        ]
+        finger = [name for name in names if name not in WALLS or name in self.motion.names]
+        self.names = (*finger, *(parameter.name for parameter in self._pictures))
 
     @property
     def place(self) -> tuple[float, float]:
@@ -99,7 +113,7 @@ class Unknowns:
             # A printed wall is within 5 %; of the wall at the base the clamp may hold more or less.
             share = 0.25 if name == "base_thickness" else 0.05
             known.append(Parameter(name, "mm", drawn, share * drawn * prior, 0.5 * drawn, 2 * drawn))
-        by_name = {parameter.name: parameter for parameter in known}
+        by_name = {parameter.name: parameter for parameter in [*known, *self._pictures]}
         return [by_name[name] for name in self.names]
 
     def hypothesis(self, values: FloatArray) -> Hypothesis:
@@ -115,12 +129,16 @@ class Unknowns:
             lame=material.lame,
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
+            pressed=self.similarity("pressed", named),
+            drawn=self.similarity("drawn", named),
         )
 
     def slopes(self, values: FloatArray) -> HypothesisSlopes:
         """Derivatives of the hypothesis of values, shape (p,)."""
         named, material = self._named(values), self.material(values)
-        by = {name: np.zeros(len(self.names)) for name in (*NAMES, *self.motion.names)}
+        parts = {picture: [f"{picture}_{part}" for part in PARTS] for picture in ("pressed", "drawn")}
+        known = (*NAMES, *self.motion.names, *parts["pressed"], *parts["drawn"])
+        by = {name: np.zeros(len(self.names)) for name in known}
         by |= dict(zip(self.names, np.eye(len(self.names)), strict=True))
         young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
@@ -134,6 +152,8 @@ class Unknowns:
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
             changes=np.array([by[name] for name in self.motion.names]).reshape(-1, len(self.names)).T,
             softness=by["base_compliance"] / young - compliance / young**2 * by["young"],
+            pressed=np.stack([by[name] for name in parts["pressed"]], axis=1),
+            drawn=np.stack([by[name] for name in parts["drawn"]], axis=1),
         )
 
     def material(self, values: FloatArray) -> Material:
@@ -141,6 +161,10 @@ class Unknowns:
         named = self._named(values)
         changed = {name: value for name, value in named.items() if name in ("young", "poisson")}
         return self.problem.material.model_copy(update=changed)
+
+    def similarity(self, picture: str, named: Mapping[str, float]) -> Similarity:
+        """The similarity of `pressed` or `drawn` pictures with values by name, zero for the rest."""
+        return Similarity(self._centre, np.array([named.get(f"{picture}_{part}", 0.0) for part in PARTS]))
 
     def _named(self, values: FloatArray) -> dict[str, float]:
         return dict(zip(self.names, map(float, values), strict=True))

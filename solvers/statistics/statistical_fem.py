@@ -35,7 +35,7 @@ from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import ElementSettings, Progress, check_problem, silent
+from solvers.solver import ElementSettings, NoSolutionError, Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel, MarkerPrediction, with_markers_left_out
 from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField
 
@@ -108,7 +108,7 @@ class StatFemSolver(ElementSettings):
             there = load.model_copy(update={"displacement": tuple(displacement)})
             solution = fem.solve(replace(problem, load=there, observations=None), progress)
             if not solution.status.converged:
-                raise UserError(f"statfem: {fem.name} {solution.status.message}")
+                raise NoSolutionError(f"statfem needs {fem.name}: {solution.status.message}")
             return cast(LagrangeField, solution.field)
 
         if problem.material.law == "linear":
