@@ -1,6 +1,5 @@
 """Measured or simulated displacements of the markers."""
 
-import re
 from dataclasses import dataclass
 from math import inf
 
@@ -8,67 +7,7 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, frozen_array
 from geometry.errors import ShapeError, UserError
-
-
-@dataclass(frozen=True)
-class Registration:
-    """How well a picture's frame is known: standard deviations of a similarity about the markers' middle.
-
-    Raises:
-        UserError: If one of them is negative or infinite.
-    """
-
-    turn: float = 0.0  #: Degrees.
-    shift: float = 0.0  #: Of each component, mm.
-    scale: float = 0.0  #: A share: 0.01 is one per cent.
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0 <= value < inf:
-                raise UserError(f"the {name} of a picture must be known to zero or more, got {value:g}")
-
-    @property
-    def fixed(self) -> bool:
-        """True if the frame is known exactly."""
-        return not (self.turn or self.shift or self.scale)
-
-    @classmethod
-    def parse(cls, text: str) -> "Registration":
-        """Read `fixed`, `free`, or such as `turn 2 deg, shift 0.3 mm, scale 1 %`, of which all are optional.
-
-        Raises:
-            UserError: If the text says something else.
-        """
-        if text.strip().lower() in (names := {"fixed": FIXED, "free": FREE}):
-            return names[text.strip().lower()]
-        found = {}
-        for part in text.split(","):
-            known = re.fullmatch(r"\s*(turn|shift|scale)\s+([0-9.eE+-]+)\s*(deg|mm|%)\s*", part)
-            if known is None or {"turn": "deg", "shift": "mm", "scale": "%"}[known[1]] != known[3]:
-                break
-            try:
-                found[known[1]] = float(known[2]) / (100 if known[3] == "%" else 1)
-            except ValueError:
-                break
-        else:
-            return cls(**found)
-        raise UserError(
-            f"{text.strip()!r} is neither fixed, free nor like 'turn 2 deg, shift 0.3 mm, scale 1 %'"
-        )
-
-    def __str__(self) -> str:
-        if self.fixed:
-            return "fixed"
-        return f"turn {self.turn:g} deg, shift {self.shift:g} mm, scale {100 * self.scale:g} %"
-
-
-FIXED = Registration()
-"""Of a picture in whose frame lengths and directions are known."""
-FREE = Registration(turn=10.0, shift=5.0, scale=0.05)
-"""Of a picture in whose frame little more is known than which side is up."""
-HAND_HELD = Registration(turn=5.0, shift=1.0, scale=0.02)
-"""Of a photograph by hand from about the place of another one: pictures of real fingers were turned by 2 to 5
-degrees."""
+from geometry.registration import FIXED, Registration
 
 
 @dataclass(frozen=True, eq=False)

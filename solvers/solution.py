@@ -11,6 +11,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.notebook import fact_table
+from geometry.registration import Pictures
 from solvers.elasticity import energy_density_of, strain_of, stress_of, von_mises
 from solvers.problem import Problem
 
@@ -138,6 +139,7 @@ class Solution:
     #: Where the indenter presses, from a solver of finite strain; None if it does not touch
     contact: Contact | None = None
     identified: IdentifiedForce | None = None  #: The force, from a solver that identifies it
+    pictures: Pictures | None = None  #: Frames of the observations' pictures, from a solver that finds them
 
     def displacement(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.
@@ -155,6 +157,10 @@ class Solution:
         if isinstance(self.field, MovedWallsField):
             return self.field.displacement_in_space(self._locate(points))
         return self.displacement(points)
+
+    def shown(self, points: FloatArray, displacement: FloatArray) -> FloatArray:
+        """What the observations' pictures show of the displacement of points, all of shape (n, 2), mm."""
+        return displacement if self.pictures is None else self.pictures.shown(points, displacement)
 
     def gradient(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2)."""

@@ -402,10 +402,11 @@ def test_the_docs_have_every_column_of_measurements():
 def test_the_measurements_in_the_docs_can_be_read(tmp_path):
     from vision.measurements import read_measurements
 
-    (block,) = [block for block in blocks(MEASUREMENTS) if block.language == "csv"]
+    table, frames = [block.text for block in blocks(MEASUREMENTS) if block.language == "csv"]
     path = tmp_path / "markers.csv"
-    path.write_text(block.text, encoding="utf-8")
+    path.write_text(frames + table, encoding="utf-8")
     observations = read_measurements(path, marker_radius=0.8)
+    assert (observations.pressed.turn, observations.drawn.scale) == (3.0, 0.003)
     assert observations.label == "measured"
     assert list(observations.visible) == [True, True, False]
     np.testing.assert_allclose(observations.points, marker_positions(load_design())[:3], atol=0.005)

@@ -11,7 +11,8 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
-from geometry.observations import FIXED, HAND_HELD, Observations, Registration
+from geometry.observations import Observations
+from geometry.registration import FIXED, HAND_HELD, Registration
 
 POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")

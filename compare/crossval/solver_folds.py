@@ -159,7 +159,8 @@ class FoldRunner:
         own = replace(self.problem, material=solution.problem.material)  # a solver may have estimated it
         status, faults = self._body.status(solution)
         against = [*faults, *([] if status.converged else [f"did not converge: {solution.status.message}"])]
-        errors = sampled.markers - observations[fold.load_case].displacements
+        shown = solution.shown(observations[0].points, sampled.markers)
+        errors = shown - observations[fold.load_case].displacements
         if not np.isfinite(errors).all():
             raise UserError(f"{self._solver.name}: its displacement is not finite at every marker")
         return FoldResult(

@@ -105,6 +105,8 @@ class Evaluation:
     twin: str | None = None  #: Name of the finite-element solver that fits the markers in the same way.
     #: Displacement of each marker as the solver predicts it without that marker, shape (m, 2), mm.
     left_out: FloatArray | None = None
+    #: What the measurement's pictures show of the markers' displacement, if the solver found their frames.
+    shown: FloatArray | None = None
     solid: bool = False  #: Whether the field is a plane of a body in three dimensions.
     #: Displacement of the nodes at every row of the history, shape (k, n, 2), mm, if the load was followed.
     path: FloatArray | None = None
@@ -124,6 +126,8 @@ class Evaluation:
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             inside, nodes = (mesh.locate_on(solution.problem.mesh, place.points) for place in (inside, nodes))
         state, displacement = solution.state(inside), solution.displacement(nodes)
+        markers = np.asarray(mesh.markers if markers is None else markers, dtype=np.float64)
+        at_markers = solution.displacement_in_space(markers)
         return cls(
             solver=solution.solver,
             law=solution.problem.material.law,
@@ -136,7 +140,7 @@ class Evaluation:
                 for name, value in solution.stats.items()
             },
             history={name: np.asarray(column) for name, column in solution.history.items()},
-            marker_displacement=solution.displacement_in_space(mesh.markers if markers is None else markers),
+            marker_displacement=at_markers,
             node_displacement=displacement[: len(mesh.points)],
             edge_displacement=displacement[len(mesh.points) :],
             weights=quadrature.weights,
@@ -148,6 +152,7 @@ class Evaluation:
             energy_density=state.energy_density,
             in_sample=solution.problem.observations is not None,
             left_out=solution.left_out,
+            shown=solution.shown(markers, at_markers) if solution.pictures else None,
             solid=isinstance(solution.field, SolidField),
             path=np.stack([state.displacement(nodes)[: len(mesh.points)] for state in solution.states])
             if solution.states
@@ -163,6 +168,11 @@ class Evaluation:
     def label_at_markers(self) -> str:
         """The label for errors at the markers, marked if the solver was given those markers."""
         return f"{self.label}{' †' * self.in_sample}"
+
+    @property
+    def shown_displacement(self) -> FloatArray:
+        """Displacement of the markers, mm, as in the measurement's pictures: shape (m, 2)."""
+        return self.marker_displacement if self.shown is None else self.shown
 
     @property
     def finite(self) -> bool:

@@ -37,7 +37,7 @@ MEANS = MarkerErrors._fields[2:]
 
 def marker_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors:
     """Absolute and mean absolute errors at the markers, in-sample for a solver that assimilated them."""
-    return _errors(evaluation.marker_displacement, observations)
+    return _errors(evaluation.shown_displacement, observations)
 
 
 def held_out_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors | None:

@@ -97,7 +97,7 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Results, evalua
     body.clamp(axes, body.base_lines(mesh), size=body.hatch_size(mesh.points))
     seen = observations.visible
     observed = observations.points[seen] + observations.displacements[seen]
-    computed = observations.points + evaluation.marker_displacement
+    computed = observations.points + evaluation.shown_displacement
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec="white", mew=2.0, zorder=4)
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec=MEASURED, mew=1.1, zorder=5)
     axes.plot(*computed.T, "x", ms=4, color="white", mew=2.0, zorder=4)

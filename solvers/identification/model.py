@@ -7,7 +7,7 @@ is the place of the contact; with the tangent K there,
 
 A marker is at a fixed place P of the drawn body; where the walls have moved by W, the material there was
 drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
-`solvers.assimilation.registration` has what pictures show of that whose frames are unknown.
+`geometry.registration` has what pictures show of that whose frames are unknown.
 """
 
 from dataclasses import dataclass, replace
@@ -284,7 +284,11 @@ class MarkerModel:
         """Values in the order of `MarkerData.observed`, shape (n,), and their derivatives (n, p)."""
         hypothesis, state, slopes = response.hypothesis, response.state, response.slopes
         by = self.unknowns.slopes(response.values)
-        points, pressed, drawing = self.measurement.points, hypothesis.pressed, hypothesis.drawn
+        points, pressed, drawing = (
+            self.measurement.points,
+            hypothesis.pictures.pressed,
+            hypothesis.pictures.drawn,
+        )
         count = len(self.moved_rows)
         moves = np.append(hypothesis.changes, drawing.values)[:count]
         by_moves = np.concatenate([by.changes, by.drawn], axis=1)[:, :count]

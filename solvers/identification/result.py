@@ -146,6 +146,7 @@ class Identified:
             left_out=leave_one_out_displacements(problem, left_out),
             uncertainty=Uncertainty(field.standard_deviation, field.von_mises_deviation),
             identified=self.force(),
+            pictures=hypothesis.pictures if best.model.unknowns.unregistered else None,
         )
 
     def _residuals(self) -> tuple[FloatArray, FloatArray]:

@@ -10,9 +10,8 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.wall_motion import WallMotion
-from geometry.observations import FIXED
+from geometry.registration import FIXED, Pictures, Registration, Similarity
 from solvers.assimilation.estimation import Parameter
-from solvers.assimilation.registration import PARTS, Similarity, registration_parameters
 from solvers.elasticity import Lame, lame_derivatives
 from solvers.identification.boundary import FrontTraction
 from solvers.problem import Material, Problem, contact_ends
@@ -22,6 +21,10 @@ WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson")
 NAMES = (*DEFAULT, "young")
 """Everything that can be found; the table of docs/how-to/force.md describes each."""
+
+
+PARTS = {"turn": "deg", "shift_x": "mm", "shift_y": "mm", "scale": ""}
+"""Values of a similarity, with their units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +38,7 @@ class Hypothesis:
     lame: Lame  # Lamé constants, MPa
     changes: FloatArray  # Of the walls' thickness, shape (k,), mm
     softness: float  # Compliance of the base over Young's modulus, mm/MPa
-    pressed: Similarity  # Takes the picture at rest to the pressed one
-    drawn: Similarity  # Takes the picture at rest to the drawing
+    pictures: Pictures
 
 
 class HypothesisSlopes(NamedTuple):
@@ -68,11 +70,16 @@ class Unknowns:
         seen = problem.observations
         self._centre = np.zeros(2) if seen is None else seen.points.mean(axis=0)
         self._pictures = [
-            *registration_parameters("pressed", FIXED if seen is None else seen.pressed),
-            *registration_parameters("drawn", FIXED if seen is None else seen.drawn),
+            *_of_picture("pressed", FIXED if seen is None else seen.pressed),
+            *_of_picture("drawn", FIXED if seen is None else seen.drawn),
         ]
         finger = [name for name in names if name not in WALLS or name in self.motion.names]
         self.names = (*finger, *(parameter.name for parameter in self._pictures))
+
+    @property
+    def unregistered(self) -> bool:
+        """True if the frame of a picture is to be found."""
+        return bool(self._pictures)
 
     @property
     def place(self) -> tuple[float, float]:
@@ -129,8 +136,7 @@ class Unknowns:
             lame=material.lame,
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
-            pressed=self.similarity("pressed", named),
-            drawn=self.similarity("drawn", named),
+            pictures=Pictures(*(self.similarity(picture, named) for picture in ("pressed", "drawn"))),
         )
 
     def slopes(self, values: FloatArray) -> HypothesisSlopes:
@@ -168,6 +174,16 @@ class Unknowns:
 
     def _named(self, values: FloatArray) -> dict[str, float]:
         return dict(zip(self.names, map(float, values), strict=True))
+
+
+def _of_picture(picture: str, registration: Registration) -> list[Parameter]:
+    """The unknown values of the similarity of a picture, with their priors; none where it is fixed."""
+    deviations = (registration.turn, registration.shift, registration.shift, registration.scale)
+    return [
+        Parameter(f"{picture}_{part}", unit, 0.0, deviation)
+        for (part, unit), deviation in zip(PARTS.items(), deviations, strict=True)
+        if deviation
+    ]
 
 
 def parse_unknowns(solver: str, text: str) -> tuple[str, ...]:

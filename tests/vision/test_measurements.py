@@ -1,5 +1,6 @@
 """Marker displacements as CSV, as written here and as they come from elsewhere; units mm."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.observations import Observations
+from geometry.registration import FIXED, FREE, HAND_HELD, Registration
 from vision.measurements import read_measurements, write_measurements
 
 HEADER = "x_mm,y_mm,u_mm,v_mm"
@@ -54,6 +56,38 @@ def test_what_was_written_is_read_back_to_the_last_digit(tmp_path, source, simul
     for name in ("points", "displacements", "standard_deviations", "visible"):
         np.testing.assert_array_equal(getattr(back, name), getattr(written, name), err_msg=name)
     assert (back.source, back.simulated) == (source, simulated)
+
+
+FREED = Registration(turn=1.5, shift=0.2, scale=0.004)
+
+
+@pytest.mark.parametrize("clicked", [True, False])
+@pytest.mark.parametrize(("pressed", "drawn"), [(FIXED, FIXED), (FREED, FIXED), (HAND_HELD, FREE)])
+def test_how_well_the_pictures_are_known_is_read_back(tmp_path, clicked, pressed, drawn):
+    path = tmp_path / "markers.csv"
+    deviations = np.full((5, 2), 0.3 if clicked else 0.001)
+    write_measurements(
+        path, replace(observations(), standard_deviations=deviations, pressed=pressed, drawn=drawn)
+    )
+    back = read_measurements(path, marker_radius=0.6)
+    assert (back.pressed, back.drawn) == (pressed, drawn)
+
+
+@pytest.mark.parametrize(
+    ("mark", "deviation", "known"),
+    [
+        ("", 0.3, HAND_HELD),
+        ("", 0.01, FIXED),
+        ("", 0.0, FIXED),  # none was given
+        ("# simulated", 0.3, FIXED),
+        ("# Pressed picture: fixed", 0.3, FIXED),
+    ],
+)
+def test_points_that_were_clicked_have_a_pressed_picture_by_hand(tmp_path, mark, deviation, known):
+    lines = [mark, f"{HEADER},std_u_mm,std_v_mm", f"1,2,3,4,{deviation},{deviation}"]
+    found = read(tmp_path, "\n".join(lines))
+    assert (found.pressed, found.drawn) == (known, FIXED)
+    assert ("the pressed picture's frame is known to turn 5 deg" in found.origin) == (known == HAND_HELD)
 
 
 def test_a_source_of_several_lines_stays_a_comment(tmp_path):

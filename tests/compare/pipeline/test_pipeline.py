@@ -26,7 +26,7 @@ from geometry.observations import Observations
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, silent
+from solvers.solver import NoSolutionError, Progress, silent
 from tests.compare.pipeline.runs import compare
 from vision.measurements import read_measurements
 
@@ -286,6 +286,15 @@ def test_a_run_goes_on_without_a_solver_that_raises(job):
     assert json.loads((out / "run.json").read_text())["failed"] == {"second": line}
     assert "solver second raised RuntimeError" in (out / "report.html").read_text()
     compare(job(Scripted("first"), Scripted("third"), resume=True))  # its file is one of the run's own
+
+
+def test_a_run_goes_on_without_a_solver_that_finds_no_solution(job):
+    """Nobody needs a traceback of that."""
+    found = compare(job(Scripted("first"), Scripted("second", NoSolutionError("no equilibrium near rest"))))
+    assert [evaluation.solver for evaluation in found.evaluations] == ["first"]
+    assert found.failed == {"second": "second found no solution: no equilibrium near rest"}
+    assert not (job().out / "errors").exists()
+    assert "no equilibrium near rest" in (job().out / "report.html").read_text()
 
 
 @pytest.mark.parametrize("reference", [None, "second"], ids=["nothing is left", "it is the reference"])

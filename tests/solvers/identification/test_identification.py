@@ -7,10 +7,11 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
+from geometry.registration import FIXED, HAND_HELD, Registration, Similarity
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import FemBody, FemIdSolver
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
-from solvers.identification.unknowns import CONTACT, DEFAULT, Unknowns
+from solvers.identification.unknowns import CONTACT, DEFAULT, PARTS, Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import observed_at
@@ -141,14 +142,41 @@ def test_moved_walls_are_a_moved_mesh(problem):
     assert energies[0] == pytest.approx(energies[1], rel=1e-9)
 
 
+PICTURES = {
+    f"{picture}_{part}": value
+    for picture, values in (("pressed", (2.0, 0.3, -0.2, 0.01)), ("drawn", (-1.0, 0.1, 0.2, -0.01)))
+    for part, value in zip(PARTS, values, strict=True)
+}
+"""Pictures that are turned, shifted and scaled."""
+
+
+@pytest.fixture(scope="module")
+def unregistered(problem):
+    """The model and the markers with pictures whose frames are unknown."""
+    observed = observed_at(problem.mesh.markers, np.zeros((9, 2)), NOISE)
+    loose = Registration(turn=2.0, shift=0.3, scale=0.01)
+    observed = replace(observed, pressed=loose, drawn=loose)
+    model = model_of(replace(problem, observations=observed))
+    return model, MarkerModel(model, MarkerData.of(problem.mesh, observed, None, None))
+
+
+@pytest.mark.parametrize("name", [*PICTURES, "normal_force", "base_compliance", "rib_thickness"])
+def test_derivatives_by_the_frames_pass_the_taylor_test(unregistered, name):
+    check_taylor(*unregistered, name, VALUES | PICTURES)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_derivatives_pass_the_taylor_test(model, markers, name):
+    check_taylor(model, markers, name, VALUES)
+
+
+def check_taylor(model, markers, name, values):
     """What the first-order expansion of the markers leaves falls by four or more when the step is halved.
 
     It is rounding where the markers are linear in the parameter to six digits.
     """
     unknowns = model.unknowns
-    here, which = values_of(unknowns), unknowns.names.index(name)
+    here, which = values_of(unknowns, values), unknowns.names.index(name)
     model.restart(None)
     response = model.response(here, 1e-9)
     assert response is not None
@@ -201,6 +229,30 @@ def test_a_twin_is_found_with_its_law(identified):
     size = np.linalg.norm(true.hypothesis.force)
     assert solution.stats["force_low"] < size < solution.stats["force_high"]
     np.testing.assert_allclose(solution.reaction, true.hypothesis.force, rtol=0.1, atol=0.02)
+
+
+@pytest.mark.parametrize("known", [Registration(turn=3.0, shift=0.3, scale=0.01), HAND_HELD])
+def test_the_frame_of_the_pressed_picture_is_found(problem, known):
+    """Turned by 3 degrees, shifted by 0.3 mm and scaled by 1 %: the force is as if nothing were wrong."""
+    observed, true = twin(problem, "st-venant-kirchhoff", TRUE)
+    moved = Similarity(observed.points.mean(axis=0), np.array([3.0, 0.3, -0.3, 0.01]))
+    shown = moved.moved(observed.points + observed.displacements) - observed.points
+    loose = replace(observed, displacements=shown, pressed=known)
+    found = FemIdSolver(degree=1).solve(replace(problem, observations=loose))
+    assert found.status.converged
+    for part, value in zip(PARTS, moved.values, strict=True):
+        stats = [found.stats[f"pressed_{part}{end}"] for end in ("_low", "", "_high")]
+        assert stats[0] < value < stats[2], (part, value, stats)
+    size = np.linalg.norm(true.hypothesis.force)
+    assert found.stats["force_low"] < size < found.stats["force_high"]
+    assert found.stats["force"] == pytest.approx(size, rel=0.1)
+    # What it says of the pictures is what they show; the field is the finger's own.
+    field = found.displacement_in_space(observed.points)
+    np.testing.assert_allclose(found.shown(observed.points, field), shown, atol=4 * NOISE)
+    np.testing.assert_allclose(field, observed.displacements, atol=0.6)
+    fixed = FemIdSolver(degree=1).solve(replace(problem, observations=replace(loose, pressed=FIXED)))
+    assert fixed.stats["inflation"] > 3  # it has no such picture
+    assert fixed.pictures is None
 
 
 def test_the_field_and_its_deviations_hold_the_truth(identified, problem):

@@ -1,0 +1,71 @@
+"""Similarities between pictures: forward, back, derivatives; what a measurement says of its pictures."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.registration import FIXED, FREE, Pictures, Registration, Similarity
+
+RNG = np.random.default_rng(5)
+POINTS = RNG.normal(size=(7, 2)) * 30
+VALUES = np.array([3.0, 0.3, -0.4, 0.01])
+SIMILAR = Similarity(POINTS.mean(axis=0), VALUES)
+
+
+def test_a_similarity_turns_scales_and_shifts():
+    quarter = Similarity(np.array([1.0, 0.0]), np.array([90.0, 0.5, 0.0, 1.0]))
+    np.testing.assert_allclose(quarter.moved(np.array([[2.0, 0.0]])), [[1.5, 2.0]], atol=1e-12)
+
+
+def test_undone_it_gives_the_points_back():
+    np.testing.assert_allclose(SIMILAR.undone(SIMILAR.moved(POINTS)), POINTS, atol=1e-12)
+
+
+def test_one_without_values_changes_no_digit():
+    still = Similarity(POINTS.mean(axis=0), np.zeros(4))
+    np.testing.assert_array_equal(still.moved(POINTS), POINTS)
+    np.testing.assert_array_equal(still.undone(POINTS), POINTS)
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_derivatives_are_those_of_differences(part):
+    step = 1e-6 * np.eye(4)[part]
+    ends = [Similarity(SIMILAR.centre, VALUES + side * step).moved(POINTS) for side in (-1, 1)]
+    np.testing.assert_allclose(SIMILAR.slopes(POINTS)[part], (ends[1] - ends[0]) / 2e-6, rtol=1e-7, atol=1e-7)
+
+
+def test_a_finger_at_rest_shows_the_motion_of_the_picture():
+    """A wrong drawing shows nothing by itself: both pictures are in its frame."""
+    fixed = Similarity(SIMILAR.centre, np.zeros(4))
+    still = np.zeros_like(POINTS)
+    np.testing.assert_allclose(Pictures(fixed, SIMILAR).shown(POINTS, still), 0, atol=1e-12)
+    shown = Pictures(SIMILAR, fixed).shown(POINTS, still)
+    np.testing.assert_allclose(shown, SIMILAR.moved(POINTS) - POINTS, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "known"),
+    [
+        ("fixed", FIXED),
+        (" Free ", FREE),
+        ("turn 2 deg, shift 0.3 mm, scale 1 %", Registration(2.0, 0.3, 0.01)),
+        ("scale 0.5%", Registration(scale=0.005)),
+        ("shift 1e-1 mm,turn 3deg", Registration(turn=3.0, shift=0.1)),
+    ],
+)
+def test_a_text_says_how_well_a_frame_is_known(text, known):
+    assert Registration.parse(text) == known
+    assert Registration.parse(str(known)) == known
+
+
+@pytest.mark.parametrize(
+    "text", ["", "loose", "turn 2", "turn 2 mm", "turn --2 deg", "shift 1 mm; scale 1 %"]
+)
+def test_another_text_is_refused_with_an_example(text):
+    with pytest.raises(UserError, match="neither fixed, free nor like 'turn 2 deg"):
+        Registration.parse(text)
+
+
+def test_a_negative_deviation_is_refused():
+    with pytest.raises(UserError, match="the turn of a picture"):
+        Registration(turn=-1.0)
