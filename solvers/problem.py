@@ -222,7 +222,7 @@ class Problem:
         content: list[object] = [self.mesh.digest, self.material.model_dump(), self.load.model_dump()]
         if (seen := self.observations) is not None:
             content += [seen.points, seen.displacements, seen.standard_deviations, seen.visible]
-            content.append(seen.marker_radius)
+            content += [seen.marker_radius, *vars(seen.pressed).values(), *vars(seen.drawn).values()]
         if self.finger is not None:
             content.append(self.finger.digest)
         return content_hash(content)

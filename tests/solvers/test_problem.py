@@ -1,10 +1,14 @@
 """The boundary-value problem: the load's functional, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from geometry.errors import UserError
+from geometry.registration import Registration
 from solvers.problem import Load, Material, Physics, Problem, contact_ends, contact_functional, contact_nodes
+from tests.solvers.conftest import observed_at
 
 
 def test_the_mean_is_weighted_by_a_raised_cosine(coarse_mesh):
@@ -22,6 +26,14 @@ def test_the_point_load_is_the_contacts_middle_node(coarse_mesh):
     points, weights = contact_functional(Problem(coarse_mesh, load=Load(kind="point")))
     np.testing.assert_allclose(points, [[35.0, 0.0]], atol=1e-12)
     assert weights.tolist() == [1.0]
+
+
+def test_the_digest_depends_on_how_well_the_pictures_are_known(coarse_mesh):
+    """Else a resumed run would take over the solution from before the file said so."""
+    seen = observed_at(coarse_mesh.markers, np.zeros((9, 2)), 0.01)
+    loose = Registration(turn=1.0)
+    kinds = [seen, replace(seen, pressed=loose), replace(seen, drawn=loose)]
+    assert len({Problem(coarse_mesh, observations=each).digest for each in kinds}) == 3
 
 
 def test_the_digest_depends_on_everything_that_defines_the_problem(coarse_mesh, medium_mesh):
