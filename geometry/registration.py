@@ -41,7 +41,7 @@ class Registration:
 
     @classmethod
     def parse(cls, text: str) -> "Registration":
-        """Read `fixed`, `free`, or such as `turn 2 deg, shift 0.3 mm, scale 1 %`, of which all are optional.
+        """Read `fixed`, `free`, or `turn 2 deg, shift 0.3 mm, scale 1 %`, or some of these parts.
 
         Raises:
             UserError: If the text says something else.
@@ -51,7 +51,11 @@ class Registration:
         found = {}
         for part in text.split(","):
             known = re.fullmatch(r"\s*(turn|shift|scale)\s+([0-9.eE+-]+)\s*(deg|mm|%)\s*", part)
-            if known is None or {"turn": "deg", "shift": "mm", "scale": "%"}[known[1]] != known[3]:
+            if (
+                known is None
+                or known[1] in found
+                or {"turn": "deg", "shift": "mm", "scale": "%"}[known[1]] != known[3]
+            ):
                 break
             try:
                 found[known[1]] = float(known[2]) / (100 if known[3] == "%" else 1)
@@ -99,11 +103,12 @@ class Similarity:
     def slopes(self, points: FloatArray) -> FloatArray:
         """Derivatives (4, n, 2) of the new places of points, shape (n, 2), by the values."""
         offset, degree = points - self.centre, np.pi / 180
-        turn = degree * self.values[0]
-        rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
         quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
         by_shift = np.broadcast_to(np.eye(2)[:, None], (2, *points.shape))
-        by_turn, by_scale = degree * offset @ (quarter @ self.matrix).T, offset @ rotation.T
+        by_turn, by_scale = (
+            degree * offset @ (quarter @ self.matrix).T,
+            offset @ self.matrix.T / (1 + self.values[3]),
+        )
         return np.concatenate([by_turn[None], by_shift, by_scale[None]])
 
     @property

@@ -78,7 +78,7 @@ def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> F
             axes.set_axis_off()
             edges = body[boundary_edges(comparison.mesh.triangles)]
             axes.add_collection(LineCollection(list(edges), colors=BODY, lw=0.7, path_effects=RIM))
-            computed = comparison.observations.points + evaluation.marker_displacement
+            computed = comparison.observations.points + evaluation.shown_displacement
             _markers(axes, tracking, plane.pixels(computed))
             _name(axes, comparison, evaluation)
         label = f"markers, {comparison.observations.label}"

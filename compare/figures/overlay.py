@@ -96,15 +96,18 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Results, evalua
     body.draw_outline(axes, canvas.outline, deformed, width=0.4)
     body.clamp(axes, body.base_lines(mesh), size=body.hatch_size(mesh.points))
     seen = observations.visible
-    observed = observations.points[seen] + observations.displacements[seen]
-    computed = observations.points + evaluation.shown_displacement
+    # In the finger's frame: what the pictures show besides its displacement is taken off.
+    off = evaluation.shown_displacement - evaluation.marker_displacement
+    observed = (observations.points + observations.displacements - off)[seen]
+    computed = observations.points + evaluation.marker_displacement
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec="white", mew=2.0, zorder=4)
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec=MEASURED, mew=1.1, zorder=5)
     axes.plot(*computed.T, "x", ms=4, color="white", mew=2.0, zorder=4)
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
     axes.set_title(evaluation.label_at_markers, size=9, pad=3, y=1.0, weight="bold")
     if observations.known:
-        body.write_note(axes, canvas.extent, errors_note(evaluation, observations))
+        frame = "" if evaluation.shown is None else "; the frame it found is taken off the markers"
+        body.write_note(axes, canvas.extent, errors_note(evaluation, observations) + frame)
 
 
 def errors_note(evaluation: Evaluation, observations: Observations) -> str:

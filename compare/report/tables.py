@@ -91,6 +91,8 @@ def write_table_one(path: Path, comparison: Results) -> None:
 def write_markers(path: Path, comparison: Results) -> None:
     """Write a row a marker: its place and observed motion, every solver's displacement and its errors.
 
+    A displacement is what the measurement's pictures show of it, if the solver found their frames.
+
     The cells of observations and errors are empty at markers that were not seen; those of held-out errors
     are also empty where a solver that was given the marker does not tell its prediction without it.
     """
@@ -107,7 +109,7 @@ def write_markers(path: Path, comparison: Results) -> None:
         row |= {"observations": observations.label, "visible": int(seen)}
         row |= {"observed_u_mm": u if seen else "", "observed_v_mm": v if seen else ""}
         for each, error, held_out in errors:
-            name, (own_u, own_v) = each.solver, each.marker_displacement[marker].tolist()
+            name, (own_u, own_v) = each.solver, each.shown_displacement[marker].tolist()
             row |= {f"{name}_converged": int(each.converged), f"{name}_in_sample": int(each.in_sample)}
             row |= {f"{name}_u_mm": own_u, f"{name}_v_mm": own_v}
             for kind, found in (("ae", error), ("held_out_ae", held_out)):

@@ -284,11 +284,8 @@ class MarkerModel:
         """Values in the order of `MarkerData.observed`, shape (n,), and their derivatives (n, p)."""
         hypothesis, state, slopes = response.hypothesis, response.state, response.slopes
         by = self.unknowns.slopes(response.values)
-        points, pressed, drawing = (
-            self.measurement.points,
-            hypothesis.pictures.pressed,
-            hypothesis.pictures.drawn,
-        )
+        points = self.measurement.points
+        pressed, drawing = hypothesis.pictures.pressed, hypothesis.pictures.drawn
         count = len(self.moved_rows)
         moves = np.append(hypothesis.changes, drawing.values)[:count]
         by_moves = np.concatenate([by.changes, by.drawn], axis=1)[:, :count]

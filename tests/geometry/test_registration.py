@@ -59,7 +59,8 @@ def test_a_text_says_how_well_a_frame_is_known(text, known):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "loose", "turn 2", "turn 2 mm", "turn --2 deg", "shift 1 mm; scale 1 %"]
+    "text",
+    ["", "loose", "turn 2", "turn 2 mm", "turn --2 deg", "turn 1 deg, turn 2 deg", "shift 1 mm; scale 1 %"],
 )
 def test_another_text_is_refused_with_an_example(text):
     with pytest.raises(UserError, match="neither fixed, free nor like 'turn 2 deg"):

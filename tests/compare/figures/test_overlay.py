@@ -1,21 +1,28 @@
 """The picture of the deformed finger."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
+from matplotlib.text import Text
 
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.overlay import draw_overlay
 from geometry.observations import Observations
+from geometry.registration import Pictures, Similarity
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
 from tests.compare.conftest import BendingField
 from tests.compare.figures.drawn_pages import page_of
 
 
+@pytest.mark.parametrize("turned", [False, True], ids=["fixed", "the picture's frame was found"])
 def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_markers(
-    mesh, compared, monkeypatch
+    mesh, compared, monkeypatch, turned
 ):
+    """And on the body: the found frame of the pictures is taken off what was observed, and said."""
     points = np.array([[2.3, -1.1], [7.7, -3.2]])
     solution = Solution(
         solver="bent",
@@ -26,31 +33,40 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
         status=Status(True, "a closed form"),
         stats={},
     )
+    pressed = Similarity(points.mean(axis=0), np.array([3.0, 0.1, 0.2, 0.01]))
+    if turned:
+        still = Similarity(points.mean(axis=0), np.zeros(4))
+        solution = replace(solution, pictures=Pictures(pressed, still))
+    field = solution.displacement(points)
     observations = Observations(
         points=points,
-        displacements=np.zeros((2, 2)),
+        displacements=pressed.moved(points + field) - points if turned else field,
         standard_deviations=np.zeros((2, 2)),
         visible=np.ones(2, dtype=bool),
         source="a test",
         simulated=True,
         marker_radius=0.8,
     )
-    crosses = []
+    crosses, circles = [], []
     plot = Axes.plot
 
     def watched(axes: Axes, *arguments: object, **options: object) -> object:
         if isinstance(arguments[-1], str) and arguments[-1] == "x":
             crosses.append(np.column_stack(arguments[:2]))
+        if isinstance(arguments[-1], str) and arguments[-1] == "o":
+            circles.append(np.column_stack(arguments[:2]))
         return plot(axes, *arguments, **options)
 
     monkeypatch.setattr(Axes, "plot", watched)
     evaluation = Evaluation.of(solution, mesh, points)
-    page_of(draw_overlay(compared(evaluation, observations=observations)))
+    page = page_of(draw_overlay(compared(evaluation, observations=observations)))
     x, y = points.T
     expected = points + np.stack([0.01 * y**2, -0.02 * x**2], axis=1)
-    assert len(crosses) > 0
-    for drawn in crosses:
+    assert len(crosses) == len(circles) > 0
+    for drawn in (*crosses, *circles):
         np.testing.assert_allclose(drawn, expected, rtol=1e-12)
+    said = any("the frame it found" in text.get_text() for text in page.figure.findobj(Text))
+    assert said == turned
 
 
 def test_a_cylinder_is_drawn_where_it_ends(mesh, fem, compared):

@@ -14,7 +14,10 @@ DATA = Path(__file__).parents[2] / "data" / "printed-fingers"
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "stroke"), [("A", 16.0), ("B", 18.0)])
 def test_mechanics_predict_a_real_finger_better_than_none(name, stroke):
-    """Nothing is set by hand: the pressed picture, whose turn nobody knows, is an unknown of the fit."""
+    """Nothing is set by hand: the pressed picture, whose turn nobody knows, is an unknown of the fit.
+
+    `gp` and `statfem` take the pictures as they are.
+    """
     finger, load = pr.load_drawing(DATA / f"{name}.svg"), Load(displacement=(0.0, -stroke))
 
     def left_out(solver: str) -> float:
