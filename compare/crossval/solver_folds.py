@@ -159,7 +159,9 @@ class FoldRunner:
         own = replace(self.problem, material=solution.problem.material)  # a solver may have estimated it
         status, faults = self._body.status(solution)
         against = [*faults, *([] if status.converged else [f"did not converge: {solution.status.message}"])]
-        shown = solution.shown(observations[0].points, sampled.markers)
+        shown = sampled.markers
+        if fold.load_case == 0:  # the picture at another load has another frame
+            shown = solution.shown(observations[0].points, shown)
         errors = shown - observations[fold.load_case].displacements
         if not np.isfinite(errors).all():
             raise UserError(f"{self._solver.name}: its displacement is not finite at every marker")

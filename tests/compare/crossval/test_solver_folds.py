@@ -14,6 +14,7 @@ from geometry.arrays import FloatArray
 from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
+from geometry.registration import Pictures, Similarity
 from solvers.assimilation.misfit import misfit_of
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
@@ -169,6 +170,23 @@ def test_force_place_and_stated_intervals_are_judged_by_the_truth(task, coarse_m
     found = score([[full]])
     assert found.force.mean == pytest.approx(1.0)
     assert (found.force_within, found.position_within) == (1.0, 0.0)
+
+
+def test_errors_are_those_in_the_picture_whose_frame_was_found(task, truth, observations, monkeypatch):
+    """The picture at half the load is another one."""
+    centre = observations.points.mean(axis=0)
+    turned = Similarity(centre, np.array([3.0, 0.3, -0.2, 0.01]))
+    pictures = Pictures(turned, Similarity(centre, np.zeros(4)))
+    results = []
+    for label, each in (("fixed", truth), ("turned", replace(truth, pictures=pictures))):
+        monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_, each=each: lambda _: each)
+        results.append(judged(replace(task, variant=replace(task.variant, label=label))))
+    for fixed, found in zip(*results, strict=True):
+        moved = observations.displacements if fixed.fold.load_case == 0 else 0.0
+        field = np.array(fixed.errors) + moved
+        shown = pictures.shown(observations.points, field) if fixed.fold.load_case == 0 else field
+        np.testing.assert_allclose(found.errors, shown - moved, atol=1e-12)
+        assert fixed.fields == found.fields
 
 
 def test_the_stress_is_that_of_the_material_that_a_solver_has_found(task, truth, monkeypatch):

@@ -64,6 +64,17 @@ def test_errors_are_against_the_observations(markers: Rows) -> None:
     assert float(markers[2]["fem_ae_v_mm"]) == pytest.approx(0.4)
 
 
+def test_displacements_are_of_the_frame_of_their_errors(tmp_path, fem, observations, compared):
+    """In the picture whose frame the solver found, all markers lie another 0.2 mm along x."""
+    found = replace(fem, solver="found", shown=fem.marker_displacement + np.array([0.2, 0.0]))
+    write_markers(tmp_path / "markers.csv", compared(fem, found, observations=observations))
+    for row in read(tmp_path / "markers.csv"):
+        off = [float(row[f"found_{axis}_mm"]) - float(row[f"observed_{axis}_mm"]) for axis in "uv"]
+        errors = [float(row[f"found_ae_{axis}_mm"]) for axis in "uv"]
+        assert np.abs(off) == pytest.approx(errors)
+        assert errors == pytest.approx([0.1, 0.4])
+
+
 def test_a_marker_that_was_not_seen_has_no_observation_and_no_error(markers: Rows) -> None:
     empty = {name for name, cell in markers[1].items() if cell == ""}
     kinds = ("ae", "held_out_ae")

@@ -11,9 +11,11 @@ from geometry.registration import FIXED, HAND_HELD, Registration, Similarity
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import FemBody, FemIdSolver
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
+from solvers.identification.search import LAWS, MOST_LOST, Identifier
 from solvers.identification.unknowns import CONTACT, DEFAULT, PARTS, Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
+from solvers.solver import NoSolutionError
 from tests.solvers.conftest import observed_at
 
 NOISE = 0.01
@@ -163,6 +165,25 @@ def unregistered(problem):
 @pytest.mark.parametrize("name", [*PICTURES, "normal_force", "base_compliance", "rib_thickness"])
 def test_derivatives_by_the_frames_pass_the_taylor_test(unregistered, name):
     check_taylor(*unregistered, name, VALUES | PICTURES)
+
+
+def test_a_finger_beside_its_drawing_shows_what_lies_where_the_markers_are(problem, unregistered):
+    """The drawing is 0.02 mm and 0.02 degrees off; second order in that is left."""
+    loose, markers = unregistered
+    off = {"drawn_turn": 0.02, "drawn_shift_x": 0.02, "drawn_shift_y": -0.015}
+    response = loose.response(values_of(loose.unknowns, VALUES | off), EXACT)
+    assert response is not None
+    pictures, points = response.hypothesis.pictures, markers.measurement.points
+    there = pictures.drawn.moved(points)
+    fixed = model_of(problem)
+    moved = MarkerModel(fixed, MarkerData.of(problem.mesh, observed_at(there, 0 * there, NOISE), None, None))
+    exact = fixed.response(values_of(fixed.unknowns), EXACT)
+    assert exact is not None
+    shown = pictures.shown(points, moved.predicted(exact)[0].reshape(-1, 2))
+    found = markers.predicted(response)[0].reshape(-1, 2)
+    np.testing.assert_allclose(found, shown, atol=5e-4)
+    start = markers.predicted(loose.response(values_of(loose.unknowns, VALUES), EXACT))[0].reshape(-1, 2)
+    assert np.abs(start - shown).max() > 3e-3
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -340,6 +361,64 @@ def test_a_wrong_marker_is_found_and_not_used(identified, problem):
     assert solution.stats["force"] == pytest.approx(right.stats["force"], rel=0.1)
     np.testing.assert_allclose(solution.left_out[5], right.left_out[5], atol=5 * NOISE)
     assert np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
+
+
+def failing(monkeypatch, *laws):
+    """Let fits of some laws find no equilibrium."""
+    fit = Identifier._fit
+
+    def failed(self, law, *arguments, **options):
+        if law in laws:
+            raise NoSolutionError(f"no equilibrium of the {law} law")
+        return fit(self, law, *arguments, **options)
+
+    monkeypatch.setattr(Identifier, "_fit", failed)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_without_an_equilibrium_is_left_out_and_said(identified, problem, monkeypatch, law):
+    failing(monkeypatch, law)
+    (other,) = [each for each in LAWS if each != law]
+    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+    assert solution.problem.material.law == other
+    assert f"no equilibrium of the {law} law was found near the markers" in solution.status.message
+    assert f"probability {law}" not in solution.stats
+
+
+def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, problem, monkeypatch):
+    settled = Identifier._settled
+
+    def lost(self, fit):
+        if fit.law == "st-venant-kirchhoff":
+            raise NoSolutionError("no equilibrium near the markers")
+        return settled(self, fit)
+
+    monkeypatch.setattr(Identifier, "_settled", lost)
+    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+    assert solution.problem.material.law == "neo-hookean"
+    assert "no equilibrium of the st-venant-kirchhoff law" in solution.status.message
+
+
+def test_without_any_law_it_has_no_solution(identified, problem, monkeypatch):
+    failing(monkeypatch, *LAWS)
+    with pytest.raises(NoSolutionError, match="no equilibrium of the"):
+        FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+
+
+def test_a_search_ends_where_few_hypotheses_have_an_equilibrium(identified, problem, monkeypatch):
+    """Beyond a limit load it would halve its steps for a minute."""
+    asked = []
+
+    def response(self, values, *arguments, **options):
+        self.evaluations += 1
+        asked.append(values)
+        return known(self, values, *arguments, **options) if len(asked) < 3 else None
+
+    known = ResponseModel.response
+    monkeypatch.setattr(ResponseModel, "response", response)
+    with pytest.raises(NoSolutionError, match="see whether the markers are of this finger and load"):
+        FemIdSolver(degree=1, law="given").solve(replace(problem, observations=identified[0]))
+    assert len(asked) <= 2 + 1 + MOST_LOST
 
 
 def test_three_hidden_markers_open_the_intervals(identified, problem):
