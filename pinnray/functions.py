@@ -112,7 +112,7 @@ def solve(
         remarks += displacement_remarks(given, problem)
     solution = solved(chosen, problem)
     status, faults = DeformedBody(problem.mesh).status(solution)
-    for remark in [*remarks, *faults]:
+    for remark in [*status.warnings, *remarks, *faults]:
         warnings.warn(remark, stacklevel=2)
     return replace(solution, status=status)
 

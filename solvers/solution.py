@@ -62,6 +62,10 @@ class Contact(NamedTuple):
     end: float  #: The other end
 
 
+def _interval(value: float, low: float, high: float) -> str:
+    return f"{value:.4g} ({low:.4g} to {high:.4g})"
+
+
 class Estimated(NamedTuple):
     """A number estimated from markers, with its 95 % interval."""
 
@@ -76,6 +80,13 @@ class IdentifiedForce(NamedTuple):
     size: Estimated  #: N/mm
     position: Estimated | None  #: Contact's abscissa on the drawn front, mm; None where it was no unknown
 
+    def phrase(self, depth: float | None = None) -> str:
+        """Force and place with their intervals in words; in N as well for a finger of a depth, mm."""
+        said = f"force {_interval(*self.size)} N/mm"
+        if depth is not None:
+            said += f", {_interval(*(depth * value for value in self.size))} N over {depth:g} mm"
+        return said if self.position is None else f"{said}, at x = {_interval(*self.position)} mm"
+
 
 @dataclasses.dataclass(frozen=True)
 class Status:
@@ -83,6 +94,7 @@ class Status:
 
     converged: bool  #: Whether the solver's own criterion was met
     message: str  #: A sentence on the outcome, with advice if it has not converged
+    warnings: Sequence[str] = ()  #: What speaks against what the solver was given, a sentence each
 
 
 def unstable_phrase(directions: int) -> str:
@@ -161,6 +173,12 @@ class Solution:
     def shown(self, points: FloatArray, displacement: FloatArray) -> FloatArray:
         """What the observations' pictures show of the displacement of points, all of shape (n, 2), mm."""
         return displacement if self.pictures is None else self.pictures.shown(points, displacement)
+
+    @property
+    def force_phrase(self) -> str:
+        """The force that was identified, in words; empty if there is none."""
+        finger = self.problem.finger
+        return self.identified.phrase(finger.depth if finger else None) if self.identified else ""
 
     def gradient(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2)."""

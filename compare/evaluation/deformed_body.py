@@ -87,7 +87,7 @@ class DeformedBody:
         """The status of a solution after the checks of `with_body_checks`, and a remark on each fault."""
         faults = self.faults(solution.displacement(self._space.at_nodes()))
         status, law = solution.status, solution.problem.material.law
-        judged = Status(*_judged(bool(status.converged), status.message, law, faults))
+        judged = Status(*_judged(bool(status.converged), status.message, law, faults), status.warnings)
         return judged, [f"{solution.solver}: {fault}; {ADVICE[fault]}" for fault in faults]
 
 

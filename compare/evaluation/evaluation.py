@@ -5,7 +5,7 @@ They are kept as an archive of NumPy arrays: a run is resumed, and a result comp
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from geometry.atomic import write_arrays
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.lagrange import LagrangeSpace
-from solvers.solution import SolidField, Solution
+from solvers.solution import IdentifiedForce, SolidField, Solution
 
 
 class FieldDifference(NamedTuple):
@@ -71,6 +71,7 @@ def _magnitude(values: FloatArray) -> FloatArray:
 
 
 QUADRATURE_DEGREE = 2
+DIFFERENCES, FORCE = TypeAdapter(ReferenceDifferences | None), TypeAdapter(IdentifiedForce | None)
 IN_SAMPLE = "† was given these markers: its errors there are training errors"
 """Meaning of the mark in `Evaluation.label_at_markers`."""
 
@@ -107,6 +108,8 @@ class Evaluation:
     left_out: FloatArray | None = None
     #: What the measurement's pictures show of the markers' displacement, if the solver found their frames.
     shown: FloatArray | None = None
+    identified: IdentifiedForce | None = None  #: The force that was found from the markers.
+    warnings: Sequence[str] = ()  #: What speaks against what the solver was given, a sentence each.
     solid: bool = False  #: Whether the field is a plane of a body in three dimensions.
     #: Displacement of the nodes at every row of the history, shape (k, n, 2), mm, if the load was followed.
     path: FloatArray | None = None
@@ -133,6 +136,8 @@ class Evaluation:
             law=solution.problem.material.law,
             converged=bool(solution.status.converged),
             message=solution.status.message,
+            warnings=list(solution.status.warnings),
+            identified=solution.identified,
             energy=float(solution.energy),
             reaction=np.asarray(solution.reaction, dtype=np.float64),
             stats={
@@ -216,8 +221,8 @@ class Evaluation:
             prefix = "history_"
             columns = [name for name in arrays if name.startswith(prefix)]
             header["history"] = {name.removeprefix(prefix): arrays.pop(name) for name in columns}
-            adapter = TypeAdapter(ReferenceDifferences | None)
-            header["uncertainty"] = adapter.validate_python(header["uncertainty"])
+            header["uncertainty"] = DIFFERENCES.validate_python(header["uncertainty"])
+            header["identified"] = FORCE.validate_python(header["identified"])
             return cls(**header, **arrays)
         except Exception as error:  # a damaged file can make the reader raise anything
             warnings.warn(

@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.errors import OutsideBodyError, UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from solvers.identification.contradiction import likely_order, order_words
 from solvers.problem import Load, Problem
 from solvers.registry import MissingLibraryError, make_solver
 from solvers.solver import NONE_SEEN
@@ -35,6 +36,9 @@ UNLIKE = 0.5
 strain it is 0.92 or more on five designs with strokes up to 15 mm, and at most 0.06 with u and v swapped."""
 SIZES = 3.0
 """Ratio of measured to linear displacements that is unlikely; at finite strain it is 0.86 to 1."""
+MUCH_NEARER = 0.75
+"""Share of the distance from `fem` to which another order of the markers has to bring them: 0.53 to 0.58
+where they were in reverse order, numbered one off or had their walls swapped."""
 SMALL = 0.1
 """Share of the stroke below which `fem`'s displacements at the markers say little of a direction."""
 
@@ -123,13 +127,13 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
     stroke = float(np.abs(problem.load.values).max())
     if float(np.sqrt((expected**2).sum(axis=1).mean())) < SMALL * stroke:
         return remarks
-    return [*remarks, *_compared(moved, expected, stroke, number, apart=apart)]
+    return [*remarks, *_compared(moved, expected, stroke, np.flatnonzero(seen) + 1, apart=apart)]
 
 
 def _compared(
-    moved: FloatArray, expected: FloatArray, stroke: float, number: int, *, apart: bool
+    moved: FloatArray, expected: FloatArray, stroke: float, numbers: IntArray, *, apart: bool
 ) -> list[str]:
-    """Remarks on displacements beside those of `fem`, shapes (m, 2), mm; marker `number` moved farthest.
+    """Remarks on displacements of markers of `numbers`, (m,), beside those of `fem`, shapes (m, 2), mm.
 
     At one place, where markers are not `apart`, their direction says nothing: finite strain changes it.
     """
@@ -152,15 +156,22 @@ def _compared(
         looks = f"these look like {unit}, or the stroke was another" if unit else "check unit and stroke"
         remarks.append(f"{sized}; {looks}")
     elif (far := np.linalg.norm(moved, axis=1).max()) > SIZES * np.linalg.norm(expected, axis=1).max():
+        number = numbers[np.linalg.norm(moved, axis=1).argmax()]
         remarks.append(f"marker {number} moved by {far:.4g} mm, {SIZES:g} times farther than any in fem")
     moves_along = apart and np.abs(moved[:, 0]).max() > SMALL * stroke
+    turned = moves_along and _cosine(moved[:, 0], expected[:, 0]) < -0.7  # at finite strain it falls to 0
     if own < UNLIKE:
         remarks.append(
             f"the markers' displacements are unlike those of fem (cosine {own:.2f}); check markers, columns, "
             "signs and load"
         )
-    elif moves_along and _cosine(moved[:, 0], expected[:, 0]) < -0.7:  # at finite strain it falls to 0
+    elif turned:
         remarks.append("u goes against that of fem: its sign looks reversed (u is positive towards the tip)")
+    if apart and not turned and (order := likely_order(moved, expected, MUCH_NEARER)) is not None:
+        remarks.append(
+            f"the markers' displacements are much nearer to those of fem {order_words(order, numbers)}; see "
+            "how they are numbered"
+        )
     return remarks
 
 

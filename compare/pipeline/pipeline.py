@@ -125,7 +125,10 @@ def compute(job: Job, stages: Stages, folder: Path) -> Results:
         settings={each.name: each.settings() for each in solvers if each.name in outcome.evaluations},
         unsupported=unsupported | outcome.unsupported,
         failed={name: _with_traceback(folder, name, reason) for name, reason in outcome.failed.items()},
-        warnings=[*unit_remarks(problem), *remarks, *impossible, *branches],
+        warnings=[
+            *(f"{each.solver}: {text}" for each in evaluations for text in each.warnings),
+            *(*unit_remarks(problem), *remarks, *impossible, *branches),
+        ],
     )
 
 

@@ -73,6 +73,8 @@ def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
         "energy": evaluation.energy,
         "reaction": evaluation.reaction.tolist(),
         "stats": dict(evaluation.stats),
+        "force": evaluation.identified
+        and {name: part and part._asdict() for name, part in evaluation.identified._asdict().items()},
         "certificate": evaluation.certificate and evaluation.certificate.numbers(),
         "markers": {
             "in_sample": evaluation.in_sample,

@@ -182,15 +182,20 @@ def _held_out_cells(own: Metrics) -> list[str]:
 
 def _force_interval(name: str, own: Metrics, metrics: Metrics) -> str:
     """The force that a solver found, with its 95 % interval, beside the true one where that is known."""
-    low, high = own["stats"].get("force_low"), own["stats"].get("force_high")
-    if low is None or high is None:
+    if not own.get("force"):
         return ""
-    size, source = hypot(*own["reaction"]), metrics["measurements"]["source"]
+    (size, low, high), place = own["force"]["size"].values(), own["force"]["position"]
+    source, depth = metrics["measurements"]["source"], metrics["design"].get("depth")
     interval = f"95 % interval {number(low, 3)} to {number(high, 3)}"
     said = f"{name} finds a force of {number(size, 3)} N/mm ({interval})"
+    if depth:
+        said += f", {number(size * depth, 3)} N over the depth of {depth:g} mm,"
+    if place:
+        middle, start, end = (number(place[key], 3) for key in ("value", "low", "high"))
+        said += f" at x = {middle} mm ({start} to {end} mm)"
     if own["force_to_truth_rel"] is None:
         return f"{said} from the {source} markers."
-    true = size / (1 + own["force_to_truth_rel"])
+    true = hypot(*own["reaction"]) / (1 + own["force_to_truth_rel"])
     where = "inside" if low <= true <= high else "outside"
     return f"{said} from the {source} markers; that of the simulated finger is {number(true, 3)}, {where} it."
 

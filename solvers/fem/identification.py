@@ -20,8 +20,10 @@ from solvers.fem.equilibrium import QUADRATURE_DEGREE
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import Factorisation
 from solvers.identification.body import Linearised
+from solvers.identification.contradiction import with_doubts
 from solvers.identification.model import ResponseModel
-from solvers.identification.search import LAWS, Identifier, IdentifyingSolver
+from solvers.identification.search import Identifier
+from solvers.identification.settings import LAWS, IdentifyingSolver
 from solvers.identification.tracker import ForceTracker, LawTracker
 from solvers.identification.unknowns import DEFAULT, Unknowns
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -180,14 +182,20 @@ class FemIdSolver(IdentifyingSolver):
             plain = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
             said = f"without markers, this is {self.model}: {plain.status.message}"
             return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
-        return self.refitter(problem)(problem.observations, progress)
+        found = with_doubts(
+            lambda given: self.refitter(replace(problem, observations=given))(given, progress),
+            problem.observations,
+            lambda given: self._identifier(problem).expected(given),
+        )
+        progress(1.0, found.force_phrase)
+        return found
 
     def refitter(self, problem: Problem) -> Callable[..., Solution]:
         """A function that finds the unknowns for other observations; see `Refittable`.
 
         Fits share the elements; each search starts from the last result. It takes a progress, too.
         """
-        identifier = Identifier(self, problem, lambda unknowns: FemBody(unknowns, self.degree))
+        identifier = self._identifier(problem)
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
             started = time.perf_counter()
@@ -201,6 +209,9 @@ class FemIdSolver(IdentifyingSolver):
             return found.solution(self.name, replace(problem, observations=observations), stats)
 
         return fitted
+
+    def _identifier(self, problem: Problem) -> Identifier:
+        return Identifier(self, problem, lambda unknowns: FemBody(unknowns, self.degree))
 
 
 def fem_law_tracker(

@@ -113,7 +113,12 @@ class Identified:
             place = Estimated(float(found.values[which]), *map(float, found.intervals[which]))
         return IdentifiedForce(Estimated(size, max(size - half, 0.0), size + half), place)
 
-    def solution(self, name: str, problem: Problem, stats: Mapping[str, float | int | str]) -> Solution:
+    def solution(
+        self,
+        name: str,
+        problem: Problem,
+        stats: Mapping[str, float | int | str],
+    ) -> Solution:
         """The solution by the most probable law, with deviations that the others widen.
 
         Args:
@@ -141,6 +146,7 @@ class Identified:
             status=Status(
                 best.estimate.converged and best.exact and not unstable,
                 f"{unstable_phrase(unstable)}; {sentence}" if unstable else sentence,
+                [f"{said}, and was left out" for said in self._contradictions()],
             ),
             stats={**stats, **self.stats(), "unstable_directions": unstable},
             left_out=leave_one_out_displacements(problem, left_out),
@@ -164,6 +170,13 @@ class Identified:
         for marker, off in self.doubtful.items():
             left_out[marker] = -off
         return missed, left_out
+
+    def _contradictions(self) -> list[str]:
+        """A clause on each marker that was not believed."""
+        return [
+            f"MARKER {number + 1} of those seen CONTRADICTS the others by {np.linalg.norm(off):.2g} mm"
+            for number, off in self.doubtful.items()
+        ]
 
     def stats(self) -> dict[str, float | int | str]:
         """All that was found, for tables: parameters, how well they are known, force and laws."""
@@ -225,11 +238,7 @@ class Identified:
             shares = zip(self.fits, self.probabilities, strict=True)
             parts.append("law " + ", ".join(f"{fit.law} {share:.1%}" for fit, share in shares) + " probable")
         parts += [f"no equilibrium of the {law} law was found near the markers" for law in self.lost]
-        for number, off in self.doubtful.items():
-            far = np.linalg.norm(off)
-            parts.append(
-                f"MARKER {number + 1} of those seen CONTRADICTS the others by {far:.2g} mm: not used"
-            )
+        parts += [f"{said}: not used" for said in self._contradictions()]
         parts.append(f"markers missed by {np.sqrt((missed**2).mean()):.2g} mm (root mean square)")
         if found.inflation > 1:
             parts.append(

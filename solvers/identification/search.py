@@ -1,34 +1,26 @@
-"""Contact, walls and law from the markers: the settings, the search, and doubtful markers.
+"""Contact, walls and law from the markers: the search, and markers that contradict the others.
 
 Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, Chapman and Hall 1982, for the misfit
 without an observation.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import ClassVar, Literal, get_args
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Prediction, estimate
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
 from solvers.identification.result import Fit, Identified
-from solvers.identification.transfer import transferred
-from solvers.identification.unknowns import DEFAULT, Unknowns, parse_unknowns
+from solvers.identification.settings import LAWS, IdentifyingSolver
+from solvers.identification.unknowns import Unknowns
 from solvers.problem import Problem
-from solvers.solution import Solution
 from solvers.solver import NoSolutionError, Progress, silent
-
-LAWS: tuple[LawName, ...] = ("neo-hookean", "st-venant-kirchhoff")
-"""The laws of finite strain to choose from."""
-
-LawChoice = Literal["evidence", "given"]
 
 QUICK = 4
 """Steps in which a law is judged first."""
@@ -38,62 +30,6 @@ IMPROBABLE = 15.0
 
 MOST_LOST = 8
 """Hypotheses without equilibrium at which a search ends: near a limit load there are ever more of them."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class IdentifyingSolver:
-    """A solver that identifies contact, walls and law.
-
-    Attributes:
-        parameters: Names of the unknowns, with commas between them, of `solvers.identification.unknowns`;
-            empty for all but `young`.
-        law: "evidence": the law of finite strain with the largest evidence; "given": the problem's.
-        prior: Factor of the parameters' prior standard deviations.
-        reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
-        reaction_error: Standard deviation of the reaction over its size.
-        marker_radius: Radius of the discs over which the displacement is averaged, mm; None: the
-            observations' own; zero: the markers' centres alone.
-    """
-
-    parameters: str = ""
-    law: LawChoice = "evidence"
-    prior: float = 1.0
-    reaction: float | None = None
-    reaction_error: float = 0.02
-    marker_radius: float | None = None
-    name: ClassVar[str]
-    assimilates: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        if self.law not in get_args(LawChoice):
-            raise UserError(f"{self.name}: law must be {' or '.join(get_args(LawChoice))}, got {self.law!r}")
-        if "young" in self.unknowns and self.reaction is None:
-            raise UserError(
-                f"{self.name} cannot find young from displacements alone: forces and stresses are in "
-                "proportion to it; give reaction=, N/mm"
-            )
-        for setting in ("prior", "reaction_error"):
-            if not (np.isfinite(value := getattr(self, setting)) and value > 0):
-                raise UserError(f"{self.name}: {setting} must be positive, got {value}")
-        if self.reaction is not None and not (np.isfinite(self.reaction) and self.reaction):
-            raise UserError(
-                f"{self.name}: the reaction must be a force other than zero, N/mm, got {self.reaction}"
-            )
-        if self.marker_radius is not None and not 0 <= self.marker_radius < np.inf:
-            raise UserError(f"{self.name}: marker_radius must be zero or more, got {self.marker_radius}")
-
-    def settings(self) -> dict[str, object]:
-        """Unknowns, law, priors and discretisation."""
-        return asdict(self)
-
-    def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
-        """The solution at another load with the finger of a solution; see `transfer`."""
-        return transferred(solution, problem, other)
-
-    @property
-    def unknowns(self) -> tuple[str, ...]:
-        """Names of the unknowns."""
-        return parse_unknowns(self.name, self.parameters) if self.parameters else DEFAULT
 
 
 class Identifier:
@@ -134,6 +70,16 @@ class Identifier:
         if chosen.reaction is not None:
             reaction = chosen.reaction, chosen.reaction_error * abs(chosen.reaction)
         return MarkerData.of(self._mesh, observations, chosen.marker_radius, reaction)
+
+    def expected(self, observations: Observations) -> FloatArray:
+        """Displacements of the markers seen, shape (m, 2), mm per N/mm: of a linear finger, drawn contact."""
+        model = next(iter(self.models.values()))
+        at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
+        if at_rest is None:
+            raise NoSolutionError("the finger has no equilibrium near rest")
+        markers = MarkerModel(model, self.measurement(observations))
+        slope = markers.predicted(at_rest)[1][:, self._names.index("normal_force")]
+        return slope[: 2 * len(markers.measurement.kept)].reshape(-1, 2)
 
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
         """The unknowns under every law, and the laws' probabilities.

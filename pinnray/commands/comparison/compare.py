@@ -134,11 +134,16 @@ def compare(
             console.print(marker_table(comparison))
             console.print()
         console.print(body_table(comparison))
+        for evaluation in comparison.evaluations:
+            if evaluation.identified:
+                found = evaluation.identified.phrase(job.design.depth)
+                console.print(f"{evaluation.label} found: {found}", soft_wrap=True, highlight=False)
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
     for fault in comparison.failed.values():
         say(f"error: {fault}")
     for evaluation in comparison.unconverged:
-        say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
+        told = evaluation.message in evaluation.warnings
+        say(f"error: {evaluation.solver} did not converge{'' if told else f': {evaluation.message}'}")
     done = not (comparison.failed or comparison.unconverged) and tolerance_reached(comparison.adaptation)
     return 0 if done else NOT_CONVERGED
 

@@ -88,7 +88,7 @@ def solve(
             written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
             write_force_displacement(written[1], curves, load, depth=chosen.depth)
             draw_force_displacement(curves, depth=chosen.depth).save(written[2])
-    for remark in remarks:
+    for remark in [*evaluation.warnings, *remarks]:
         say(f"warning: {remark}")
     print(f"{evaluation.label}: {evaluation.message}")
     u, v = solution.reaction

@@ -11,9 +11,11 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.elasticity import LawName
+from solvers.identification.contradiction import with_doubts
 from solvers.identification.model import ResponseModel
 from solvers.identification.result import Fit, Identified
-from solvers.identification.search import LAWS, Identifier, IdentifyingSolver, carried
+from solvers.identification.search import Identifier, carried
+from solvers.identification.settings import LAWS, IdentifyingSolver
 from solvers.identification.unknowns import Unknowns
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.identification.network_body import NetworkBody
@@ -67,7 +69,13 @@ class PinnIdSolver(IdentifyingSolver):
         """Find the unknowns and solve with them; see `Solver`. Without markers it solves for the load."""
         check_problem(self, problem)
         if problem.observations is not None:
-            return self._solved(problem, problem.observations, progress)[0]
+            found = with_doubts(
+                lambda given: self._solved(problem, given, progress)[0],
+                problem.observations,
+                lambda given: self._identifier(problem, self.coarse).expected(given),
+            )
+            progress(1.0, found.force_phrase)
+            return found
         network = self._network
         level = replace(
             network,

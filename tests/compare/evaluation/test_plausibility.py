@@ -157,3 +157,15 @@ def test_markers_that_hardly_move_in_fem_say_nothing_of_directions(measured, pro
     beside_base = replace(reversed_, points=np.vstack([[2.0, -1.0], measured.points[1:]]))
     (remark,) = displacement_remarks(beside_base, problem)
     assert remark.startswith("one marker was seen")
+
+
+def test_another_order_of_the_markers_is_warned_of(measured, problem):
+    """Reversed, numbered one off, and two walls swapped; a factor makes no other order likely."""
+    count = len(measured.points)
+    swapped = np.arange(count).reshape(-1, 3)[:, [1, 0, 2]].ravel()
+    for order in (np.arange(count)[::-1], np.roll(np.arange(count), 1), swapped):
+        mixed = replace(measured, displacements=measured.displacements[order])
+        remarks = displacement_remarks(mixed, problem)
+        assert any("see how they are numbered" in remark for remark in remarks), order
+    smaller = replace(measured, displacements=0.5 * measured.displacements)
+    assert displacement_remarks(smaller, problem) == []

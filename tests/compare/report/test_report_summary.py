@@ -12,6 +12,7 @@ from compare.report.output_files import metrics
 from compare.report.summary import RunAnswer, answers
 from compare.report.text import truth_sentences
 from geometry.observations import Observations
+from solvers.solution import Estimated, IdentifiedForce
 
 TRUST, MARKERS, CONVERGED = (
     "May the network be trusted here?",
@@ -96,8 +97,11 @@ def test_measured_markers_are_never_called_simulated(compared, fem, given, obser
 
 @pytest.mark.parametrize(("low", "word"), [(0.4, "inside"), (0.6, "outside")])
 def test_a_found_force_has_its_interval(compared, fem, given, evaluate, low, word):
-    found = replace(given, stats={**given.stats, "force_low": low, "force_high": 0.8})
+    found = replace(given, identified=IdentifiedForce(Estimated(0.5, low, 0.8), Estimated(36.0, 35.0, 37.5)))
     sentences = asked(compared(fem, found, truth=evaluate("fem-nonlinear", 1.0)))[MARKERS].sentences
+    said = sentences[-1].replace("\N{NO-BREAK SPACE}", " ")
+    assert f"0.500 N/mm (95 % interval {low:.3f} to 0.800), 10.0 N over the depth of 20 mm" in said
+    assert "at x = 36.0 mm (35.0 to 37.5 mm)" in said
     assert f"that of the simulated finger is 0.500, {word} it." in sentences[-1]
 
 

@@ -51,6 +51,7 @@ SOLVER = {
     "energy": Real,
     "reaction": list,
     "stats": dict,
+    "force": (dict, type(None)),
     "certificate": CERTIFICATE,
     "markers": {"in_sample": bool, "ae_u": list, "ae_v": list, **ERRORS},
     "held_out": {"ae_u": list, "ae_v": list, **ERRORS},

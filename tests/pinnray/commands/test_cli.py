@@ -70,6 +70,23 @@ def test_json_prints_the_metrics_and_nothing_else(folder, capsys, without_pictur
     assert output.err == ""
 
 
+def test_markers_that_no_finger_explains_are_said_first(folder, capsys, without_pictures):
+    """They were in reverse order: the run had ended with 0, "converged" and no warning."""
+    markers = Path(__file__).parents[2] / "data" / "second-renderer" / "reversed.csv"
+    given = "--mesh-size 3 --set contact_position=36.5 --stroke 9.5 --solvers fem,fem-id --out here"
+    assert main(["compare", *given.split(), "--measurements", str(markers)]) == NOT_CONVERGED
+    told = json.loads(Path("here/metrics.json").read_text())
+    assert told["solvers"]["fem-id"]["status"] == "not converged"
+    assert "in reverse order their displacements fit" in told["warnings"][0]
+    assert told["solvers"]["fem-id"]["force"]["size"]["value"] > 0
+    output = capsys.readouterr()
+    assert output.err.index(told["warnings"][0]) < output.err.index("error: fem-id did not converge")
+    assert "fem-id (not converged) found: force" in output.out
+    report = Path("here/report.html").read_text()
+    assert report.index("What speaks against these numbers?") < report.index("What is not converged?")
+    assert "in reverse order" in report
+
+
 @pytest.mark.parametrize("options", [["--quiet"], ["--json"]])
 def test_quiet_does_not_hide_an_error(folder, capsys, options):
     assert main(["compare", "--solvers", "fen", *options]) == BAD_INPUT
