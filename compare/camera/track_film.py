@@ -131,12 +131,13 @@ def _sentence(film: Film, tracking: Tracking) -> str:
     """One sentence on the source and the accuracy of the displacements."""
     initial, final = (len(end) for end in tracking.rest)
     deviations = np.sqrt(np.diag(tracking.displacement_covariance)) if tracking.visible.any() else np.zeros(1)
+    aligned = f"; {tracking.alignment}" if tracking.alignment else ""
     camera = "a calibrated camera" if film.camera else "no calibrated camera"
     origin = f"{RIG_MARK}, tracked" if tracking.simulated else "measured"
     return (
         f"{origin} by pinnray track ({film.method}, {camera}) in {Path(film.source).name}, "
         f"means of {initial} and {final} frames at rest, standard deviations {deviations.min():.2g} to "
-        f"{deviations.max():.2g} mm"
+        f"{deviations.max():.2g} mm{aligned}"
     )
 
 
@@ -166,6 +167,7 @@ def track_summary(tracking: Tracking, observations: Observations) -> dict[str, A
         "markers": len(tracking.visible),
         "visible": int(tracking.visible.sum()),
         "offset_rms_mm": float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1)))),
+        "alignment": tracking.alignment and tracking.alignment.numbers(),
         "displacement_covariance_mm2": tracking.displacement_covariance.tolist(),
         "warnings": list(tracking.warnings),
         "description": observations.source,

@@ -7,13 +7,14 @@ Covariances come from linear propagation of covariances by the implicit function
 A. Zisserman, "Multiple View Geometry", 2nd ed., 2003, chapter 5). Units: pixels, mm.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import cv2
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.registration import Similarity
 from vision.calibration.camera import Camera, Pose
 
 CORNERS = 24
@@ -90,6 +91,10 @@ class MarkerPlane:
         middle = [((of + np.roll(of, -1, axis=1)) * turns).sum(axis=1) for of in (x, y)]
         return np.asarray(np.stack(middle, axis=1) / (3 * turns.sum(axis=1)[:, None]))
 
+    def aligned(self, similarity: Similarity) -> "MarkerPlane":
+        """The plane in the frame to which a similarity takes its points."""
+        return replace(self, projection=AlignedProjection(self.projection, similarity))
+
     def scales(self, points: FloatArray) -> FloatArray:
         """Pixels per mm at points of the plane, shape (n,): the root of the ratio of areas."""
         return np.asarray(
@@ -121,6 +126,27 @@ class MarkerPlane:
         blocks = covariance.reshape(count, 2, count, 2)
         blocks[np.arange(count), :, np.arange(count)] += own
         return np.asarray(covariance)
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedProjection:
+    """A projection of a plane whose points a similarity has taken to another frame."""
+
+    projection: PlaneProjection
+    similarity: Similarity
+
+    def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
+        """See `PlaneProjection`."""
+        return self.projection.pixels(self.similarity.undone(points), parameters)
+
+    def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
+        """See `PlaneProjection`."""
+        return self.similarity.moved(self.projection.points(pixels, parameters))
+
+    def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
+        """See `PlaneProjection`."""
+        before = self.projection.jacobians(self.similarity.undone(points), parameters)
+        return before._replace(point=before.point @ np.linalg.inv(self.similarity.matrix))
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.errors import UserError
+from geometry.registration import HAND_HELD
 from vision.discs.disc_detector import FLOOR, DiscDetections
 from vision.frames.frame import Frame, Frames
 from vision.tracking.camera_motion import CameraMotion, find_camera_motion
@@ -16,7 +17,11 @@ from vision.tracking.scene import FilmedScene
 from vision.tracking.trajectories import Tracking
 
 FAR = 0.5
-"""Root mean square distance of the markers at rest from the design's, mm, that is worth a warning."""
+"""Root mean square distance of the markers at rest from the design's, mm, that is worth a warning, ..."""
+UNLIKE = 0.1
+"""... and the distance that may remain once they are aligned."""
+SCALE = 0.003
+"""Change of scale between the film and the drawing that is worth a warning."""
 SHAKE = 0.3
 """Shift of the fiducials between start and end, pixels, that is worth a warning."""
 
@@ -96,7 +101,9 @@ def track(
         final_plane=motion.planes[1] if motion and motion.planes else None,
     )
     if motion is None:
-        return _oriented_by_motion(scene, tracking)
+        return _oriented_by_motion(scene, replace(tracking, pressed=HAND_HELD))
+    if scene.method == "precise":
+        tracking = tracking.aligned()
     warnings = [*_warnings(scene, tracking, after, motion)]
     if scene.workspace.simulated and not frames.simulated:
         warnings.append(
@@ -177,9 +184,32 @@ def _warnings(
             f"the fiducials moved by {motion.shift:.2f} pixels between start and end: the camera was not at "
             f"rest, {known}"
         )
-    far = float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1))))
-    if far > FAR:
-        yield f"at rest the markers are {far:.2f} mm (rms) from where the design has them"
+    if tracking.visible.any():
+        yield from _rest_warnings(tracking)
     if not tracking.visible.all():
         names = ", ".join(str(number + 1) for number in np.nonzero(~tracking.visible)[0])
         yield f"not seen at rest both before and after, so reported missing: marker {names}"
+
+
+def _rest_warnings(tracking: Tracking) -> Iterator[str]:
+    """Warnings on the markers at rest beside the design's."""
+    found = tracking.alignment
+    far = float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1)))) if found is None else found.before
+    if far > FAR:
+        done = "" if found is None else f"; the film was {found}"
+        yield f"at rest the markers are {far:.2f} mm (rms) from where the design has them{done}"
+    if found is None:
+        return
+    larger = 1 / (1 + float(found.similarity.values[3])) - 1
+    if abs(larger) > max(SCALE, 2 * found.known.scale):
+        size = "larger" if larger > 0 else "smaller"
+        yield (
+            f"lengths between the markers at rest are {abs(larger):.2%} {size} in the film than in the "
+            "drawing, and were scaled to it: see at what scale the fiducials were printed, and how high the "
+            f"markers are above them; {found.after:.2g} mm (rms) remain"
+        )
+    if found.after > UNLIKE:
+        yield (
+            f"aligned with the drawing, the markers at rest are still {found.after:.2f} mm (rms) off: they "
+            "are not where they are drawn, or the design is another one"
+        )

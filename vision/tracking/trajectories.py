@@ -1,6 +1,6 @@
 """Marker trajectories, rest positions, and displacements with covariances from a video."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,7 +8,9 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.observations import Observations
+from geometry.registration import FIXED, Registration
 from vision.discs.disc_detector import DetectionMethod, DiscDetections
+from vision.tracking.alignment import Alignment, align
 from vision.tracking.marker_plane import MarkerPlane
 from vision.tracking.rest_detection import RestIntervals
 
@@ -30,6 +32,8 @@ class Tracking:
         warnings: For the user, one line each.
         simulated: True if the film or its workspace is of the virtual rig.
         final_plane: The plane at the end, if the camera has moved; None if it is `plane`.
+        alignment: Of the film's frame with the drawing, which the planes have; None where they have none.
+        pressed: How well the frame of the final frames is known in that of the initial ones.
     """
 
     design: Finger
@@ -45,6 +49,8 @@ class Tracking:
     warnings: tuple[str, ...] = ()
     simulated: bool = False
     final_plane: MarkerPlane | None = None
+    alignment: Alignment | None = None
+    pressed: Registration = FIXED
 
     @property
     def visible(self) -> BoolArray:
@@ -61,6 +67,15 @@ class Tracking:
         """Initial and final positions of the markers at rest, shapes (m, 2), mm; nan if not detected."""
         plane, radius = self.plane, self.design.marker_radius
         return plane.circles(self.initial.centres, radius), plane.circles(self.final.centres, radius)
+
+    def aligned(self) -> "Tracking":
+        """The tracking in the frame in which the markers at rest are nearest to the design's."""
+        found = align(np.where(self.visible[:, None], self.rest_positions[0], np.nan), self.expected)
+        if found is None:
+            return self
+        final = self.final_plane and self.final_plane.aligned(found.similarity)
+        plane = self.plane.aligned(found.similarity)
+        return replace(self, plane=plane, final_plane=final, alignment=found)
 
     @property
     def offsets(self) -> FloatArray:
@@ -109,4 +124,6 @@ class Tracking:
             source,
             simulated=self.simulated,
             marker_radius=self.design.marker_radius,
+            pressed=self.pressed,
+            drawn=self.alignment.drawn if self.alignment else FIXED,
         )
