@@ -23,9 +23,9 @@ from solvers.identification.body import Linearised
 from solvers.identification.contradiction import with_doubts
 from solvers.identification.model import ResponseModel
 from solvers.identification.search import Identifier
-from solvers.identification.settings import LAWS, IdentifyingSolver
+from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.tracker import ForceTracker, LawTracker
-from solvers.identification.unknowns import DEFAULT, Unknowns
+from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status

@@ -21,9 +21,12 @@ from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.elasticity import LawName
 from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
 from solvers.identification.model import MarkerData, Response, ResponseModel
+from solvers.identification.unknowns import log_prior
 from solvers.problem import Problem
 from solvers.solution import Estimated, IdentifiedForce, Solution, Status, Uncertainty, unstable_phrase
 
+NORMAL = float(norm.ppf((1 + LEVEL) / 2))
+"""Half of an interval over the standard deviation, of a normal distribution."""
 PROBABLE = 0.01
 """Least probability of a law whose field is kept."""
 
@@ -54,13 +57,18 @@ class Fit(NamedTuple):
         return -len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
 
     @property
+    def log_posterior(self) -> float:
+        """Logarithm of the law's probability, up to a constant that all laws share."""
+        return self.log_evidence + log_prior(self.law)
+
+    @property
     def standard_errors(self) -> FloatArray:
         """Independent errors in the values, columns of shape (p, p), of one standard deviation each.
 
         They are widened where Student's interval is wider than the normal one.
         """
         found = self.estimate
-        wider = found.quantile / float(norm.ppf((1 + LEVEL) / 2))
+        wider = found.quantile / NORMAL
         return np.asarray(wider * found.slopes[:, None] * np.linalg.cholesky(found.covariance))
 
     @property
@@ -89,8 +97,8 @@ class Identified:
         cls, fits: Sequence[Fit], doubtful: Mapping[int, FloatArray], lost: Sequence[LawName] = ()
     ) -> "Identified":
         """The fits, given in any order."""
-        ordered = sorted(fits, key=lambda fit: -fit.log_evidence)
-        logs = np.array([fit.log_evidence for fit in ordered])
+        ordered = sorted(fits, key=lambda fit: -fit.log_posterior)
+        logs = np.array([fit.log_posterior for fit in ordered])
         weights = np.exp(logs - logs.max())
         return cls(ordered, weights / weights.sum(), doubtful, lost)
 
@@ -100,18 +108,26 @@ class Identified:
         return self.fits[0]
 
     def force(self) -> IdentifiedForce:
-        """The force and its place by the most probable law; the other laws widen the force's interval."""
-        size, _ = self.best.force
-        variance = 0.0
-        for fit, probability in zip(self.fits, self.probabilities, strict=True):
-            own, deviation = fit.force
-            variance += float(probability) * (deviation**2 + (own - size) ** 2)
-        half = float(norm.ppf((1 + LEVEL) / 2)) * float(np.sqrt(variance))
-        found, names, place = self.best.estimate, self.best.model.unknowns.names, None
+        """The force and its place: the mean over the laws, with an interval that holds their scatter."""
+        names, place = self.best.model.unknowns.names, None
+        size = self._mean([fit.force for fit in self.fits])
         if "position" in names:
             which = names.index("position")
-            place = Estimated(float(found.values[which]), *map(float, found.intervals[which]))
-        return IdentifiedForce(Estimated(size, max(size - half, 0.0), size + half), place)
+            found = [fit.estimate for fit in self.fits]
+            place = self._mean(
+                [
+                    (float(each.values[which]), each.quantile / NORMAL * float(each.deviations[which]))
+                    for each in found
+                ]
+            )
+        return IdentifiedForce(size._replace(low=max(size.low, 0.0)), place)
+
+    def _mean(self, found: Sequence[tuple[float, float]]) -> Estimated:
+        """The mean over the laws of a value with its standard deviation by each."""
+        values, deviations = np.array(found).T
+        mean = float(self.probabilities @ values)
+        half = NORMAL * float(np.sqrt(self.probabilities @ (deviations**2 + (values - mean) ** 2)))
+        return Estimated(mean, mean - half, mean + half)
 
     def solution(
         self,

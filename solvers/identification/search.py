@@ -17,8 +17,8 @@ from solvers.elasticity import LawName
 from solvers.identification.body import Body
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
 from solvers.identification.result import Fit, Identified
-from solvers.identification.settings import LAWS, IdentifyingSolver
-from solvers.identification.unknowns import Unknowns
+from solvers.identification.settings import IdentifyingSolver
+from solvers.identification.unknowns import LAWS, Unknowns
 from solvers.problem import Problem
 from solvers.solver import NoSolutionError, Progress, silent
 
@@ -90,7 +90,7 @@ class Identifier:
         self._progress = progress
         rough = self._rough(self.measurement(observations))
         lost = [law for law in self.models if law not in {each.law for each in rough}]
-        for best in sorted(rough, key=lambda fit: -fit.log_evidence):
+        for best in sorted(rough, key=lambda fit: -fit.log_posterior):
             try:
                 fit, doubtful = self._believed(self._settled(best))
                 break
@@ -111,7 +111,7 @@ class Identifier:
     def _rival(self, law: LawName, fit: Fit) -> Fit:
         """The fit of another law, to its end unless it could not be probable even there."""
         other = self._fit(law, fit.measurement, fit, rounds=1, steps=QUICK)
-        if self._shifted(other, fit.measurement).log_evidence > fit.log_evidence - IMPROBABLE:
+        if self._shifted(other, fit.measurement).log_posterior > fit.log_posterior - IMPROBABLE:
             other = self._fit(law, fit.measurement, other)
         return other
 

@@ -6,14 +6,10 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from geometry.errors import UserError
-from solvers.elasticity import LawName
 from solvers.identification.transfer import transferred
 from solvers.identification.unknowns import DEFAULT, parse_unknowns
 from solvers.problem import Problem
 from solvers.solution import Solution
-
-LAWS: tuple[LawName, ...] = ("neo-hookean", "st-venant-kirchhoff")
-"""The laws of finite strain to choose from."""
 
 LawChoice = Literal["evidence", "given"]
 

@@ -26,7 +26,7 @@ from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation
 from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
 from solvers.elasticity import LawName
 from solvers.identification.model import MarkerData, MarkerModel, ResponseModel
-from solvers.identification.unknowns import CONTACT
+from solvers.identification.unknowns import CONTACT, log_prior
 
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
@@ -281,7 +281,7 @@ class LawTracker:
     """Estimates the force in one frame after another by the law that is most probable by the markers.
 
     All laws are compared whenever the markers have moved by a quarter farther than at the last comparison; in
-    between only the most probable one is followed. A law is dropped once the logarithm of its evidence is
+    between only the most probable one is followed. A law is dropped once the logarithm of its probability is
     less than another's by 7: it is a thousand times less probable.
 
     Args:
@@ -304,8 +304,8 @@ class LawTracker:
             self._compared = first.largest
             for law in self.laws[1:]:
                 found[law] = self._trackers[law].update(displacements, deviations, visible)
-            evidence = {law: self._trackers[law].log_evidence for law in self.laws}
-            order = sorted(evidence, key=lambda law: -evidence[law])
-            self.laws = tuple(law for law in order if evidence[law] >= evidence[order[0]] - 7.0)
+            known = {law: self._trackers[law].log_evidence + log_prior(law) for law in self.laws}
+            order = sorted(known, key=lambda law: -known[law])
+            self.laws = tuple(law for law in order if known[law] >= known[order[0]] - 7.0)
         evaluations = sum(reading.evaluations for reading in found.values())
         return replace(found[self.laws[0]], evaluations=evaluations, seconds=time.perf_counter() - started)

@@ -12,7 +12,7 @@ from geometry.errors import UserError
 from geometry.mesh.wall_motion import WallMotion
 from geometry.registration import FIXED, Pictures, Registration, Similarity
 from solvers.assimilation.estimation import Parameter
-from solvers.elasticity import Lame, lame_derivatives
+from solvers.elasticity import Lame, LawName, lame_derivatives
 from solvers.identification.boundary import FrontTraction
 from solvers.problem import Material, Problem, contact_ends
 
@@ -21,6 +21,18 @@ WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson")
 NAMES = (*DEFAULT, "young")
 """Everything that can be found; the table of docs/how-to/force.md describes each."""
+
+
+LAW_ODDS: Mapping[LawName, float] = {"neo-hookean": 3.0, "st-venant-kirchhoff": 1.0}
+"""The laws of finite strain to choose from, with their odds before the markers are seen. Rubbers follow the
+neo-Hookean law up to strains of 0.3 (L. R. G. Treloar, The physics of rubber elasticity, 3rd ed., 1975,
+chapter 5); that of St Venant and Kirchhoff gives way in compression, as none of them does."""
+LAWS = tuple(LAW_ODDS)
+
+
+def log_prior(law: LawName) -> float:
+    """Logarithm of a law's odds before the markers are seen."""
+    return log(LAW_ODDS.get(law, 1.0))
 
 
 PARTS = {"turn": "deg", "shift_x": "mm", "shift_y": "mm", "scale": ""}

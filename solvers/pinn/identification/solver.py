@@ -15,8 +15,8 @@ from solvers.identification.contradiction import with_doubts
 from solvers.identification.model import ResponseModel
 from solvers.identification.result import Fit, Identified
 from solvers.identification.search import Identifier, carried
-from solvers.identification.settings import LAWS, IdentifyingSolver
-from solvers.identification.unknowns import Unknowns
+from solvers.identification.settings import IdentifyingSolver
+from solvers.identification.unknowns import LAWS, Unknowns
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Problem

@@ -11,8 +11,9 @@ from geometry.registration import FIXED, HAND_HELD, Registration, Similarity
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import FemBody, FemIdSolver
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
-from solvers.identification.search import LAWS, MOST_LOST, Identifier
-from solvers.identification.unknowns import CONTACT, DEFAULT, PARTS, Unknowns
+from solvers.identification.result import Identified
+from solvers.identification.search import MOST_LOST, Identifier
+from solvers.identification.unknowns import CONTACT, DEFAULT, LAW_ODDS, LAWS, PARTS, Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solver import NoSolutionError
@@ -276,6 +277,28 @@ def test_the_frame_of_the_pressed_picture_is_found(problem, known):
     assert not fixed.status.converged
     assert "THE PRESSED PICTURE IS NOT IN THE FRAME OF THAT AT REST" in fixed.status.warnings[0]
     assert fixed.stats["pressed_turn"] == pytest.approx(found.stats["pressed_turn"], abs=0.1)
+
+
+def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
+    """Made equally likely by the markers, the laws keep the odds that they had before."""
+    observed, _, solution = identified
+    problem = replace(solution.problem, observations=None)
+    identifier = Identifier(FemIdSolver(degree=1), problem, lambda unknowns: FemBody(unknowns, 1))
+    found = identifier.identify(observed)
+    by_law = {fit.law: fit for fit in found.fits}
+    logs = [by_law[law].log_evidence + np.log(odds) for law, odds in LAW_ODDS.items()]
+    share = dict(zip(LAW_ODDS, np.exp(logs - np.logaddexp(*logs)), strict=True))
+    np.testing.assert_allclose(found.probabilities, [share[fit.law] for fit in found.fits])
+    even = Identified(found.fits, np.array([0.25, 0.75]), {})
+    forces, deviations = np.array([fit.force for fit in found.fits]).T
+    force = even.force()
+    mean = 0.25 * forces[0] + 0.75 * forces[1]
+    variance = np.array([0.25, 0.75]) @ (deviations**2 + (forces - mean) ** 2)
+    assert force.size.value == pytest.approx(mean)
+    assert force.size.high - mean == pytest.approx(1.95996 * np.sqrt(variance), rel=1e-4)
+    places = [fit.estimate.values[0] for fit in found.fits]
+    assert force.position.value == pytest.approx(0.25 * places[0] + 0.75 * places[1])
+    assert force.position.low < min(places) < max(places) < force.position.high
 
 
 def test_the_field_and_its_deviations_hold_the_truth(identified, problem):
