@@ -130,3 +130,7 @@ class Pictures:
         """What pictures show of the displacement of points, all of shape (n, 2), mm."""
         seen = self.drawn.undone(self.drawn.moved(points) + displacement)
         return np.asarray(self.pressed.moved(seen) - points)
+
+    def own(self, points: FloatArray, shown: FloatArray) -> FloatArray:
+        """The displacement in the drawing of which pictures show `shown`, all of shape (n, 2), mm."""
+        return self.drawn.moved(self.pressed.undone(points + shown)) - self.drawn.moved(points)

@@ -10,8 +10,9 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.wall_motion import WallMotion
-from geometry.registration import FIXED, Pictures, Registration, Similarity
+from geometry.registration import Pictures, Similarity
 from solvers.assimilation.estimation import Parameter
+from solvers.assimilation.pictures import PARTS, picture_parameters
 from solvers.elasticity import Lame, LawName, lame_derivatives
 from solvers.identification.boundary import FrontTraction
 from solvers.problem import Material, Problem, contact_ends
@@ -33,10 +34,6 @@ LAWS = tuple(LAW_ODDS)
 def log_prior(law: LawName) -> float:
     """Logarithm of a law's odds before the markers are seen."""
     return log(LAW_ODDS.get(law, 1.0))
-
-
-PARTS = {"turn": "deg", "shift_x": "mm", "shift_y": "mm", "scale": ""}
-"""Values of a similarity, with their units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +78,7 @@ class Unknowns:
         self.traction, self.motion = FrontTraction(problem.mesh), WallMotion.of(problem.mesh)
         seen = problem.observations
         self._centre = np.zeros(2) if seen is None else seen.points.mean(axis=0)
-        self._pictures = [
-            *_of_picture("pressed", FIXED if seen is None else seen.pressed),
-            *_of_picture("drawn", FIXED if seen is None else seen.drawn),
-        ]
+        self._pictures = [] if seen is None else picture_parameters(seen)
         finger = [name for name in names if name not in WALLS or name in self.motion.names]
         self.names = (*finger, *(parameter.name for parameter in self._pictures))
 
@@ -186,16 +180,6 @@ class Unknowns:
 
     def _named(self, values: FloatArray) -> dict[str, float]:
         return dict(zip(self.names, map(float, values), strict=True))
-
-
-def _of_picture(picture: str, registration: Registration) -> list[Parameter]:
-    """The unknown values of the similarity of a picture, with their priors; none where it is fixed."""
-    deviations = (registration.turn, registration.shift, registration.shift, registration.scale)
-    return [
-        Parameter(f"{picture}_{part}", unit, 0.0, deviation)
-        for (part, unit), deviation in zip(PARTS.items(), deviations, strict=True)
-        if deviation
-    ]
 
 
 def parse_unknowns(solver: str, text: str) -> tuple[str, ...]:

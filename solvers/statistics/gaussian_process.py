@@ -10,26 +10,26 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from geometry.arrays import FloatArray
 from geometry.mesh.boundary import evenly_spaced_points
-from geometry.mesh.point_location import LocatedPoints
 from geometry.observations import Observations
-from solvers.assimilation.misfit import MarkerSettings, Misfit, misfit_of, standard_deviations
+from solvers.assimilation.misfit import standard_deviations
+from solvers.assimilation.pictures import FramedData, FreePictures
 from solvers.energy_and_force import energy_and_force
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
 from solvers.solver import FieldSettings, Progress, UnsupportedProblemError, check_problem, silent
-from solvers.statistics.kernel_field import (
-    SMOOTHNESS,
-    Kernel,
-    KernelField,
-    MarkerPrediction,
-    with_markers_left_out,
+from solvers.statistics.kernel_field import SMOOTHNESS, Kernel, MarkerPrediction, with_markers_left_out
+from solvers.statistics.statistical_posterior import (
+    Hyperparameters,
+    Posterior,
+    StatFemData,
+    StatFemField,
+    predicted,
 )
 
 MIN_MARKERS = 3
@@ -56,36 +56,47 @@ class GaussianProcessSolver(FieldSettings):
         """Fit the processes to the problem's observations, and again without each marker; see `Solver`."""
         check_problem(self, problem)
         started = time.perf_counter()
-        solution, misfit, deviations = self._fitted(problem, MIN_MARKERS + 1)
-        base = self._base(problem)
+        solution, posterior, pictures = self._fitted(problem, MIN_MARKERS + 1)
 
         def without(marker: int) -> MarkerPrediction:
-            progress(marker / len(misfit.points), "leaving each marker out")
-            others = _fit(misfit.without(marker), np.delete(deviations, marker, axis=0), base, self.kernel)
-            there = problem.mesh.locate(misfit.points[[marker]])
-            spread = np.hypot(others.standard_deviation(there)[0], deviations[marker])
-            return others.displacement(there)[0], spread
+            progress(marker / len(pictures.points), "leaving each marker out")
+            return predicted(_fit(posterior.data.without(marker)), posterior.data, pictures, marker)
 
-        return with_markers_left_out(solution, misfit.observed, without, started)
+        return with_markers_left_out(solution, pictures.shown, without, started)
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """A function that fits other observations, without leaving any out; see `Refittable`."""
         return lambda observations: self._fitted(replace(problem, observations=observations), MIN_MARKERS)[0]
 
-    def _fitted(self, problem: Problem, least: int) -> tuple[Solution, Misfit, FloatArray]:
-        """The solution, the misfit of at least so many markers, and their standard deviations (m, 2), mm."""
-        started = time.perf_counter()
-        misfit = misfit_of(problem, MarkerSettings(marker_radius=0.0))
-        count = 0 if misfit is None else len(misfit.points)
-        if misfit is None or problem.observations is None or count < least:
+    def _fitted(self, problem: Problem, least: int) -> tuple[Solution, Posterior, FreePictures]:
+        """The solution, and the processes conditioned on at least so many markers."""
+        started, observations = time.perf_counter(), problem.observations
+        count = 0 if observations is None else int(observations.visible.sum())
+        if observations is None or count < least:
             raise UnsupportedProblemError(
                 f"gp goes through markers: it needs {least} that were seen, not {count}"
             )
-        deviations = standard_deviations(problem.observations)
-        field = _fit(misfit, deviations, self._base(problem), self.kernel)
+        pictures, base = FreePictures.of(observations), self._base(problem)
+        deviations = standard_deviations(observations)
+
+        def conditioned(framed: FramedData) -> Posterior:
+            rest = np.zeros_like(base)  # in the drawing, whatever the pictures' frames are
+            data = StatFemData(
+                points=np.concatenate([pictures.points, base]),
+                observed=np.concatenate([framed.observed, rest]),
+                deviations=np.concatenate([deviations, np.full_like(base, deviations.min())]),
+                frames=np.concatenate([framed.frames, np.zeros((len(framed.frames), *base.shape))], axis=1),
+                shapes=np.zeros((0, count + len(base), 2)),
+                load=np.zeros(0),
+                load_deviation=0.0,
+                kernel=self.kernel,
+            )
+            return _fit(data)
+
+        posterior = conditioned(pictures.about(pictures.found(lambda framed: conditioned(framed).frames[0])))
+        field = StatFemField(posterior, [])
         energy, reaction = energy_and_force(problem, field, 4)
-        u, v = field.lengths
-        evidence = [float(process.log_marginal_likelihood_value_) for process in field.processes]
+        u, v = posterior.constants.lengths
         solution = Solution(
             solver=self.name,
             problem=problem,
@@ -101,48 +112,34 @@ class GaussianProcessSolver(FieldSettings):
                 "seconds": time.perf_counter() - started,
                 "length_u": float(u),
                 "length_v": float(v),
-                "log_evidence": sum(evidence),
+                "log_evidence": posterior.log_evidence,
+                **pictures.numbers(*posterior.frames),
             },
             uncertainty=Uncertainty(field.standard_deviation),
+            pictures=pictures.at(posterior.frames[0]) if pictures.parameters else None,
         )
-        return solution, misfit, deviations
+        return solution, posterior, pictures
 
     def _base(self, problem: Problem) -> FloatArray:
         """Points at rest, shape (b, 2), mm."""
         return evenly_spaced_points(problem.mesh, "base", 5) if self.clamp else np.zeros((0, 2))
 
 
-@dataclass(frozen=True, eq=False)
-class GaussianProcessField(KernelField):
-    """The posterior mean of two processes, with the processes of scikit-learn for u and v."""
-
-    processes: list[Any]
-
-    def standard_deviation(self, location: LocatedPoints) -> FloatArray:
-        """Standard deviation of the displacement, shape (n, 2), mm."""
-        spreads = [process.predict(location.points, return_std=True)[1] for process in self.processes]
-        return np.stack(spreads, axis=1)
-
-
-def _fit(misfit: Misfit, deviations: FloatArray, base: FloatArray, kernel: Kernel) -> GaussianProcessField:
-    """The processes through markers with standard deviations (m, 2), mm, and through points at rest."""
+def _fit(data: StatFemData) -> Posterior:
+    """The processes with the hyperparameters of the largest marginal likelihood, frames as they are."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
-    points = np.concatenate([misfit.points, base])
-    observed = np.concatenate([misfit.observed, np.zeros_like(base)])
-    deviations = np.concatenate([deviations, np.full_like(base, deviations.min())])
     # Start and search range of variance, mm², and length, mm
-    covariance = ConstantKernel(10.0, (1e-4, 1e6)) * Matern(30.0, (1.0, 1000.0), SMOOTHNESS[kernel])
-    processes = []
+    covariance = ConstantKernel(10.0, (1e-4, 1e6)) * Matern(30.0, (1.0, 1000.0), SMOOTHNESS[data.kernel])
+    found = []
     for axis in (0, 1):
-        process = GaussianProcessRegressor(covariance, alpha=deviations[:, axis] ** 2)
+        process = GaussianProcessRegressor(covariance, alpha=data.deviations[:, axis] ** 2)
         with threadpool_limits(1, user_api="blas"), warnings.catch_warnings():
             # On small matrices BLAS's threads wait for one another.
             # An end of the search range is a valid result: constant over the finger, or the markers alone.
             warnings.simplefilter("ignore", ConvergenceWarning)
-            processes.append(process.fit(points, observed[:, axis]))
-    variances, lengths = np.exp([process.kernel_.theta for process in processes]).T
-    coefficients = variances * np.stack([process.alpha_ for process in processes], axis=1)
-    return GaussianProcessField(points, coefficients, lengths, kernel, processes)
+            found.append(process.fit(data.points, data.observed[:, axis]).kernel_.theta)
+    variances, lengths = np.exp(found).T
+    return Posterior.given(data, Hyperparameters(1.0, np.sqrt(variances), lengths))

@@ -29,6 +29,7 @@ import numpy as np
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.misfit import standard_deviations
+from solvers.assimilation.pictures import FramedData, FreePictures
 from solvers.energy_and_force import energy_and_force
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
@@ -37,7 +38,7 @@ from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
 from solvers.solver import ElementSettings, NoSolutionError, Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel, MarkerPrediction, with_markers_left_out
-from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField
+from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField, predicted
 
 TANGENT_STEP = 0.1
 """Change of a prescribed displacement for its tangent at finite strain, mm."""
@@ -69,25 +70,22 @@ class StatFemSolver(ElementSettings):
             return replace(plain, solver=self.name, status=said)
         started = time.perf_counter()
         shapes = self._shapes(problem, progress)
-        data = self._data(problem, problem.observations, shapes)
-        solution = self._conditioned(problem, data, shapes)
+        solution, posterior, pictures = self._conditioned(problem, problem.observations, shapes)
+        data = posterior.data
 
         def without(marker: int) -> MarkerPrediction:
             progress(0.5 + marker / len(data.points) / 2, "leaving each marker out")
-            mean, variance = Posterior.of(data.without(marker)).at(
-                data.points[[marker]], data.shapes[:, [marker]]
-            )
-            return mean[0], np.sqrt(variance[0] + data.deviations[marker] ** 2)
+            others = Posterior.of(data.without(marker))
+            return predicted(others, data, pictures, marker)
 
-        return with_markers_left_out(solution, data.observed, without, started)
+        return with_markers_left_out(solution, pictures.shown, without, started)
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """A function that solves for other observations with the same finite elements; see `Refittable`."""
         shapes = self._shapes(problem, silent)
 
         def refit(observations: Observations) -> Solution:
-            data = self._data(problem, observations, shapes)
-            return self._conditioned(replace(problem, observations=observations), data, shapes)
+            return self._conditioned(replace(problem, observations=observations), observations, shapes)[0]
 
         return refit
 
@@ -132,29 +130,41 @@ class StatFemSolver(ElementSettings):
         return [LagrangeField(whole.space, nodal[number]) for number in sorted(nodal)]
 
     def _data(
-        self, problem: Problem, observations: Observations, shapes: Sequence[LagrangeField]
+        self,
+        problem: Problem,
+        observations: Observations,
+        framed: FramedData,
+        shapes: Sequence[LagrangeField],
     ) -> StatFemData:
         points = observations.points[observations.visible]
         location = problem.mesh.locate(points)
         return StatFemData(
             points=points,
-            observed=observations.displacements[observations.visible],
+            observed=framed.observed,
             deviations=standard_deviations(observations),
+            frames=framed.frames,
             shapes=np.stack([shape.displacement(location) for shape in shapes]),
             load=problem.load.values,
             load_deviation=self.stroke_deviation,
             kernel=self.kernel,
         )
 
-    def _conditioned(self, problem: Problem, data: StatFemData, shapes: Sequence[LagrangeField]) -> Solution:
-        started = time.perf_counter()
-        posterior = Posterior.of(data)
-        field = StatFemField(posterior, shapes)
+    def _conditioned(
+        self, problem: Problem, observations: Observations, shapes: Sequence[LagrangeField]
+    ) -> tuple[Solution, Posterior, FreePictures]:
+        started, pictures = time.perf_counter(), FreePictures.of(observations)
+
+        def conditioned(framed: FramedData) -> Posterior:
+            return Posterior.of(self._data(problem, observations, framed, shapes))
+
+        z = pictures.found(lambda framed: conditioned(framed).frames[0])
+        posterior = conditioned(pictures.about(z))
+        field, data = StatFemField(posterior, shapes), posterior.data
         energy, reaction = energy_and_force(problem, field, 4)
-        factor, (u, v), length = posterior.constants
+        factor, (u, v), (length, _) = posterior.constants
         _, variances = posterior.at(data.points, data.shapes)
         loads = zip(problem.load.prescribed, posterior.load, strict=True)
-        return Solution(
+        solution = Solution(
             solver=self.name,
             problem=problem,
             field=field,
@@ -171,10 +181,13 @@ class StatFemSolver(ElementSettings):
                 "factor": factor,
                 "discrepancy_u": float(u),
                 "discrepancy_v": float(v),
-                "length": length,
+                "length": float(length),
                 "log_evidence": posterior.log_evidence,
                 "deviation_at_markers": float(np.sqrt(variances.max())),
                 **{f"load_{'uv'[axis]}": float(value) for axis, value in loads},
+                **pictures.numbers(*posterior.frames),
             },
             uncertainty=Uncertainty(field.standard_deviation),
+            pictures=pictures.at(posterior.frames[0]) if pictures.parameters else None,
         )
+        return solution, posterior, pictures

@@ -15,8 +15,9 @@ from threadpoolctl import threadpool_limits
 
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
+from solvers.assimilation.pictures import FreePictures
 from solvers.solution import DisplacementField
-from solvers.statistics.kernel_field import Kernel, KernelField, correlation
+from solvers.statistics.kernel_field import Kernel, KernelField, MarkerPrediction, correlation
 
 SPREADS, LENGTHS, FACTORS = (1e-4, 100.0), (2.0, 500.0), (0.2, 5.0)
 """Search ranges of the amplitudes, mm, the length, mm, and ρ."""
@@ -31,6 +32,7 @@ class StatFemData:
     points: FloatArray  # Shape (m, 2), mm
     observed: FloatArray  # d, shape (m, 2), mm
     deviations: FloatArray  # Standard deviations of e, shape (m, 2), mm
+    frames: FloatArray  # Errors by unit changes of the pictures' frames, shape (p, m, 2), mm
     # Displacements of the finite elements at the points by unit displacements of the contact, shape (k, m, 2)
     shapes: FloatArray
     load: FloatArray  # Nominal displacements of the contact, shape (k,), mm
@@ -45,16 +47,17 @@ class StatFemData:
             points=self.points[kept],
             observed=self.observed[kept],
             deviations=self.deviations[kept],
+            frames=self.frames[:, kept],
             shapes=self.shapes[:, kept],
         )
 
 
 class Hyperparameters(NamedTuple):
-    """Factor ρ; amplitudes of δ, shape (2,), mm; its length, mm."""
+    """Factor ρ; amplitudes and lengths of δ in u and v, each of shape (2,), mm."""
 
     factor: float
     amplitudes: FloatArray
-    length: float
+    lengths: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +85,14 @@ class Posterior:
                 for values in START
             ]
         best = min(found, key=lambda result: result.fun)
-        constants = _exponentials(best.x)
-        cholesky, _, coefficients = _condition(data, constants)
-        log_evidence = -float(best.fun) - len(data.points) * np.log(2 * np.pi)
+        return cls.given(data, _exponentials(best.x))
+
+    @classmethod
+    def given(cls, data: StatFemData, constants: Hyperparameters) -> "Posterior":
+        """Condition on the markers with hyperparameters."""
+        cholesky, residual, coefficients = _condition(data, constants)
+        misfit = float(0.5 * residual @ coefficients) + log_root_determinant(cholesky)
+        log_evidence = -misfit - len(data.points) * np.log(2 * np.pi)
         return cls(data, constants, coefficients.reshape(-1, 2), cholesky, log_evidence)
 
     @property
@@ -94,21 +102,45 @@ class Posterior:
         return np.asarray(self.data.load + self.data.load_deviation**2 * self.constants.factor * pulled)
 
     @property
+    def frames(self) -> tuple[FloatArray, FloatArray]:
+        """Mean (p,) and covariance (p, p) of the frames' standardised values."""
+        flat = self.data.frames.reshape(len(self.data.frames), 2 * len(self.data.points))
+        mean = flat @ self.coefficients.ravel()
+        return mean, np.eye(len(flat)) - flat @ cho_solve((self.cholesky, True), flat.T)
+
+    @property
     def discrepancy(self) -> KernelField:
         """Posterior mean of δ."""
         coefficients = self.constants.amplitudes**2 * self.coefficients
-        lengths = np.full(2, self.constants.length)
-        return KernelField(self.data.points, coefficients, lengths, self.data.kernel)
+        return KernelField(self.data.points, coefficients, self.constants.lengths, self.data.kernel)
 
-    def at(self, points: FloatArray, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean, mm, and variance, mm², at points (n, 2) where `shapes` is of shape (k, n, 2): each (n, 2)."""
+    def at(
+        self, points: FloatArray, shapes: FloatArray, frames: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean, mm, and variance, mm², at points (n, 2) where `shapes` is of shape (k, n, 2): each (n, 2).
+
+        With `frames`, of shape (p, n, 2), of what is observed there, without the errors e.
+        """
         data, (factor, amplitudes, _) = self.data, self.constants
         between = _covariance(data, self.constants, points, shapes)
         mean = factor * np.einsum("k,knc->nc", data.load, shapes)
         mean = mean + (between @ self.coefficients.ravel()).reshape(-1, 2)
         prior = (factor * data.load_deviation) ** 2 * (shapes**2).sum(axis=0) + amplitudes**2
+        if frames is not None:
+            shared = np.einsum("pnc,pgd->ncgd", frames, data.frames).reshape(between.shape)
+            mean = mean + (shared @ self.coefficients.ravel()).reshape(-1, 2)
+            between, prior = between + shared, prior + (frames**2).sum(axis=0)
         known = (between * cho_solve((self.cholesky, True), between.T).T).sum(axis=1).reshape(-1, 2)
         return mean, np.maximum(prior - known, 0.0)
+
+
+def predicted(others: Posterior, data: StatFemData, pictures: FreePictures, marker: int) -> MarkerPrediction:
+    """What the pictures show of a marker, by the posterior of the others."""
+    one = [marker]
+    mean, _ = others.at(data.points[one], data.shapes[:, one])
+    _, variance = others.at(data.points[one], data.shapes[:, one], data.frames[:, one])
+    shown = pictures.at(others.frames[0]).shown(data.points[one], mean)
+    return shown[0], np.sqrt(variance[0] + data.deviations[marker] ** 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,18 +152,22 @@ class StatFemField:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Posterior mean, shape (n, 2), mm."""
-        own = np.stack([shape.displacement(location) for shape in self.shapes])
-        return self._by_load(own) + self.posterior.discrepancy.displacement(location)
+        return self._by_load(self._own(location)) + self.posterior.discrepancy.displacement(location)
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Gradient du_i/dx_j of the mean, shape (n, 2, 2)."""
-        own = np.stack([shape.gradient(location) for shape in self.shapes])
-        return self._by_load(own) + self.posterior.discrepancy.gradient(location)
+        own = [shape.gradient(location) for shape in self.shapes]
+        gradients = np.reshape(own, (len(own), len(location.points), 2, 2))
+        return self._by_load(gradients) + self.posterior.discrepancy.gradient(location)
 
     def standard_deviation(self, location: LocatedPoints) -> FloatArray:
         """Standard deviation of the displacement, shape (n, 2), mm."""
-        own = np.stack([shape.displacement(location) for shape in self.shapes])
-        return np.asarray(np.sqrt(self.posterior.at(location.points, own)[1]))
+        return np.asarray(np.sqrt(self.posterior.at(location.points, self._own(location))[1]))
+
+    def _own(self, location: LocatedPoints) -> FloatArray:
+        """Displacements by the shapes, shape (k, n, 2)."""
+        own = [shape.displacement(location) for shape in self.shapes]
+        return np.reshape(own, (len(own), len(location.points), 2))
 
     def _by_load(self, own: FloatArray) -> FloatArray:
         return np.asarray(np.tensordot(self.posterior.constants.factor * self.posterior.load, own, axes=1))
@@ -139,7 +175,7 @@ class StatFemField:
 
 def _exponentials(parameters: FloatArray) -> Hyperparameters:
     factor, u, v, length = np.exp(parameters)
-    return Hyperparameters(float(factor), np.array([u, v]), float(length))
+    return Hyperparameters(float(factor), np.array([u, v]), np.full(2, length))
 
 
 def log_root_determinant(cholesky: FloatArray) -> float:
@@ -154,7 +190,8 @@ def log_root_determinant(cholesky: FloatArray) -> float:
 def _condition(data: StatFemData, constants: Hyperparameters) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Cholesky factor of the covariance C of d, (2 m, 2 m); d minus its prior mean r, mm; C^-1 r, 1/mm."""
     covariance = _covariance(data, constants, data.points, data.shapes)
-    covariance = covariance + np.diag(data.deviations.ravel() ** 2)
+    flat = data.frames.reshape(len(data.frames), covariance.shape[0])
+    covariance = covariance + np.diag(data.deviations.ravel() ** 2) + flat.T @ flat
     mean = constants.factor * np.einsum("k,kgc->gc", data.load, data.shapes)
     residual = (data.observed - mean).ravel()
     cholesky = np.linalg.cholesky(covariance)
@@ -166,6 +203,7 @@ def _covariance(
 ) -> FloatArray:
     """Prior covariance of ρ u + δ between n points and the markers, mm²: (2 n, 2 m), u and v by turns."""
     by_load = np.einsum("knc,kgd->ncgd", shapes, data.shapes) * (constants.factor * data.load_deviation) ** 2
-    kernel = correlation(points, data.points, constants.length, data.kernel)
-    discrepancy = np.einsum("ng,cd->ncgd", kernel, np.diag(constants.amplitudes**2))
+    kernels = {length: correlation(points, data.points, length, data.kernel) for length in constants.lengths}
+    kernel = np.stack([kernels[length] for length in constants.lengths])
+    discrepancy = np.einsum("cng,cd->ncgd", kernel, np.diag(constants.amplitudes**2))
     return np.asarray((by_load + discrepancy).reshape(2 * len(points), 2 * len(data.points)))

@@ -39,7 +39,8 @@ def conditioned(solution, points, given, *, axis):
     """Mean and variance of the process with its constants, by the textbook's equations 2.25 and 2.26."""
     observations = solution.problem.observations
     known, d = observations.points[given], observations.displacements[given, axis]
-    variance, length = np.exp(solution.field.processes[axis].kernel_.theta)
+    constants = solution.field.posterior.constants
+    variance, length = constants.amplitudes[axis] ** 2, constants.lengths[axis]
 
     def kernel(first, second):
         return variance * matern(first, second, length)
@@ -120,8 +121,9 @@ def test_the_evidence_is_that_of_the_normal_distribution(problem, kernel):
     observations = problem.observations
     seen, smoothness = observations.visible, {"matern32": 1.5, "gaussian": np.inf}[kernel]
     points, expected = observations.points[seen], 0.0
-    for axis, process in enumerate(solution.field.processes):
-        variance, length = np.exp(process.kernel_.theta)
+    constants = solution.field.posterior.constants
+    for axis in (0, 1):
+        variance, length = constants.amplitudes[axis] ** 2, constants.lengths[axis]
         covariance = variance * matern(points, points, length, smoothness)
         covariance += np.diag(observations.standard_deviations[seen, axis] ** 2)
         expected += multivariate_normal.logpdf(observations.displacements[seen, axis], cov=covariance)

@@ -1,0 +1,112 @@
+"""`gp` and `statfem` with pictures whose frames are unknown, against the joint normal distribution."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.registration import FIXED, Pictures, Registration, Similarity
+from solvers.assimilation.pictures import FreePictures
+from solvers.problem import Load, Problem
+from solvers.registry import make_solver
+from tests.solvers.conftest import observed_at
+
+KNOWN = Registration(turn=3.0, shift=0.3, scale=0.01)
+OFF = np.array([2.5, 0.3, -0.2, -0.012])  # degrees, mm, a share
+
+
+@pytest.fixture(scope="module")
+def problem(coarse_mesh):
+    return Problem(coarse_mesh, load=Load(displacement=(0.0, -6.0)))
+
+
+def pictured(problem, off, drawn=0.0):
+    """What turned, shifted and scaled pictures show of linear `fem`, and the displacements themselves."""
+    points = problem.mesh.markers
+    moved = make_solver("fem", estimate=False).solve(problem).displacement(points)
+    centre = points.mean(axis=0)
+    pictures = Pictures(Similarity(centre, off), Similarity(centre, np.array([0, 0, 0, drawn])))
+    observed = observed_at(points, pictures.shown(points, moved), 0.01)
+    return replace(observed, pressed=KNOWN), moved
+
+
+def test_pictures_show_what_is_their_own(problem):
+    observed, moved = pictured(problem, OFF, drawn=0.02)
+    centre = observed.points.mean(axis=0)
+    pictures = Pictures(Similarity(centre, OFF), Similarity(centre, np.array([0, 0, 0, 0.02])))
+    own = pictures.own(observed.points, observed.displacements)
+    np.testing.assert_allclose(own, moved, atol=1e-12)
+
+
+def test_observations_are_linear_in_the_frames(problem):
+    """By steps of one standard deviation: the finger's displacements are observed minus frames z."""
+    observed, _ = pictured(problem, OFF)
+    free = FreePictures.of(replace(observed, drawn=Registration(turn=0.5, shift=0.1, scale=0.005)))
+    assert len(free.parameters) == 8
+    z = np.linspace(-1, 1, 8)
+    framed = free.about(z)
+    for step in 0.001 * np.eye(8):
+        own = free.at(z + step).own(observed.points, observed.displacements)
+        linear = framed.observed - np.tensordot(z + step, framed.frames, axes=1)
+        np.testing.assert_allclose(linear, own, atol=2e-7)
+    assert FreePictures.of(replace(observed, pressed=FIXED)).parameters == []
+
+
+def test_frames_are_those_of_the_joint_normal_distribution(problem):
+    """Of `statfem`: mean and covariance of z given the observations, from the covariance of both together."""
+    observed, _ = pictured(problem, OFF)
+    solution = make_solver("statfem").solve(replace(problem, observations=observed))
+    posterior = solution.field.posterior
+    data, (factor, amplitudes, lengths) = posterior.data, posterior.constants
+    count, shapes = 2 * len(data.points), data.shapes.reshape(len(data.load), -1)
+    by_load = (factor * data.load_deviation) ** 2 * shapes.T @ shapes
+    distance = np.linalg.norm(data.points[:, None] - data.points, axis=2) * np.sqrt(5) / lengths[0]
+    kernel = (1 + distance + distance**2 / 3) * np.exp(-distance)
+    process = np.einsum("mn,cd->mcnd", kernel, np.diag(amplitudes**2)).reshape(count, count)
+    frames = data.frames.reshape(4, count)
+    whole = by_load + process + 0.01**2 * np.eye(count) + frames.T @ frames
+    left = data.observed.ravel() - factor * data.load @ shapes
+    mean, covariance = posterior.frames
+    np.testing.assert_allclose(mean, frames @ np.linalg.solve(whole, left), atol=1e-6)
+    expected = np.eye(4) - frames @ np.linalg.solve(whole, frames.T)
+    np.testing.assert_allclose(covariance, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("solver", ["statfem", "gp"])
+def test_a_turned_picture_is_found(problem, solver):
+    """`gp` knows of it only by the base at rest."""
+    options = {"clamp": True} if solver == "gp" else {}
+    observed, moved = pictured(problem, OFF)
+    made = make_solver(solver, **options)
+    found = made.solve(replace(problem, observations=observed))
+    names = ("pressed_turn", "pressed_shift_x", "pressed_shift_y", "pressed_scale")
+    for name, value in zip(names, OFF, strict=True):
+        assert found.stats[f"{name}_low"] < value < found.stats[f"{name}_high"], name
+    field = found.displacement(observed.points)
+    np.testing.assert_allclose(found.shown(observed.points, field), observed.displacements, atol=0.03)
+    as_it_is = made.solve(replace(problem, observations=replace(observed, pressed=FIXED)))
+    assert as_it_is.pictures is None
+    if solver == "statfem":  # mechanics tell the turn
+        assert found.stats["pressed_turn"] == pytest.approx(OFF[0], abs=0.3)
+        off = np.abs(field - moved).max()
+        assert off < 0.2 * np.abs(as_it_is.displacement(observed.points) - moved).max()
+
+
+@pytest.mark.parametrize("solver", ["statfem", "gp"])
+def test_a_marker_left_out_is_predicted_in_its_picture(problem, solver):
+    """`gp` is as good as without the turn; `statfem`, which is told that there is none, is far off."""
+    turned, _ = pictured(problem, OFF)
+    straight, _ = pictured(problem, np.zeros(4))
+    made, errors = make_solver(solver), {}
+    for name, observed in (
+        ("free", turned),
+        ("fixed", replace(turned, pressed=FIXED)),
+        ("straight", replace(straight, pressed=FIXED)),
+    ):
+        solution = made.solve(replace(problem, observations=observed))
+        errors[name] = float(np.sqrt(((solution.left_out - observed.displacements) ** 2).mean()))
+        assert solution.stats["left_out_within_2sd"] > 0.7
+    if solver == "statfem":
+        assert errors["free"] < 0.3 * errors["fixed"]
+    else:
+        assert errors["free"] == pytest.approx(errors["straight"], rel=0.5)
