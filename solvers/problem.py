@@ -121,6 +121,10 @@ class Load(CheckedModel):
             raise ValueError("the cylinder does not move; prescribe a displacement (mm)")
         return self
 
+    def as_mean(self) -> "Load":
+        """The same displacement as the mean over a contact as wide as the drawn one."""
+        return Load(displacement=self.displacement, position=self.position)
+
     @property
     def prescribed(self) -> list[int]:
         """The components (0 for u, 1 for v) that are prescribed."""

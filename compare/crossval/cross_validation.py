@@ -22,6 +22,7 @@ from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.observations import Observations
 from geometry.processes import ProcessFailed
+from geometry.registration import FIXED
 from solvers.problem import Problem
 
 DEFINITION = "definition.json"
@@ -141,14 +142,18 @@ def _noisy(
     displacements = [TrueField.load(path).sampled.markers for path in paths]
 
     def observed(true: FloatArray, seed: int, at: int) -> Observations:
+        points = study.markers[case.layout]
+        known = study.frame if at == 0 else FIXED
+        shown = true if known.fixed else study.pressed_picture(points, seed).moved(points + true) - points
         return Observations(
-            points=study.markers[case.layout],
-            displacements=true + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
+            points=points,
+            displacements=shown + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
             standard_deviations=np.full_like(true, study.noise),
             visible=np.ones(len(true), dtype=bool),
             source=f"{source}, with {study.noise:g} mm of noise",
             simulated=True,
             marker_radius=study.design.marker_radius,
+            pressed=known,
         )
 
     return [

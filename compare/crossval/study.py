@@ -17,6 +17,7 @@ from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
+from geometry.registration import FIXED, Registration, Similarity
 from solvers.problem import Load, Material
 from solvers.registry import make_solver
 from solvers.solver import Solver, check_load, with_law
@@ -90,6 +91,8 @@ class CrossvalStudy:
         schemes: Keys of `SCHEMES` other than `ALL`.
         seeds: Number of draws of the noise, and of the solvers' random numbers.
         noise: Standard deviation of a simulated marker's displacement, mm.
+        frame: By how much the simulated pressed pictures are turned, shifted and scaled, in directions that
+            each draw chooses; the observations say so.
         measurements: Marker displacements from elsewhere; None for the virtual experiment.
         processes: Solvers run at a time.
         picture_formats: Formats of the pictures besides PNG.
@@ -106,6 +109,7 @@ class CrossvalStudy:
     schemes: Sequence[str] = tuple(scheme for scheme in SCHEMES if scheme != ALL)
     seeds: int = 5
     noise: float = 0.005
+    frame: Registration = FIXED
     measurements: Observations | None = None
     processes: int = field(default_factory=cores)
     picture_formats: Sequence[str] = ()
@@ -150,10 +154,18 @@ class CrossvalStudy:
         """`simulated` or `measured`, for captions."""
         return "simulated" if self.measurements is None else self.measurements.label
 
+    def pressed_picture(self, points: FloatArray, seed: int) -> Similarity:
+        """The similarity of a draw's pressed picture, about the middle of points, shape (m, 2), mm."""
+        known, signs = self.frame, np.random.default_rng([seed, len(points)]).choice([-1.0, 1.0], 4)
+        sizes = np.array([known.turn, known.shift, known.shift, known.scale])
+        return Similarity(points.mean(axis=0), signs * sizes)
+
     def check(self) -> None:
         """Raise a `UserError` for a study that cannot be done, before anything is computed."""
         if self.layouts and self.measurements:
             raise UserError("layouts: markers that were measured are where they are; name no layouts")
+        if not self.frame.fixed and self.measurements:
+            raise UserError("frame: the file of the measurements says how well their pictures are known")
         if tuple(self.truths) != (SLIDING.name,) and self.measurements:
             raise UserError("a truth is for a simulated experiment; with measurements name none")
         check_truths(self.truth_names, self.design)
@@ -195,6 +207,7 @@ class CrossvalStudy:
         arrays = given and (given.points, given.displacements, given.standard_deviations)
         return job_definition(self.design, self.mesh, self.material, self.load, __name__) | {
             "noise_mm": None if given else self.noise,
+            "frame": str(given.pressed if given else self.frame),
             "measurements": arrays and [values.tolist() for values in arrays],
         }
 

@@ -52,6 +52,37 @@ def held_out_errors(evaluation: Evaluation, observations: Observations) -> Marke
     return None if evaluation.left_out is None else _errors(evaluation.left_out, observations)
 
 
+RIGID = "rigid motion off"
+"""What is added to the name of a solver whose markers are moved rigidly to the pressed picture."""
+
+
+def without_rigid_motion(evaluation: Evaluation, observations: Observations) -> Evaluation | None:
+    """The evaluation with its markers turned and shifted until they are nearest to the pressed picture's.
+
+    None for a solver that was given the markers, and where the pictures' frames are known: nobody may then
+    move them. By least squares over the markers seen (W. Kabsch, Acta Cryst. A 32 (1976) 922-923).
+    """
+    known = observations.pressed.fixed and observations.drawn.fixed
+    if known or evaluation.in_sample or observations.visible.sum() < 2:
+        return None
+    seen, points = observations.visible, observations.points
+    there, pressed = points + evaluation.shown_displacement, points + observations.displacements
+    middles = [places[seen].mean(axis=0) for places in (there, pressed)]
+    here, wanted = (
+        (places[seen] - middle) @ [1, 1j] for places, middle in zip((there, pressed), middles, strict=True)
+    )
+    turn = np.exp(1j * np.angle(np.vdot(here, wanted)))
+    turned = turn * ((there - middles[0]) @ [1, 1j])
+    moved = np.column_stack([turned.real, turned.imag]) + middles[1]
+    return replace(evaluation, solver=f"{evaluation.solver}, {RIGID}", shown=moved - points)
+
+
+def at_markers(evaluations: Sequence[Evaluation], observations: Observations) -> list[Evaluation]:
+    """The evaluations for errors at the markers, each followed by that without its rigid motion, if any."""
+    pairs = ((each, without_rigid_motion(each, observations)) for each in evaluations)
+    return [each for pair in pairs for each in pair if each is not None]
+
+
 def _errors(displacement: FloatArray, observations: Observations) -> MarkerErrors:
     error = np.abs(displacement - observations.displacements)
     error[~observations.visible] = np.nan

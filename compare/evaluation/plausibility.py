@@ -12,7 +12,7 @@ from geometry.errors import OutsideBodyError, UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.identification.contradiction import likely_order, order_words
-from solvers.problem import Load, Problem
+from solvers.problem import Problem
 from solvers.registry import MissingLibraryError, make_solver
 from solvers.solver import NONE_SEEN
 from vision.measurements import SMALLEST_DISTANCE
@@ -179,7 +179,7 @@ def _expected(problem: Problem, points: FloatArray) -> FloatArray:
     """Displacements of `fem` at points, shape (m, 2), mm; a cylinder is replaced by the mean load."""
     load = problem.load
     if load.kind == "cylinder":
-        load = Load(displacement=load.displacement, position=load.position)
+        load = load.as_mean()
     linear = problem.material.model_copy(update={"law": "linear"})
     fem = make_solver("fem", estimate=False)
     return fem.solve(Problem(problem.mesh, linear, load)).displacement(points)

@@ -24,9 +24,11 @@ from compare.evaluation.metrics import (
     marker_errors,
     reference_differences,
     truth_differences,
+    without_rigid_motion,
 )
 from geometry.atomic import write_text
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
 
 SCHEMA = 1
 """Keys may be added to a schema; a key that is renamed or removed makes a new one."""
@@ -84,12 +86,18 @@ def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
         },
         "held_out": held_out
         and {"ae_u": held_out.ae_u.tolist(), "ae_v": held_out.ae_v.tolist(), **_means(held_out)},
+        "rigid_motion_off": _without_rigid_motion(evaluation, observations),
         "uncertainty": _own_uncertainty(evaluation),
         "to_reference": _differences(differences)
         | {"reference_uncertainty": reference.uncertainty and _differences(reference.uncertainty)},
         "to_truth": None if truth is None else _by_component(truth_differences(evaluation, truth)._asdict()),
         "force_to_truth_rel": None if truth is None else force_error(evaluation, truth),
     }
+
+
+def _without_rigid_motion(evaluation: Evaluation, observations: Observations) -> dict[str, float] | None:
+    moved = without_rigid_motion(evaluation, observations)
+    return None if moved is None else _means(marker_errors(moved, observations))
 
 
 def _means(errors: MarkerErrors) -> dict[str, float]:

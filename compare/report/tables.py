@@ -14,7 +14,9 @@ from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation, ReferenceDifferences
 from compare.evaluation.metrics import (
     MEANS,
+    RIGID,
     TruthDifferences,
+    at_markers,
     force_error,
     held_out_errors,
     marker_errors,
@@ -59,9 +61,9 @@ def printed_rows(finger: Finger) -> tuple[Row, ...]:
 
 
 def table_one(comparison: Results) -> list[Row]:
-    """A row of Table I for each solver of this run."""
+    """A row of Table I for each evaluation of this run at its markers; see `at_markers`."""
     rows, observations = [], comparison.observations
-    for evaluation in comparison.evaluations:
+    for evaluation in at_markers(comparison.evaluations, observations):
         given = marker_errors(evaluation, observations)[2:] if evaluation.in_sample else None
         held_out = held_out_errors(evaluation, observations)
         rows.append(Row(evaluation.label, observations.label, given, held_out and held_out[2:]))
@@ -76,7 +78,8 @@ def millimetres(error: float, printed: bool = False) -> str:
 
 def write_table_one(path: Path, comparison: Results) -> None:
     """Write a row a solver, then `printed_rows`; cells without a number are empty."""
-    own = [(each.solver, int(each.converged)) for each in comparison.evaluations]
+    found = at_markers(comparison.evaluations, comparison.observations)
+    own = [(each.solver, int(each.converged)) for each in found]
     printed = printed_rows(comparison.design)
     names: list[tuple[str, Cell]] = [*own, *((row.solver, "") for row in printed)]
     rows: list[dict[str, Cell]] = []
@@ -199,7 +202,10 @@ def marker_table(comparison: Results) -> Table:
         "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) (its Table I)."
         + ("\npaper: as it prints them, of its own experiment and not of this run." if printed else "")
     )
-    rows = zip(table_one(comparison), comparison.evaluations, strict=True)
+    found = at_markers(comparison.evaluations, observations)
+    if len(found) > len(comparison.evaluations):
+        caption += f"\n{RIGID}: turned and shifted to be nearest to the pressed picture."
+    rows = zip(table_one(comparison), found, strict=True)
     table = _table(
         f"Mean absolute error at {markers}, mm ({observations.label} displacements)",
         ["given\nu", "\nv", "\nsum", "\nrss", "held out\nu", "\nv", "\nsum", "\nrss"],
@@ -242,7 +248,7 @@ def _table(title: str, headings: list[str], rows: list[tuple[Evaluation, list[st
     table.collapse_padding, table.pad_edge = True, True
     for evaluation, cells in rows:
         style = None if evaluation.converged else "yellow"
-        table.add_row(evaluation.label.replace(" (", "\n("), *cells, style=style)
+        table.add_row(evaluation.label.replace(" (", "\n(").replace(", ", ",\n"), *cells, style=style)
     return table
 
 

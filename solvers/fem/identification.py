@@ -13,6 +13,7 @@ from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
+from geometry.registration import Registration
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_conditions
 from solvers.fem.dolfinx_compat import DistributedSpace
@@ -183,7 +184,7 @@ class FemIdSolver(IdentifyingSolver):
             said = f"without markers, this is {self.model}: {plain.status.message}"
             return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
         found = with_doubts(
-            lambda given: self.refitter(replace(problem, observations=given))(given, progress),
+            lambda given: self.refitter(problem)(given, progress),
             problem.observations,
             lambda given: self._identifier(problem).expected(given),
         )
@@ -195,11 +196,13 @@ class FemIdSolver(IdentifyingSolver):
 
         Fits share the elements; each search starts from the last result. It takes a progress, too.
         """
-        identifier = self._identifier(problem)
+        kept: dict[tuple[Registration, Registration], Identifier] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
-            started = time.perf_counter()
-            found = identifier.identify(observations, progress)
+            started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
+            if frames not in kept:
+                kept[frames] = self._identifier(replace(problem, observations=observations))
+            found = kept[frames].identify(observations, progress)
             stats = {
                 "seconds": time.perf_counter() - started,
                 "unknowns": found.best.response.state.size,

@@ -11,6 +11,7 @@ from geometry.mesh.wall_motion import WallMotion
 from solvers.identification.body import Body
 from solvers.identification.boundary import RigidMotion
 from solvers.identification.model import Response, ResponseModel
+from solvers.identification.unknowns import doubt_of_the_plane
 from solvers.problem import Problem
 from solvers.solution import DisplacementField, State
 
@@ -99,7 +100,13 @@ class IdentifiedField(Snapshot):
 
     def von_mises_deviation(self, location: LocatedPoints) -> FloatArray:
         """Standard deviation of the von Mises stress, shape (n,), MPa."""
-        return self._deviation(lambda them: von_mises_stresses(them, location))
+        found = self._deviation(lambda them: von_mises_stresses(them, location))
+        if not (share := doubt_of_the_plane(self.problem)):
+            return found
+        (own,), mesh = von_mises_stresses([self], location), self.problem.mesh
+        (all_over,) = von_mises_stresses([self], mesh.at_centroids())
+        # Over a section bending differs from that of the plane also where the plane has little stress.
+        return np.hypot(found, share * np.hypot(own, np.sqrt(np.average(all_over**2, weights=mesh.areas))))
 
     def _deviation(self, quantities: Callable[[Sequence[Snapshot]], list[FloatArray]]) -> FloatArray:
         """Standard deviation of a quantity, a function of snapshots of one body."""

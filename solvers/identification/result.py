@@ -16,12 +16,13 @@ import numpy as np
 from scipy.stats import norm
 
 from geometry.arrays import FloatArray
+from geometry.mesh.boundary import mean_thickness
 from solvers.assimilation.estimation import LEVEL, Estimate
 from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.elasticity import LawName
 from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
 from solvers.identification.model import MarkerData, Response, ResponseModel
-from solvers.identification.unknowns import log_prior
+from solvers.identification.unknowns import doubt_of_the_plane, log_prior
 from solvers.problem import Problem
 from solvers.solution import Estimated, IdentifiedForce, Solution, Status, Uncertainty, unstable_phrase
 
@@ -78,7 +79,20 @@ class Fit(NamedTuple):
         size = float(np.linalg.norm(force))
         along = force / size if size else unknowns.directions[0]
         slopes = unknowns.slopes(self.response.values).force @ along
-        return size, float(np.linalg.norm(slopes @ self.standard_errors))
+        doubt = doubt_of_the_plane(unknowns.problem) * size
+        return size, float(np.hypot(np.linalg.norm(slopes @ self.standard_errors), doubt))
+
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Abscissa on the drawn front at which the force acts, and its standard deviation, mm; if unknown."""
+        names = self.model.unknowns.names
+        if "position" not in names:
+            return None
+        along = np.array([float(name in ("position", "eccentricity")) for name in names])
+        # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
+        couple = 0.25 * mean_thickness(self.model.unknowns.problem.mesh)
+        deviation = float(np.hypot(np.linalg.norm(along @ self.standard_errors), couple))
+        return float(along @ self.estimate.values), deviation
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,18 +123,9 @@ class Identified:
 
     def force(self) -> IdentifiedForce:
         """The force and its place: the mean over the laws, with an interval that holds their scatter."""
-        names, place = self.best.model.unknowns.names, None
         size = self._mean([fit.force for fit in self.fits])
-        if "position" in names:
-            which = names.index("position")
-            found = [fit.estimate for fit in self.fits]
-            place = self._mean(
-                [
-                    (float(each.values[which]), each.quantile / NORMAL * float(each.deviations[which]))
-                    for each in found
-                ]
-            )
-        return IdentifiedForce(size._replace(low=max(size.low, 0.0)), place)
+        places = [place for fit in self.fits if (place := fit.place)]
+        return IdentifiedForce(size._replace(low=max(size.low, 0.0)), self._mean(places) if places else None)
 
     def _mean(self, found: Sequence[tuple[float, float]]) -> Estimated:
         """The mean over the laws of a value with its standard deviation by each."""

@@ -4,7 +4,7 @@ Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, Chapman 
 without an observation.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from geometry.arrays import FloatArray
 from geometry.observations import Observations
-from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Prediction, estimate
+from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Estimate, Prediction, estimate
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
@@ -182,31 +182,37 @@ class Identifier:
         return found
 
     def _settled(self, rough: Fit) -> Fit:
-        """The fit of a law; where it does not explain the markers, the best of several from other contacts.
-
-        A wide contact is far from the start, in width and force; a place farther away counts where little
-        is explained.
-        """
+        """The fit of a law; where it does not explain the markers, the best from several contacts."""
         if rough.estimate.converged:
             return rough
         best = self._fit(rough.law, rough.measurement, rough)
         if best.estimate.inflation == 1 or self._known:
             return best
-        # Standard deviations of the prior
-        others = [("width", 3.0)] + [
-            ("position", away) for away in (-2.0, 2.0) if best.estimate.inflation > 10
-        ]
-        for name, away in others:
-            if name not in self._names:
-                continue
-            start = best.estimate.z.copy() if name == "width" else np.zeros(len(self._names))
-            start[self._names.index(name)] = away
+        for start in self._elsewhere(best.estimate):
             try:
                 other = self._fit(rough.law, rough.measurement, None, start)
             except NoSolutionError:
                 continue
             best = max(best, other, key=lambda fit: fit.log_evidence)
+            if best.estimate.inflation == 1:
+                break
         return best
+
+    def _elsewhere(self, found: Estimate) -> Iterator[FloatArray]:
+        """Standardised values, shape (p,), to start again from: a wide contact there, and in the middle.
+
+        Where little is explained, places far away follow.
+        """
+        if "width" in self._names:
+            wide = found.z.copy()
+            wide[self._names.index("width")] = 3.0
+            yield wide
+            yield np.where(np.isin(self._names, ("position", "tangential_force", "eccentricity")), 0.0, wide)
+        if "position" in self._names and found.inflation > 10:
+            for away in (-2.0, 2.0):
+                start = np.zeros(len(self._names))
+                start[self._names.index("position")] = away
+                yield start
 
     def _fit(
         self,

@@ -26,7 +26,7 @@ from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation
 from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
 from solvers.elasticity import LawName
 from solvers.identification.model import MarkerData, MarkerModel, ResponseModel
-from solvers.identification.unknowns import CONTACT, log_prior
+from solvers.identification.unknowns import CONTACT, doubt_of_the_plane, log_prior
 
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
@@ -252,7 +252,8 @@ class ForceTracker:
         force = values @ directions
         size = float(np.linalg.norm(force))
         along = force / size if size else self._unknowns.directions[0]
-        half = found.quantile * float(np.sqrt(along @ spread @ along))
+        doubt = doubt_of_the_plane(self._unknowns.problem) * size
+        half = found.quantile * float(np.hypot(np.sqrt(along @ spread @ along), doubt))
         wider = found.quantile / float(norm.ppf((1 + LEVEL) / 2))
         may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chi2.ppf(LEVEL, len(force))
         of_place = np.isin(self._unknowns.names, ("position", "eccentricity")).astype(np.float64)

@@ -36,6 +36,15 @@ def log_prior(law: LawName) -> float:
     return log(LAW_ODDS.get(law, 1.0))
 
 
+def doubt_of_the_plane(problem: Problem) -> float:
+    """Deviation of force and stress of a finger with a depth from those of the plane, as a share.
+
+    Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger is
+    in neither state, and its markers do not tell. A body that is only a plane has none.
+    """
+    return 0.0 if problem.finger is None else 0.5 * problem.material.poisson**2
+
+
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A finger and a contact."""

@@ -49,7 +49,7 @@ class GaussianProcessSolver(FieldSettings):
     name = "gp"
     family = "statistics"
     laws = ("linear",)
-    loads = ("mean", "point", "patch")
+    loads = ("mean", "point", "patch", "cylinder")  # it only needs to know where, for its force
     assimilates = True
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:

@@ -16,7 +16,8 @@ Methods Appl. Mech. Engrg. 375 (2021) 113533: the model of the data, its conditi
 likelihood. There the source term is random; here it is the prescribed displacement.
 
 At finite strain u is linearised about the nominal load: the shape of its largest component is the
-secant from rest, the other is the tangent.
+secant from rest, the other is the tangent. Under the linear law the travel of a cylinder is the mean
+displacement of the contact.
 """
 
 import time
@@ -34,7 +35,7 @@ from solvers.energy_and_force import energy_and_force
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField
-from solvers.problem import Problem
+from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status, Uncertainty
 from solvers.solver import ElementSettings, NoSolutionError, Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel, MarkerPrediction, with_markers_left_out
@@ -53,7 +54,7 @@ class StatFemSolver(ElementSettings):
     name = "statfem"
     family = "statistics"
     laws = (*FemSolver.laws, *FemNonlinearSolver.laws)
-    loads = FemSolver.loads
+    loads = FemNonlinearSolver.loads
     assimilates = True
 
     def __post_init__(self) -> None:
@@ -65,7 +66,7 @@ class StatFemSolver(ElementSettings):
         check_problem(self, problem)
         if problem.observations is None:
             fem = self._fem(problem)
-            plain = fem.solve(problem, progress)
+            plain = fem.solve(replace(problem, load=self._load(problem)), progress)
             said = Status(plain.status.converged, f"without markers this is {fem.name}")
             return replace(plain, solver=self.name, status=said)
         started = time.perf_counter()
@@ -94,13 +95,18 @@ class StatFemSolver(ElementSettings):
             return FemSolver(degree=self.degree, estimate=False)
         return FemNonlinearSolver(degree=self.degree)
 
+    def _load(self, problem: Problem) -> Load:
+        """The load that the finite elements take: a linear law knows no cylinder."""
+        linear = problem.material.law == "linear"
+        return problem.load.as_mean() if linear and problem.load.kind == "cylinder" else problem.load
+
     def _shapes(self, problem: Problem, progress: Progress) -> list[LagrangeField]:
         """Finite elements for a unit displacement of each prescribed component of the contact.
 
         At finite strain their sum, times the nominal displacements, is the solution; others add tangents. A
         `UserError` says that the finger has no equilibrium under the nominal load or near it.
         """
-        fem, load = self._fem(problem), problem.load
+        fem, load = self._fem(problem), self._load(problem)
 
         def moved(displacement: Sequence[float | None]) -> LagrangeField:
             there = load.model_copy(update={"displacement": tuple(displacement)})

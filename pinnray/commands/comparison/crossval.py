@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from compare.runtime.exits import NOT_CONVERGED, say
+from geometry.registration import Registration
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -34,6 +35,7 @@ def crossval(
     layouts: str | None = None,
     seeds: int = 5,
     noise: float = 0.005,
+    frame: str = "fixed",
     measurements: Path | None = None,
     processes: int | None = None,
     pictures: str = "",
@@ -55,6 +57,8 @@ def crossval(
             design's own.
         seeds: Number of noise draws.
         noise: Standard deviation of a simulated marker's displacement, mm.
+        frame: How the simulated pressed pictures lie, and how well that is known: fixed, or such as
+            "turn 3 deg, shift 0.3 mm, scale 1 %".
         measurements: CSV file of marker displacements; default: simulated.
         processes: Solvers run at a time; default: one per core.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
@@ -84,6 +88,7 @@ def crossval(
         layouts=comma_list(layouts) if layouts else (),
         seeds=seeds,
         noise=noise,
+        frame=Registration.parse(frame),
         measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
         out=out or Path("out") / f"crossval-{design.name}",
         processes=read_processes(processes),

@@ -17,6 +17,7 @@ from compare.crossval.study import CrossvalStudy, solver_variants
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
+from geometry.registration import HAND_HELD
 from pinnray.cli import main
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
@@ -301,3 +302,34 @@ def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
     assert [variant.label for variant in read_variants(fixed, "fem-asm", Material())] == ["fem-asm"]
     stiff = Material(law="neo-hookean")  # for which there is nothing to choose
     assert [variant.label for variant in read_variants(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]
+
+
+def test_turned_pictures_are_told_and_cost_statfem_little(tmp_path, in_line):
+    """Its held-out error is that of straight pictures within a half; `fem` knows of no picture."""
+    frame, errors = '--frame "turn 3 deg, shift 0.3 mm, scale 1 %"', {}
+    for name, option in (("straight", ""), ("turned", frame)):
+        line = f"--solvers statfem,fem --schemes one-out --seeds 2 {option}"
+        assert run(line, tmp_path / name) == 0
+        own = layouts_of(tmp_path / name)["joints"]["solvers"]
+        errors[name] = {
+            solver: own[solver]["schemes"]["one-out"]["held_out"]["mae_sum"]["mean"] for solver in own
+        }
+    assert errors["turned"]["statfem"] < 1.5 * errors["straight"]["statfem"]
+    assert errors["turned"]["fem"] > errors["straight"]["fem"] + 0.1
+
+
+def test_a_frame_is_for_simulated_pictures(tmp_path, observations):
+    with pytest.raises(UserError, match="frame: the file of the measurements says how well"):
+        CrossvalStudy(
+            design=Design(),
+            variants=solver_variants([make_solver("gp")], Material()),
+            out=tmp_path,
+            frame=HAND_HELD,
+            measurements=replace(observations, simulated=False),
+        ).check()
+    study = CrossvalStudy(design=Design(), variants=[], out=tmp_path, frame=HAND_HELD)
+    turned = study.pressed_picture(observations.points, 0)
+    np.testing.assert_allclose(np.abs(turned.values), [5.0, 1.0, 1.0, 0.02])
+    np.testing.assert_array_equal(turned.centre, observations.points.mean(axis=0))
+    others = [study.pressed_picture(observations.points, seed).values.tolist() for seed in range(1, 9)]
+    assert len({tuple(each) for each in others}) > 3

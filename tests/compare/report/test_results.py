@@ -55,6 +55,7 @@ SOLVER = {
     "certificate": CERTIFICATE,
     "markers": {"in_sample": bool, "ae_u": list, "ae_v": list, **ERRORS},
     "held_out": {"ae_u": list, "ae_v": list, **ERRORS},
+    "rigid_motion_off": (dict, type(None)),
     "uncertainty": UNCERTAINTY,
     "to_truth": (dict, type(None)),
     "force_to_truth_rel": (Real, type(None)),

@@ -9,9 +9,11 @@ import pytest
 
 from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import marker_errors, reference_differences
+from compare.evaluation.metrics import RIGID, marker_errors, reference_differences
+from compare.report.output_files import metrics
 from compare.report.tables import (
     PRINTED,
+    marker_table,
     printed_rows,
     table_one,
     write_markers,
@@ -20,6 +22,7 @@ from compare.report.tables import (
 )
 from geometry import Design, load_design
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.registration import FIXED, HAND_HELD
 
 Rows = list[dict[str, str]]
 Comparing = Callable[..., Results]
@@ -183,3 +186,30 @@ def test_the_papers_numbers_stand_beside_the_papers_finger_alone() -> None:
     assert printed_rows(Design()) == printed_rows(Design(marker_layout="front", fillet_radius=1)) == PRINTED
     assert printed_rows(Design(rib_count=3)) == ()
     assert printed_rows(load_design("csiro")) == ()
+
+
+def test_a_rigid_motion_is_taken_off_where_the_frame_is_unknown(fem, pinn, observations, compared, tmp_path):
+    """Of what is only turned and shifted nothing remains, and both errors are named."""
+    turn = np.radians(2.0)
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    moved = observations.points + fem.marker_displacement
+    shown = moved @ rotation.T + [0.3, -0.2] - observations.points
+    turned = replace(observations, displacements=shown, pressed=HAND_HELD)
+    given = replace(pinn, in_sample=True, left_out=shown)
+    comparison = compared(fem, given, observations=turned)
+    assert [row.solver for row in table_one(comparison)] == [
+        fem.solver,
+        f"{fem.solver}, {RIGID}",
+        pinn.solver,
+    ]
+    as_it_is, off, _ = (row.held_out for row in table_one(comparison))
+    assert as_it_is[2] > 0.1
+    assert off[2] == pytest.approx(0, abs=1e-9)
+    write_table_one(tmp_path / "t.csv", comparison)
+    assert [row["solver"] for row in read(tmp_path / "t.csv")][1] == f"{fem.solver}, {RIGID}"
+    assert "turned and shifted to be nearest" in str(marker_table(comparison).caption)
+    told = metrics(comparison)["solvers"]
+    assert told[fem.solver]["rigid_motion_off"]["mae_sum"] == pytest.approx(0, abs=1e-9)
+    assert told[pinn.solver]["rigid_motion_off"] is None
+    known = compared(fem, given, observations=replace(turned, pressed=FIXED))
+    assert [row.solver for row in table_one(known)] == [fem.solver, pinn.solver]

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.boundary import mean_thickness
 from geometry.mesh.quadrature import body_quadrature
 from geometry.registration import FIXED, HAND_HELD, Registration, Similarity
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -296,9 +298,39 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     variance = np.array([0.25, 0.75]) @ (deviations**2 + (forces - mean) ** 2)
     assert force.size.value == pytest.approx(mean)
     assert force.size.high - mean == pytest.approx(1.95996 * np.sqrt(variance), rel=1e-4)
-    places = [fit.estimate.values[0] for fit in found.fits]
+    # The place is where the force acts: the contact's middle plus the eccentricity of the force.
+    which = [found.best.model.unknowns.names.index(name) for name in ("position", "eccentricity")]
+    places = [float(fit.estimate.values[which].sum()) for fit in found.fits]
+    joint = found.best.estimate.slopes[which]
+    spread = joint @ found.best.estimate.covariance[np.ix_(which, which)] @ joint
+    wall = 0.25 * mean_thickness(problem.mesh)
+    assert found.best.place == pytest.approx((places[0], np.hypot(np.sqrt(spread), wall)))
     assert force.position.value == pytest.approx(0.25 * places[0] + 0.75 * places[1])
     assert force.position.low < min(places) < max(places) < force.position.high
+
+
+def test_a_finger_with_a_depth_is_in_no_plane_state(identified):
+    """Half of the difference of the plane moduli widens force and stress, also where there is no stress."""
+    solution = identified[2]
+    field, mesh = solution.field, solution.problem.mesh
+    deep = replace(field, problem=replace(field.problem, finger=Design()))
+    there = mesh.at_centroids()
+    stress = solution.state(there).von_mises
+    usual = np.sqrt(np.average(stress**2, weights=mesh.areas))
+    added = 0.5 * solution.problem.material.poisson**2 * np.hypot(stress, usual)
+    expected = np.hypot(field.von_mises_deviation(there), added)
+    np.testing.assert_allclose(deep.von_mises_deviation(there), expected, rtol=1e-9)
+
+
+def test_the_force_of_a_finger_with_a_depth_is_known_to_the_difference_of_the_planes(identified, problem):
+    observed, forces = identified[0], {}
+    for finger in (None, Design()):
+        own = replace(problem, finger=finger)
+        identifier = Identifier(FemIdSolver(degree=1), own, lambda unknowns: FemBody(unknowns, 1))
+        forces[finger is None] = identifier.identify(observed).best.force
+    (size, deviation), plane = forces[False], forces[True]
+    assert size == pytest.approx(plane[0])
+    assert deviation == pytest.approx(np.hypot(plane[1], 0.5 * problem.material.poisson**2 * size))
 
 
 def test_the_field_and_its_deviations_hold_the_truth(identified, problem):

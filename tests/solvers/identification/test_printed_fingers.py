@@ -14,10 +14,7 @@ DATA = Path(__file__).parents[2] / "data" / "printed-fingers"
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "stroke"), [("A", 16.0), ("B", 18.0)])
 def test_mechanics_predict_a_real_finger_better_than_none(name, stroke):
-    """Nothing is set by hand: the pressed picture, whose turn nobody knows, is an unknown of the fit.
-
-    `gp` and `statfem` take the pictures as they are.
-    """
+    """Nothing is set by hand: the pressed picture, whose turn nobody knows, is an unknown of every solver."""
     finger, load = pr.load_drawing(DATA / f"{name}.svg"), Load(displacement=(0.0, -stroke))
 
     def left_out(solver: str) -> float:
@@ -26,6 +23,9 @@ def test_mechanics_predict_a_real_finger_better_than_none(name, stroke):
         assert found.left_out is not None
         return float(np.sqrt(((found.left_out - found.problem.observations.displacements) ** 2).mean()))
 
-    best = left_out("fem-id")
-    assert best < 0.45
-    assert best < 0.8 * min(left_out("gp"), left_out("statfem"))
+    rivals = min(left_out("gp"), left_out("statfem"))
+    # `pinn-id` takes minutes for A, of which a wide contact is not far from the start.
+    for solver in ("fem-id", "pinn-id") if name == "B" else ("fem-id",):
+        best = left_out(solver)
+        assert best < 0.45
+        assert best < 0.8 * rivals
