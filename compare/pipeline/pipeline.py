@@ -12,6 +12,7 @@ from compare.evaluation.branches import with_branches
 from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Results, supported_solvers
 from compare.evaluation.deformed_body import with_body_checks
+from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_curves, pick_reference, write_force_displacement
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 from compare.evaluation.truths import (
@@ -127,9 +128,19 @@ def compute(job: Job, stages: Stages, folder: Path) -> Results:
         failed={name: _with_traceback(folder, name, reason) for name, reason in outcome.failed.items()},
         warnings=[
             *(f"{each.solver}: {text}" for each in evaluations for text in each.warnings),
-            *(*unit_remarks(problem), *remarks, *impossible, *branches),
+            *(*unit_remarks(problem), *remarks, *_unframed(evaluations, observations)),
+            *(*impossible, *branches),
         ],
     )
+
+
+def _unframed(evaluations: Sequence[Evaluation], observations: Observations) -> list[str]:
+    """A remark on solvers that were given pictures whose frames are unknown, and took them as they are."""
+    known = observations.pressed.fixed and observations.drawn.fixed
+    names = [each.solver for each in evaluations if each.in_sample and each.shown is None]
+    if known or not names:
+        return []
+    return [f"{', '.join(names)}: the pictures' frames are not known, and were taken as they are"]
 
 
 def _with_traceback(folder: Path, name: str, reason: str) -> str:

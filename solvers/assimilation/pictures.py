@@ -5,7 +5,8 @@ show, turned, shifted and scaled back. About z₀
 
     y(z₀) - S z₀ = u - S z + e          S = ∂y/∂z, z normal a priori
 
-so that the unknown frames are like further errors of the observations, common to all markers.
+so that the unknown frames are like further errors of the observations, common to all markers. For a solver
+that minimises energy plus misfit they are a compliance S Sᵀ / scale in series with the markers' springs.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,8 +18,13 @@ from scipy.stats import norm
 
 from geometry.arrays import FloatArray
 from geometry.observations import Observations
-from geometry.registration import Pictures, Registration, Similarity
+from geometry.registration import FIXED, Pictures, Registration, Similarity
 from solvers.assimilation.estimation import LEVEL, Parameter, values_of
+from solvers.assimilation.marker_forces import MarkerForces
+from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import leave_one_out_displacements
+from solvers.problem import Problem
+from solvers.solution import Solution
 
 PARTS = {"turn": "deg", "shift_x": "mm", "shift_y": "mm", "scale": ""}
 """Values of a similarity, with their units."""
@@ -38,6 +44,14 @@ def _of(picture: str, known: Registration) -> list[Parameter]:
         for (part, unit), deviation in zip(PARTS.items(), deviations, strict=True)
         if deviation
     ]
+
+
+class FramedFit(NamedTuple):
+    """Frames that a minimiser of energy plus misfit finds."""
+
+    z: FloatArray  # Standardised values, shape (p,)
+    covariance: FloatArray  # Shape (p, p)
+    residual_without: FloatArray  # Shown minus predicted of each marker without it, shape (m, 2), mm
 
 
 class FramedData(NamedTuple):
@@ -94,6 +108,49 @@ class FreePictures:
         for _ in range(ROUNDS if len(z) else 0):
             z = solve(self.about(z))
         return z
+
+    def by_forces(self, forces: MarkerForces, weighting: MarkerWeighting) -> FramedFit:
+        """The frames at the least energy plus misfit.
+
+        Args:
+            forces: At the markers, of the displacements that the pictures show as they are.
+            weighting: Of the markers.
+        """
+        undisturbed = forces.prior_residual - self.shown
+
+        def joint(framed: FramedData) -> tuple[MarkerForces, FloatArray, float]:
+            """With the frames' compliance, their rows (p, 2 m), and the factor of the weights."""
+            rows = framed.frames.reshape(len(framed.frames), forces.prior_residual.size)
+            compliance = forces.compliance + rows.T @ rows / weighting.scale
+            own = replace(forces, compliance=compliance, prior_residual=undisturbed + framed.observed)
+            return own, rows, weighting.factor(own)
+
+        def found(framed: FramedData) -> FloatArray:
+            own, rows, factor = joint(framed)
+            return rows @ own.fit(factor).forces.ravel() / weighting.scale
+
+        z = self.found(found)
+        own, rows, factor = joint(self.about(z))
+        springs = own.compliance + np.diag(1 / (factor * own.weights.ravel()))
+        known = rows @ np.linalg.solve(springs, rows.T) / weighting.scale
+        matrix = self.at(z).pressed.matrix @ np.linalg.inv(self.at(z).drawn.matrix)
+        return FramedFit(z, np.eye(len(z)) - known, own.fit(factor).residual_without @ matrix.T)
+
+    def straightened(self, observations: Observations, z: FloatArray) -> Observations:
+        """The observations as pictures in fixed frames would show them."""
+        displacements = observations.displacements.copy()
+        displacements[observations.visible] = self.at(z).own(self.points, self.shown)
+        return replace(observations, displacements=displacements, pressed=FIXED, drawn=FIXED)
+
+    def framed(self, solution: Solution, problem: Problem, found: FramedFit) -> Solution:
+        """The solution with straightened observations as that of the problem, which has those as they are."""
+        return replace(
+            solution,
+            problem=replace(solution.problem, observations=problem.observations),
+            stats={**solution.stats, **self.numbers(found.z, found.covariance)},
+            left_out=leave_one_out_displacements(problem, found.residual_without),
+            pictures=self.at(found.z),
+        )
 
     def numbers(self, z: FloatArray, covariance: FloatArray) -> dict[str, float]:
         """What was found, for tables: each value with its standard deviation and 95 % interval."""

@@ -19,6 +19,7 @@ from geometry.observations import Observations
 from solvers.assimilation.marker_forces import MarkerForces, residual_phrase
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
+from solvers.assimilation.pictures import FreePictures
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
 from solvers.fem.equilibrium import DiscreteEquilibrium
@@ -126,7 +127,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
             finger, markers = whole[0]
             if misfit.radius != markers.radius or not np.array_equal(markers.points, observations.points):
                 return self.solve(own)
-            return self._fitted(own, finger.of_markers(observations.visible), misfit)
+            return self._framed(own, finger.of_markers(observations.visible), misfit)
 
         return refit
 
@@ -136,9 +137,18 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
         started = time.perf_counter()
         finger, misfit = self.prepare(problem)
         progress(0.9, "solved for the forces at the markers")
-        solution = self._fitted(problem, finger, misfit)
+        solution = self._framed(problem, finger, misfit)
         finger.equilibrium.factors.destroy()
         return replace(solution, stats={**solution.stats, "seconds": time.perf_counter() - started})
+
+    def _framed(self, problem: Problem, finger: MarkerCompliance, misfit: Misfit) -> Solution:
+        """The minimiser over displacement and unknown frames of the pictures."""
+        observations = problem.observations
+        if observations is None or not (pictures := FreePictures.of(observations)).parameters:
+            return self._fitted(problem, finger, misfit)
+        found = pictures.by_forces(finger.forces(misfit), self.weighting)
+        straight = replace(problem, observations=pictures.straightened(observations, found.z))
+        return pictures.framed(self._fitted(straight, finger, self._misfit(straight)), problem, found)
 
     def _fitted(self, problem: Problem, finger: MarkerCompliance, misfit: Misfit) -> Solution:
         started = time.perf_counter()

@@ -92,6 +92,12 @@ class ConstrainedNetwork:
         return torch.zeros(basis.windows.count, 2, basis.per_window, dtype=torch.float64)
 
     @property
+    def markers_at_rest(self) -> MarkerForces | None:
+        """The forces at the markers under the whole load, of a linear law; None without markers."""
+        state = self.step(self.zero_output)
+        return None if state is None else state.markers
+
+    @property
     def load_count(self) -> int:
         """Number of springs of the load, a k: the first ones."""
         return int(np.prod(self.load_shape))

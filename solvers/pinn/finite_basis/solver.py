@@ -13,6 +13,7 @@ from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.marker_forces import MarkerFit
 from solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
+from solvers.assimilation.pictures import FreePictures
 from solvers.cylinder_contact import CONTACT_AT_END
 from solvers.pinn.finite_basis.base_distance import HardConstraint
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
@@ -106,6 +107,8 @@ class FiniteBasisSolver(NetworkSolver):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network; see `Solver`."""
         check_problem(self, problem)
+        if (framed := self._framed(problem, progress)) is not None:
+            return framed
         last: LoadStep | None = None
 
         def train(
@@ -125,6 +128,22 @@ class FiniteBasisSolver(NetworkSolver):
 
         with pool():
             return self.trained(problem, train, progress)
+
+    def _framed(self, problem: Problem, progress: Progress) -> Solution | None:
+        """The solution with the pictures' frames by the coarsest level; None where they are fixed.
+
+        At finite strain the pictures are taken as they are.
+        """
+        observations, linear = problem.observations, problem.material.law == "linear"
+        if self.weighting is None or observations is None or not linear:
+            return None
+        pictures = FreePictures.of(observations)
+        forces = self.level(problem, self.coarser).markers_at_rest if pictures.parameters else None
+        if forces is None:
+            return None
+        found = pictures.by_forces(forces, self.weighting)
+        straight = replace(problem, observations=pictures.straightened(observations, found.z))
+        return pictures.framed(self.solve(straight, progress), problem, found)
 
     def trained(self, problem: Problem, train: Train, progress: Progress) -> Solution:
         """The solution by refinement levels, trained one after the other until two agree."""

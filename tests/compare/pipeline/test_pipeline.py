@@ -23,6 +23,7 @@ from geometry.finger.design import Design
 from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
+from geometry.registration import FIXED, HAND_HELD
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
@@ -509,3 +510,13 @@ def test_markers_outside_the_finger(job, tmp_path, measured):
     ):
         compare(job(Scripted("first")))
     assert not (tmp_path / "out").exists()
+
+
+def test_pictures_that_were_taken_as_they_are_are_said(job, observations):
+    """By solvers that were given the markers and told of no frame."""
+    loose = replace(observations, simulated=False, pressed=HAND_HELD)
+    warnings = compare(job(Scripted("blind"), Assimilating("seeing"), measurements=loose)).warnings
+    said = "seeing: the pictures' frames are not known, and were taken as they are"
+    assert said in warnings
+    known = replace(loose, pressed=FIXED)
+    assert said not in compare(job(Scripted("blind"), Assimilating("seeing"), measurements=known)).warnings
