@@ -28,6 +28,9 @@ QUICK = 4
 IMPROBABLE = 15.0
 """Logarithm of the ratio of evidences from which on a law is not fitted to the end."""
 
+HOPELESS = 100.0
+"""φ from which neither a wide contact nor another law explains the markers: another order or finger does."""
+
 MOST_LOST = 8
 """Hypotheses without equilibrium at which a search ends: near a limit load there are ever more of them."""
 
@@ -99,7 +102,8 @@ class Identifier:
                 if len(lost) == len(self.models):
                     raise error
         fits = [fit]
-        for law in (law for law in self.models if law != fit.law and law not in lost):
+        rivals = [law for law in self.models if law != fit.law and law not in lost]
+        for law in rivals if fit.estimate.inflation < HOPELESS else ():
             try:
                 fits.append(self._rival(law, fit))
             except NoSolutionError:
@@ -201,9 +205,9 @@ class Identifier:
     def _elsewhere(self, found: Estimate) -> Iterator[FloatArray]:
         """Standardised values, shape (p,), to start again from: a wide contact there, and in the middle.
 
-        Where little is explained, places far away follow.
+        Where little is explained, places far away follow; where nothing is, they are all.
         """
-        if "width" in self._names:
+        if "width" in self._names and found.inflation < HOPELESS:
             wide = found.z.copy()
             wide[self._names.index("width")] = 3.0
             yield wide

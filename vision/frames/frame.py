@@ -58,14 +58,17 @@ class Frames:
         rate: Frames a second, from the source or the user.
         count: Number of frames by the source; None for a camera or a pipe. It can be wrong for a video with
             a variable rate.
+        lossy: True for a video whose codec changes images: alike in frames that repeat each other.
         simulated: True if the first frame carries `RIG_MARK`: no camera was involved.
 
     Raises:
         UserError: If the source has no frame; on iterating, if an image cannot be read or has another size.
     """
 
-    def __init__(self, name: str, images: ImageStream, *, rate: float, count: int | None = None) -> None:
-        self.name, self.rate, self.count = name, rate, count
+    def __init__(
+        self, name: str, images: ImageStream, *, rate: float, count: int | None = None, lossy: bool = False
+    ) -> None:
+        self.name, self.rate, self.count, self.lossy = name, rate, count, lossy
         self._images = images
         first = next(images, None)
         if first is None:

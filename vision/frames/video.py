@@ -74,7 +74,8 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
     rate = plausible_rate(float(stream.average_rate or 0), rate)
     duration = (container.duration or 0) / av.time_base
     count = stream.frames or round(duration * rate) or None
-    return Frames(str(path), _images_of_video(path, file, container, rate, count), rate=rate, count=count)
+    images, lossy = _images_of_video(path, file, container, rate, count), bool(stream.codec.lossy)
+    return Frames(str(path), images, rate=rate, count=count, lossy=lossy)
 
 
 def _images_of_video(

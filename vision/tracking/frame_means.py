@@ -12,17 +12,23 @@ LEAST_SHARE = 0.2
 """Smallest share of the frames at rest in which a visible marker is detected."""
 USUAL = 1.3
 """Largest variance over the discs' median that counts as noise alone."""
+LOSSY = 0.02
+"""Further standard deviation of a disc in a lossy film, pixels, common to frames that repeat each other. In
+H.264 films by another renderer errors are 0.7 to 1.0 of what is so stated, 1.3 at a quarter of their size."""
 TRUST = 8
 """Prior degrees of freedom given to the fit's covariance, against the frames' scatter."""
 
 
-def mean_detections(frames: Sequence[DiscDetections], method: DetectionMethod) -> DiscDetections:
+def mean_detections(
+    frames: Sequence[DiscDetections], method: DetectionMethod, *, lossy: bool = False
+) -> DiscDetections:
     """Every disc's weighted mean over frames; nan for those detected in too few.
 
     Weights are inverse covariances. The covariances of most discs are noise, which a mean over independent
     frames reduces; the excess of others is misfit, such as of the wall beside a disc, and common to all
-    frames, as is `FLOOR`. Frames of lossy films repeat each other: if the discs scatter less than their
-    covariances, the difference is common too, and autocorrelation reduces the number of independent frames.
+    frames, as are `FLOOR` and, of a lossy film, `LOSSY`. Its frames repeat each other: if the discs scatter
+    less than their covariances, the difference is common too, and autocorrelation reduces the number of
+    independent frames.
     If a disc scatters more than its covariances, these grow with the mean square (R. T. Birge, "The
     calculation of errors by the method of least squares", Physical Review 40, 1932).
     """
@@ -46,7 +52,7 @@ def mean_detections(frames: Sequence[DiscDetections], method: DetectionMethod) -
     noise = np.minimum(USUAL * np.median(size) / size, 1.0)
     away = np.where(seen[:, known, None], centres[:, known] - mean[known], np.nan)
     share = _kept(away, weights[:, known], count[known], noise)
-    covariance[known] = share[:, None, None] * usual + FLOOR[method] ** 2 * np.eye(2)
+    covariance[known] = share[:, None, None] * usual + (FLOOR[method] ** 2 + lossy * LOSSY**2) * np.eye(2)
     return DiscDetections(mean, covariance, radius, contrast)
 
 

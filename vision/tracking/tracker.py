@@ -74,9 +74,11 @@ def track(
         noise=FLOOR[scene.method] / tracker.plane.scales(markers).mean(),
     )
     still = [[detections[number] for number in end] for end in rest]
-    initial, final = (mean_detections([frame.markers for frame in end], scene.method) for end in still)
+    initial, final = (
+        mean_detections([frame.markers for frame in end], scene.method, lossy=frames.lossy) for end in still
+    )
     before, after, always = (
-        mean_detections(fiducials, scene.method)
+        mean_detections(fiducials, scene.method, lossy=frames.lossy)
         for fiducials in _fiducials_at_rest([frame.fiducials for frame in detections], rest)
     )
     motion = None

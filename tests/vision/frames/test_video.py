@@ -54,6 +54,8 @@ def test_every_frame_comes_back(name, codec, psnr, tmp_path):
     assert len(back) == 7
     assert min(map(cv2.PSNR, frames, back)) >= min(psnr, 360)  # OpenCV's infinity is about 361
     assert [file.name for file in tmp_path.iterdir()] == [name]
+    with open_frames(path) as opened:
+        assert opened.lossy == np.isfinite(psnr)
 
 
 @pytest.mark.parametrize("rate", [1, 23.976, 59.94, 240])

@@ -6,7 +6,7 @@ from scipy.stats import chi2
 
 from geometry.arrays import FloatArray
 from vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
-from vision.tracking.frame_means import mean_detections
+from vision.tracking.frame_means import LOSSY, mean_detections
 
 DEVIATION = 0.01
 """Of a coordinate in one frame, pixels."""
@@ -203,3 +203,11 @@ def test_discs_whose_frames_do_not_follow_each_other_say_nothing_of_the_correlat
     squares = np.array([2 * 4 * 12 * 143 / 12] * 2 + [half] * 3)
     excess = (8 + squares) / (8 + 2 * (np.array([12, 12, 6, 6, 6]) - 1))
     np.testing.assert_allclose(found, excess / np.maximum(independent, 1), rtol=1e-9)
+
+
+def test_a_lossy_film_adds_what_its_frames_share() -> None:
+    frames = frames_of(np.random.default_rng(2).normal(size=(5, 3, 2)))
+    plain, lossy = (mean_detections(frames, "precise", lossy=each) for each in (False, True))
+    np.testing.assert_array_equal(plain.centres, lossy.centres)
+    added = np.broadcast_to(LOSSY**2 * np.eye(2), plain.covariances.shape)
+    np.testing.assert_allclose(lossy.covariances - plain.covariances, added, atol=1e-12)
