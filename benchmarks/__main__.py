@@ -27,6 +27,7 @@ BENCHMARKS = {
     "sweep": "sweeps.speed:main",
     "optimise": "sweeps.fronts:main",
     "validation": "validation.document:main",
+    "posterior": "validation.posterior:main",
     "reliability": "reliability.document:main",
 }
 """Names, and functions that return a table; the modules' docstrings have descriptions and times."""

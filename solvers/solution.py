@@ -52,6 +52,8 @@ class Uncertainty(NamedTuple):
     displacement: Callable[[LocatedPoints], FloatArray]
     #: Of the von Mises stress, shape (n,), MPa, where the solver knows it
     von_mises: Callable[[LocatedPoints], FloatArray] | None = None
+    #: Of `Solution.shown`, shape (n, 2), mm, where the solver found the pictures' frames
+    shown: Callable[[LocatedPoints], FloatArray] | None = None
 
 
 class Contact(NamedTuple):

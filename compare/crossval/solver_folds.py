@@ -153,9 +153,9 @@ class FoldRunner:
             solution = self._fitted(observations[0], fold.held)
             sampled = self._at_load_case(solution, fold.load_case)
             if solution.uncertainty and fold.load_case == 0:
+                deviation = solution.uncertainty.shown or solution.uncertainty.displacement
                 noise = observations[0].standard_deviations
-                stated = solution.uncertainty.displacement(self.sampler.centres)
-                deviations = np.hypot(stated, noise).tolist()
+                deviations = np.hypot(deviation(self.sampler.centres), noise).tolist()
         own = replace(self.problem, material=solution.problem.material)  # a solver may have estimated it
         status, faults = self._body.status(solution)
         against = [*faults, *([] if status.converged else [f"did not converge: {solution.status.message}"])]

@@ -8,6 +8,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.wall_motion import WallMotion
+from geometry.registration import Pictures
 from solvers.identification.body import Body
 from solvers.identification.boundary import RigidMotion
 from solvers.identification.model import Response, ResponseModel
@@ -32,6 +33,7 @@ class Snapshot:
     clamp: RigidMotion  # Motion of the clamp
     body: Body  # The discretised finger
     state: FloatArray  # Its displacement without the clamp's
+    pictures: Pictures  # Frames of the observations' pictures
 
     @property
     def drawn(self) -> DisplacementField:
@@ -97,6 +99,14 @@ class IdentifiedField(Snapshot):
     def standard_deviation(self, location: LocatedPoints) -> FloatArray:
         """Standard deviation of `displacement_in_space`, shape (n, 2), mm."""
         return self._deviation(lambda them: [each.displacement_in_space(location) for each in them])
+
+    def shown_deviation(self, location: LocatedPoints) -> FloatArray:
+        """Standard deviation of what the pictures show of the displacement, shape (n, 2), mm."""
+        return self._deviation(
+            lambda them: [
+                each.pictures.shown(location.points, each.displacement_in_space(location)) for each in them
+            ]
+        )
 
     def von_mises_deviation(self, location: LocatedPoints) -> FloatArray:
         """Standard deviation of the von Mises stress, shape (n,), MPa."""

@@ -157,7 +157,7 @@ class Identified:
             if fit is best or probability >= PROBABLE
         ]
         field = IdentifiedField(**vars(members[0].found), members=members)
-        sentence = self.sentence(missed)
+        sentence, loose = self.sentence(missed), best.model.unknowns.unregistered
         return Solution(
             solver=name,
             problem=field.problem,
@@ -171,9 +171,11 @@ class Identified:
             ),
             stats={**stats, **self.stats(), "unstable_directions": unstable},
             left_out=leave_one_out_displacements(problem, left_out),
-            uncertainty=Uncertainty(field.standard_deviation, field.von_mises_deviation),
+            uncertainty=Uncertainty(
+                field.standard_deviation, field.von_mises_deviation, field.shown_deviation if loose else None
+            ),
             identified=self.force(),
-            pictures=hypothesis.pictures if best.model.unknowns.unregistered else None,
+            pictures=hypothesis.pictures if loose else None,
         )
 
     def _residuals(self) -> tuple[FloatArray, FloatArray]:
@@ -310,4 +312,5 @@ def _snapshot(fit: Fit, problem: Problem, error: FloatArray | float = 0.0) -> Sn
         clamp=there.motion,
         body=fit.model.body,
         state=there.state,
+        pictures=there.hypothesis.pictures,
     )

@@ -10,6 +10,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -115,7 +116,10 @@ class GaussianProcessSolver(FieldSettings):
                 "log_evidence": posterior.log_evidence,
                 **pictures.numbers(*posterior.frames),
             },
-            uncertainty=Uncertainty(field.standard_deviation),
+            uncertainty=Uncertainty(
+                field.standard_deviation,
+                shown=partial(field.shown_deviation, pictures) if pictures.parameters else None,
+            ),
             pictures=pictures.at(posterior.frames[0]) if pictures.parameters else None,
         )
         return solution, posterior, pictures

@@ -23,6 +23,7 @@ displacement of the contact.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -193,7 +194,10 @@ class StatFemSolver(ElementSettings):
                 **{f"load_{'uv'[axis]}": float(value) for axis, value in loads},
                 **pictures.numbers(*posterior.frames),
             },
-            uncertainty=Uncertainty(field.standard_deviation),
+            uncertainty=Uncertainty(
+                field.standard_deviation,
+                shown=partial(field.shown_deviation, pictures) if pictures.parameters else None,
+            ),
             pictures=pictures.at(posterior.frames[0]) if pictures.parameters else None,
         )
         return solution, posterior, pictures

@@ -164,6 +164,15 @@ class StatFemField:
         """Standard deviation of the displacement, shape (n, 2), mm."""
         return np.asarray(np.sqrt(self.posterior.at(location.points, self._own(location))[1]))
 
+    def shown_deviation(self, pictures: FreePictures, location: LocatedPoints) -> FloatArray:
+        """Standard deviation of what pictures show of the displacement, shape (n, 2), mm."""
+        z, points = self.posterior.frames[0], location.points
+        there = replace(
+            pictures, points=points, shown=pictures.at(z).shown(points, self.displacement(location))
+        )
+        frames = there.about(z).frames
+        return np.asarray(np.sqrt(self.posterior.at(points, self._own(location), frames)[1]))
+
     def _own(self, location: LocatedPoints) -> FloatArray:
         """Displacements by the shapes, shape (k, n, 2)."""
         own = [shape.displacement(location) for shape in self.shapes]

@@ -4,9 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from vision.discs.disc_detector import DiscDetections
 from vision.tracking.marker_plane import MarkerPlane
+from vision.tracking.plane_fit import pose_covariance
 from vision.tracking.scene import FilmedScene
 
 FEWEST = 4
@@ -24,12 +26,14 @@ class CameraMotion(NamedTuple):
         shift: Median over the fiducials, pixels.
         planes: Of the markers at start and end; None if the camera is static, or the fiducials are too few or
             in a row.
-        deviation: Standard deviation of a coordinate that is corrected by the planes, pixels.
+        deviation: Standard deviation of a coordinate that is corrected by planes without a camera, pixels.
+        poses: Covariances of the camera's poses at both ends, by the fiducials' noise; none without a camera.
     """
 
     shift: float
     planes: tuple[MarkerPlane, MarkerPlane] | None
     deviation: float = 0.0
+    poses: tuple[FloatArray, ...] = ()
 
     def undone(self, final: DiscDetections) -> DiscDetections:
         """Discs at the end, mapped to where a static camera would have seen them."""
@@ -37,8 +41,14 @@ class CameraMotion(NamedTuple):
             return final
         start, end = self.planes
         centres, known = final.centres.copy(), np.isfinite(final.radii)
-        centres[known] = start.pixels(end.points(centres[known]))
-        return final._replace(centres=centres, covariances=final.covariances + self.deviation**2 * np.eye(2))
+        points = end.points(centres[known])
+        centres[known] = start.pixels(points)
+        covariances = final.covariances + (0.0 if self.poses else self.deviation**2) * np.eye(2)
+        for plane, pose in zip(self.planes, self.poses, strict=False):
+            # At another height than the fiducials' a wrong tilt moves the markers farther.
+            by_pose = plane.projection.jacobians(points, plane.parameters).parameters[:, :, :6]
+            covariances[known] += by_pose @ pose @ by_pose.transpose(0, 2, 1)
+        return final._replace(centres=centres, covariances=covariances)
 
 
 def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDetections) -> CameraMotion:
@@ -65,4 +75,10 @@ def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDe
         start, end = (scene.plane(fiducials.numbered(numbers)) for fiducials in (before, alike))
     except UserError:  # those that both ends show lie in a row
         return CameraMotion(shift, None)
-    return CameraMotion(shift, (start, end), noise * np.sqrt(UNKNOWNS / (2 * count)))
+    points = scene.workspace.points[common]
+    poses = [
+        pose_covariance(plane, points, fiducials.covariances[common])
+        for plane, fiducials in ((start, before), (end, after))
+    ]
+    known = tuple(pose for pose in poses if pose is not None)
+    return CameraMotion(shift, (start, end), noise * np.sqrt(UNKNOWNS / (2 * count)), known)

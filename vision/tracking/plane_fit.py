@@ -62,6 +62,17 @@ def camera_plane(
     return MarkerPlane(CameraProjection(camera, height), parameters, covariance, residual)
 
 
+def pose_covariance(plane: MarkerPlane, points: FloatArray, covariances: FloatArray) -> FloatArray | None:
+    """Covariance of a camera's pose by the noise of the fiducials, shape (6, 6); None without a camera.
+
+    Arguments as of `camera_plane`.
+    """
+    if not isinstance(plane.projection, CameraProjection):
+        return None
+    on_sheet = CameraProjection(plane.projection.camera).jacobians(points, plane.parameters)
+    return _gain(on_sheet.parameters[:, :, :6].reshape(2 * len(points), 6), covariances)[1]
+
+
 def homography_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
     """Fit a homography, without a camera; arguments as of `camera_plane`."""
     start = cv2.findHomography(points, pixels, 0)[0]  # its last entry is 1

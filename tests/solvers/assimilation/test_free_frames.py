@@ -93,6 +93,30 @@ def test_a_turned_picture_is_found(problem, solver):
 
 
 @pytest.mark.parametrize("solver", ["statfem", "gp"])
+def test_deviations_in_the_picture_are_those_of_markers_left_out(problem, solver):
+    """The frame's is part of them."""
+    observed, _ = pictured(problem, OFF)
+    seen = observed.visible.copy()
+    seen[4] = False
+    found = make_solver(solver).solve(replace(problem, observations=replace(observed, visible=seen)))
+    there = problem.mesh.locate(observed.points)
+    shown = found.uncertainty.shown(there)
+    framed = found.field.posterior
+    z, pictures = framed.frames[0], FreePictures.of(replace(observed, visible=seen))
+    place = replace(
+        pictures,
+        points=observed.points[[4]],
+        shown=found.shown(observed.points, found.displacement(there))[[4]],
+    )
+    own_shapes = found.field._own(there)[:, [4]]
+    _, variance = framed.at(observed.points[[4]], own_shapes, place.about(z).frames)
+    np.testing.assert_allclose(shown[4] ** 2, variance[0], rtol=1e-6)
+    assert shown[seen].max() < 0.011  # as exactly as it was seen
+    fixed = make_solver(solver).solve(replace(problem, observations=replace(observed, pressed=FIXED)))
+    assert fixed.uncertainty.shown is None
+
+
+@pytest.mark.parametrize("solver", ["statfem", "gp"])
 def test_a_marker_left_out_is_predicted_in_its_picture(problem, solver):
     """`gp` is as good as without the turn; `statfem`, which is told that there is none, is far off."""
     turned, _ = pictured(problem, OFF)

@@ -274,6 +274,10 @@ def test_the_frame_of_the_pressed_picture_is_found(problem, known):
     field = found.displacement_in_space(observed.points)
     np.testing.assert_allclose(found.shown(observed.points, field), shown, atol=4 * NOISE)
     np.testing.assert_allclose(field, observed.displacements, atol=0.6)
+    # At the markers the picture is known to their noise, whatever is known of its frame.
+    there = problem.mesh.locate(observed.points)
+    in_picture, of_finger = found.uncertainty.shown(there), found.uncertainty.displacement(there)
+    assert in_picture.max() < 2 * NOISE < of_finger.max()
     fixed = FemIdSolver(degree=1).solve(replace(problem, observations=replace(loose, pressed=FIXED)))
     # It has no such picture: the frame is freed, and the result does not count as converged.
     assert not fixed.status.converged

@@ -1,5 +1,7 @@
 """A camera that was nudged between start and end, and one that stood still."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -57,6 +59,26 @@ def test_a_nudge_is_undone_and_what_is_left_is_as_large_as_the_standard_deviatio
         variances = np.diagonal(undone.covariances, axis1=1, axis2=2)
         squares.append(((undone.centres - truth) ** 2 / variances).mean())
     assert 0.4 < np.mean(squares) < 1.6
+
+
+def test_markers_above_the_fiducials_are_known_less_after_a_nudge():
+    """The pose is that of the sheet: at 20 mm above it a wrong tilt moves the markers as well."""
+    rng, height = np.random.default_rng(3), 20.0
+    scene = replace(SCENE, workspace=WORKSPACE.model_copy(update={"marker_plane": height}))
+    raised = np.column_stack([MARKERS, np.full(len(MARKERS), height)])
+    truth, there = CAMERA.project(raised, POSE), CAMERA.project(raised, NUDGED)
+    exact = discs(MARKERS, POSE, rng)._replace(covariances=np.zeros((len(MARKERS), 2, 2)))
+    squares, shares = [], []
+    for _ in range(100):
+        motion = find_camera_motion(
+            scene, discs(WORKSPACE.points, POSE, rng), discs(WORKSPACE.points, NUDGED, rng)
+        )
+        undone = motion.undone(exact._replace(centres=there))
+        error = undone.centres - truth
+        squares.append(np.einsum("ni,nij,nj->n", error, np.linalg.inv(undone.covariances), error).mean() / 2)
+        shares.append(np.trace(undone.covariances, axis1=1, axis2=2).mean() / 2 / motion.deviation**2)
+    assert 0.6 < np.mean(squares) < 1.5
+    assert np.mean(shares) > 2
 
 
 def test_too_few_fiducials_tell_of_a_nudge_but_do_not_undo_it():
