@@ -60,7 +60,7 @@ def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> F
     """Draw the outline of every solver's deformed finger into a frame, one panel each."""
     plane = tracking.final_plane or tracking.plane
     nodes = comparison.mesh.points
-    bodies = [plane.pixels(nodes + each.node_displacement) for each in comparison.evaluations]
+    bodies = [plane.pixels(_pictured(each, comparison)) for each in comparison.evaluations]
     shown = [body for body, each in zip(bodies, comparison.evaluations, strict=True) if each.converged]
     (left, top), (right, bottom) = _window(np.concatenate([plane.pixels(nodes), *shown]), image)
     columns = 1 if len(bodies) == 1 else 2
@@ -91,6 +91,23 @@ def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> F
     return drawn
 
 
+def _pictured(evaluation: Evaluation, comparison: Results) -> FloatArray:
+    """Places of the deformed body's nodes in the pressed picture, shape (n, 2), mm.
+
+    Where the solver found the picture's frame, the similarity that takes its markers there takes the nodes.
+    """
+    moved = comparison.mesh.points + evaluation.node_displacement
+    if evaluation.shown is None:
+        return np.asarray(moved)
+    rest, along = comparison.observations.points, np.array([1, 1j])
+    own, shown = rest + evaluation.marker_displacement, rest + evaluation.shown
+    (factor, shift), *_ = np.linalg.lstsq(
+        np.column_stack([own @ along, np.ones(len(own))]), shown @ along, rcond=None
+    )
+    there = factor * (moved @ along) + shift
+    return np.column_stack([there.real, there.imag])
+
+
 def _window(pixels: FloatArray, image: Image) -> tuple[FloatArray, FloatArray]:
     """The first and the last pixel, x and y, of the part of the image around points, shape (n, 2)."""
     low, high = pixels.min(axis=0), pixels.max(axis=0)
@@ -114,4 +131,6 @@ def _markers(axes: Axes, tracking: Tracking, computed: FloatArray) -> None:
 
 def _name(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
     note = errors_note(evaluation, comparison.observations)
-    axes.set_title(f"{evaluation.label_at_markers}: {note}", size=SMALL)
+    title = axes.set_title(f"{evaluation.label_at_markers}: {note}", size=SMALL)
+    longer = title.get_window_extent().width / axes.get_window_extent().width
+    title.set_fontsize(SMALL / max(longer, 1.0))

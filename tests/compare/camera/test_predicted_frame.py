@@ -1,11 +1,22 @@
 """The predicted outline lies in the film where the film shows the finger."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 
 from compare.camera import predicted_frame
+from compare.evaluation.comparison import Results
+from compare.evaluation.evaluation import Evaluation
+from geometry.cache import finger_mesh
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.registration import Similarity
 from pinnray.cli import main
+from solvers.fem.linear import FemSolver
+from solvers.problem import Problem
+from tests.solvers.conftest import observed_at
 from vision.frames.sources import open_frames
 
 FILM = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 0 --tilt 8 --turn 15 --seed 1"
@@ -52,3 +63,17 @@ def test_the_outline_of_the_right_solver_is_the_edge_of_the_finger(drawn):
     assert inside - outside > 30
     middle = (seen(0.0) - outside) / (inside - outside)
     assert np.median(middle) == pytest.approx(0.5, abs=0.3)  # an edge is one or two pixels wide
+
+
+def test_an_outline_is_drawn_in_the_picture_whose_frame_was_found():
+    """The nodes are turned, shifted and scaled as the markers were."""
+    mesh = finger_mesh(Design(), settings=MeshSettings(size=2.0))
+    solution = FemSolver(estimate=False).solve(Problem(mesh))
+    known = Evaluation.of(solution, mesh)
+    picture = Similarity(mesh.markers.mean(axis=0), np.array([2.0, 0.4, -0.3, 0.01]))
+    shown = picture.moved(mesh.markers + known.marker_displacement) - mesh.markers
+    observed = observed_at(mesh.markers, shown, 0.01)
+    moved = mesh.points + known.node_displacement
+    for evaluation, expected in ((known, moved), (replace(known, shown=shown), picture.moved(moved))):
+        results = Results(Design(), mesh, observed, [evaluation], evaluation)
+        np.testing.assert_allclose(predicted_frame._pictured(evaluation, results), expected, atol=1e-9)
