@@ -26,7 +26,7 @@ from solvers.problem import Load, Material, Problem
 from solvers.solver import silent
 
 NOISE = 0.005
-WALKERS, STEPS, BURNED = 32, 1200, 300
+WALKERS, STEPS, BURNED = 32, 500, 200
 
 
 def main() -> Table:

@@ -17,7 +17,7 @@ CONTRADICTED = 20.0
 `compare.evaluation.truths`, 60 with a clamp that gave by 0.5 degrees and 0.4 mm, and 270 to 410 with markers
 in another order."""
 EXPLAINED = 3.0
-"""Factor by which another order or frame has to lower φ to be named."""
+"""Factor by which another order or frame has to lower φ to be named; they are tried where it can."""
 
 
 def likely_order(moved: FloatArray, expected: FloatArray, share: float = 1.0) -> IntArray | None:
@@ -69,7 +69,7 @@ def with_doubts(
     """
     found = solve(observations)
     off = _inflation(found)
-    if off <= CONTRADICTED:
+    if off < EXPLAINED:
         return found
     fault = (
         f"NO FINGER OF THIS DRAWING EXPLAINS THE MARKERS: they are {off:.0f} times as far off as they are "
@@ -95,6 +95,8 @@ def with_doubts(
             f"which the measurements may allow by a line '# pressed picture: {HAND_HELD}'"
         )
         return _doubted(other, fault, f"{fault}; {other.status.message}")
+    if off <= CONTRADICTED:
+        return found
     return _doubted(found, f"{fault}; see whether drawing, clamp, load and numbers of the markers are right")
 
 

@@ -7,7 +7,13 @@ import pytest
 
 from geometry.observations import Observations
 from geometry.registration import FIXED, HAND_HELD, Registration
-from solvers.identification.contradiction import CONTRADICTED, likely_order, order_words, with_doubts
+from solvers.identification.contradiction import (
+    CONTRADICTED,
+    EXPLAINED,
+    likely_order,
+    order_words,
+    with_doubts,
+)
 from solvers.solution import Status
 from solvers.solver import NoSolutionError
 
@@ -74,10 +80,18 @@ def test_the_order_of_markers_is_found_and_said(order, said):
     assert likely_order(1.1 * EXPECTED, EXPECTED) is None
 
 
-def test_what_is_explained_is_returned_as_it_is():
-    found, asked = doubted(seen(EXPECTED[::-1]), lambda given: CONTRADICTED)
-    assert found.status.converged
-    assert len(asked) == 1
+@pytest.mark.parametrize(("off", "asked"), [(EXPLAINED - 0.1, 1), (EXPLAINED + 0.1, 3), (CONTRADICTED, 3)])
+def test_what_is_not_far_off_is_returned_as_it_is(off, asked):
+    """From three on, another order and frame are tried; where they explain no more, all is as it was."""
+    found, solved = doubted(seen(EXPECTED[::-1]), lambda given: off)
+    assert found.status == Status(True, "found", ["a marker was left out"])
+    assert len(solved) == asked
+
+
+def test_a_small_motion_is_found_too():
+    found, _ = doubted(seen(), lambda given: 6.0 if given.pressed.fixed else 1.0)
+    assert not found.status.converged
+    assert "it fits 6 times better" in found.status.warnings[0]
 
 
 def test_another_order_is_a_guess_and_not_taken():
