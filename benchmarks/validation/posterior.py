@@ -3,7 +3,7 @@
 Markers of the virtual experiment with noise of 0.005 mm; elements of 2 mm, linear; the law is given. The
 chains are emcee's (extra `bench`), from walkers of the Laplace approximation. A row a parameter, and the
 force: mean and standard deviation by both, and the ends of the 95 % interval of the chains, in standard
-deviations of Laplace's. SECONDS on one core.
+deviations of Laplace's. The chains are short, and rough in soft directions. Eight minutes on one core.
 """
 
 from typing import Any
