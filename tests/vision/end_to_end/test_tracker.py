@@ -8,6 +8,7 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.finger.design import Design
+from geometry.registration import HAND_HELD
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
 from vision.calibration.camera import Camera
 from vision.rig.motion import Course, Motion
@@ -236,6 +237,7 @@ def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_u
     design = Design(marker_layout=layout)
     true = bent(design.markers)
     tracking = tracked(without_fiducials(turns, design), camera=None, markers_only=True, design=design)
+    assert tracking.pressed == HAND_HELD  # nothing tells whether the camera stood still
     observations = tracking.observations("rig")
     assert observations.visible.sum() >= 7  # a jump of 10 mm is harder to follow from the wrong end
     assert error_of(observations, true) < 0.3  # the lens and a tilt of 5 degrees are not undone
