@@ -19,6 +19,7 @@ from compare.figures.style import axes_at, legend_below_heading, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
+from geometry.registration import nearest_similarity
 from vision.frames.frame import Image
 from vision.tracking.trajectories import Tracking
 
@@ -99,13 +100,9 @@ def _pictured(evaluation: Evaluation, comparison: Results) -> FloatArray:
     moved = comparison.mesh.points + evaluation.node_displacement
     if evaluation.shown is None:
         return np.asarray(moved)
-    rest, along = comparison.observations.points, np.array([1, 1j])
+    rest = comparison.observations.points
     own, shown = rest + evaluation.marker_displacement, rest + evaluation.shown
-    (factor, shift), *_ = np.linalg.lstsq(
-        np.column_stack([own @ along, np.ones(len(own))]), shown @ along, rcond=None
-    )
-    there = factor * (moved @ along) + shift
-    return np.column_stack([there.real, there.imag])
+    return nearest_similarity(own, shown).moved(moved)
 
 
 def _window(pixels: FloatArray, image: Image) -> tuple[FloatArray, FloatArray]:

@@ -17,7 +17,7 @@ from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
-from geometry.registration import FIXED, Registration, Similarity
+from geometry.registration import FIXED, PARTS, Homography, Registration
 from solvers.problem import Load, Material
 from solvers.registry import make_solver
 from solvers.solver import Solver, check_load, with_law
@@ -154,11 +154,10 @@ class CrossvalStudy:
         """`simulated` or `measured`, for captions."""
         return "simulated" if self.measurements is None else self.measurements.label
 
-    def pressed_picture(self, points: FloatArray, seed: int) -> Similarity:
-        """The similarity of a draw's pressed picture, about the middle of points, shape (m, 2), mm."""
-        known, signs = self.frame, np.random.default_rng([seed, len(points)]).choice([-1.0, 1.0], 4)
-        sizes = np.array([known.turn, known.shift, known.shift, known.scale])
-        return Similarity(points.mean(axis=0), signs * sizes)
+    def pressed_picture(self, points: FloatArray, seed: int) -> Homography:
+        """The homography of a draw's pressed picture, about the middle of points, shape (m, 2), mm."""
+        signs = np.random.default_rng([seed, len(points)]).choice([-1.0, 1.0], len(PARTS))
+        return Homography(points.mean(axis=0), signs * self.frame.deviations)
 
     def check(self) -> None:
         """Raise a `UserError` for a study that cannot be done, before anything is computed."""

@@ -13,6 +13,7 @@ from compare.runtime.tables import Cell, write_csv
 from geometry.arrays import FloatArray
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from geometry.registration import nearest_similarity
 from solvers.problem import Load
 from solvers.shared_work import shared
 from solvers.solution import Solution
@@ -60,20 +61,14 @@ def without_rigid_motion(evaluation: Evaluation, observations: Observations) -> 
     """The evaluation with its markers turned and shifted until they are nearest to the pressed picture's.
 
     None for a solver that was given the markers, and where the pictures' frames are known: nobody may then
-    move them. By least squares over the markers seen (W. Kabsch, Acta Cryst. A 32 (1976) 922-923).
+    move them. By least squares over the markers seen.
     """
     known = observations.pressed.fixed and observations.drawn.fixed
     if known or evaluation.in_sample or observations.visible.sum() < 2:
         return None
     seen, points = observations.visible, observations.points
     there, pressed = points + evaluation.shown_displacement, points + observations.displacements
-    middles = [places[seen].mean(axis=0) for places in (there, pressed)]
-    here, wanted = (
-        (places[seen] - middle) @ [1, 1j] for places, middle in zip((there, pressed), middles, strict=True)
-    )
-    turn = np.exp(1j * np.angle(np.vdot(here, wanted)))
-    turned = turn * ((there - middles[0]) @ [1, 1j])
-    moved = np.column_stack([turned.real, turned.imag]) + middles[1]
+    moved = nearest_similarity(there[seen], pressed[seen], rigid=True).moved(there)
     return replace(evaluation, solver=f"{evaluation.solver}, {RIGID}", shown=moved - points)
 
 

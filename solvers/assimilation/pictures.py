@@ -18,7 +18,7 @@ from scipy.stats import norm
 
 from geometry.arrays import FloatArray
 from geometry.observations import Observations
-from geometry.registration import FIXED, Pictures, Registration, Similarity
+from geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
 from solvers.assimilation.estimation import LEVEL, Parameter, values_of
 from solvers.assimilation.marker_forces import MarkerForces
 from solvers.assimilation.marker_weighting import MarkerWeighting
@@ -26,22 +26,19 @@ from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.problem import Problem
 from solvers.solution import Solution
 
-PARTS = {"turn": "deg", "shift_x": "mm", "shift_y": "mm", "scale": ""}
-"""Values of a similarity, with their units."""
 ROUNDS = 4
 """Linearisations about the frames that the last one found: from 5 degrees the last changes them by 1e-4."""
 
 
 def picture_parameters(observations: Observations) -> list[Parameter]:
-    """The unknown values of the pictures' similarities, with their priors; none where both are fixed."""
+    """The unknown values of the pictures' homographies, with their priors; none where both are fixed."""
     return [*_of("pressed", observations.pressed), *_of("drawn", observations.drawn)]
 
 
 def _of(picture: str, known: Registration) -> list[Parameter]:
-    deviations = (known.turn, known.shift, known.shift, known.scale)
     return [
         Parameter(f"{picture}_{part}", unit, 0.0, deviation)
-        for (part, unit), deviation in zip(PARTS.items(), deviations, strict=True)
+        for (part, unit), deviation in zip(PARTS.items(), known.deviations.tolist(), strict=True)
         if deviation
     ]
 
@@ -88,7 +85,7 @@ class FreePictures:
         named = dict(zip((each.name for each in self.parameters), values.tolist(), strict=True))
         return Pictures(
             *(
-                Similarity(self.centre, np.array([named.get(f"{picture}_{part}", 0.0) for part in PARTS]))
+                Homography(self.centre, np.array([named.get(f"{picture}_{part}", 0.0) for part in PARTS]))
                 for picture in ("pressed", "drawn")
             )
         )
@@ -133,8 +130,10 @@ class FreePictures:
         own, rows, factor = joint(self.about(z))
         springs = own.compliance + np.diag(1 / (factor * own.weights.ravel()))
         known = rows @ np.linalg.solve(springs, rows.T) / weighting.scale
-        matrix = self.at(z).pressed.matrix @ np.linalg.inv(self.at(z).drawn.matrix)
-        return FramedFit(z, np.eye(len(z)) - known, own.fit(factor).residual_without @ matrix.T)
+        pictures = self.at(z)
+        seen = pictures.pressed.undone(self.points + self.shown)
+        residual = np.einsum("mij,mj->mi", pictures.jacobians(seen), own.fit(factor).residual_without)
+        return FramedFit(z, np.eye(len(z)) - known, residual)
 
     def straightened(self, observations: Observations, z: FloatArray) -> Observations:
         """The observations as pictures in fixed frames would show them."""

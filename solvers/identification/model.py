@@ -116,13 +116,12 @@ class ResponseModel:
         self, values: FloatArray, tolerance: float, iterations: int, halvings: int
     ) -> Response | None:
         """The response, by way of those halfway where it is too far from the last one."""
-        found = self._near(values, tolerance, iterations)
-        if found is not None or not halvings:
-            return found
-        before = self._last
+        found, before = self._near(values, tolerance, iterations), self._last
         # At rest there is no force, and the other unknowns are as expected.
         rest = np.array([parameter.start for parameter in self.unknowns.parameters(1.0)])
         start = rest if before is None else before.values
+        if found is not None or not halvings or (start == values).all():
+            return found
         self._last = self._reached(0.5 * (start + values), ROUGH, iterations, halvings - 1)
         if self._last is not None:
             found = self._reached(values, tolerance, iterations, halvings - 1)
@@ -265,7 +264,7 @@ class MarkerModel:
     Attributes:
         rows: Of the markers' mean displacement in the drawn body, shape (m, 2, *shape).
         moved_rows: Of its change by what moves a marker in the body, shape (k, m, 2, *shape): the motion of
-            each wall, per mm, and the values of the similarity between picture and drawing, if it is unknown.
+            each wall, per mm, and the values of the homography between picture and drawing, if it is unknown.
     """
 
     def __init__(self, model: ResponseModel, measurement: MarkerData) -> None:
@@ -276,7 +275,7 @@ class MarkerModel:
         self.rows = body.displacement_rows(points, means)
         moved_rows = [-body.gradient_rows(points, means[:, :, None] * shift) for shift in shifts]
         if any(name.startswith("drawn") for name in self.unknowns.names):
-            still = self.unknowns.similarity("drawn", {})
+            still = self.unknowns.homography("drawn", {})
             moved_rows += [body.gradient_rows(points, means[:, :, None] * by) for by in still.slopes(points)]
         self.moved_rows = np.array(moved_rows).reshape(-1, *self.rows.shape)
 
@@ -299,7 +298,7 @@ class MarkerModel:
         seen = drawing.undone(response.motion.moved(places))  # in the frame of the picture at rest
         seen_slopes = response.motion.slopes(places, drawn_slopes)
         seen_slopes -= np.tensordot(by.drawn, drawing.slopes(seen), axes=1)
-        seen_slopes = seen_slopes @ np.linalg.inv(drawing.matrix).T @ pressed.matrix.T
+        seen_slopes = np.einsum("mij,pmj->pmi", hypothesis.pictures.jacobians(seen), seen_slopes)
         seen_slopes += np.tensordot(by.pressed, pressed.slopes(seen), axes=1)
         moved, moved_slopes = pressed.moved(seen) - points, seen_slopes
         values, derivatives = moved.ravel(), moved_slopes.reshape(len(moved_slopes), -1).T

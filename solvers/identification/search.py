@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from geometry.observations import Observations
-from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Estimate, Prediction, estimate
+from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Estimate, Parameter, Prediction, estimate
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
@@ -24,6 +24,12 @@ from solvers.solver import NoSolutionError, Progress, silent
 
 QUICK = 4
 """Steps in which a law is judged first."""
+
+WIDE = (2.0, 4.0)
+"""Standardised widths of a contact from which to start again where none explains the markers."""
+
+HELD = 1e-3
+"""Standard deviation of a width that is held, of its logarithm."""
 
 IMPROBABLE = 15.0
 """Logarithm of the ratio of evidences from which on a law is not fitted to the end."""
@@ -101,20 +107,26 @@ class Identifier:
                 lost.append(best.law)
                 if len(lost) == len(self.models):
                     raise error
-        fits = [fit]
+        fits, quick = [fit], {each.law: each for each in rough[1:] if fit is rough[0]}
         rivals = [law for law in self.models if law != fit.law and law not in lost]
         for law in rivals if fit.estimate.inflation < HOPELESS else ():
             try:
-                fits.append(self._rival(law, fit))
+                fits.append(self._rival(law, fit, quick.get(law)))
             except NoSolutionError:
                 lost.append(law)
         for each in fits:
             self._known.setdefault(each.law, each)
         return Identified.ranked(fits, doubtful, lost)
 
-    def _rival(self, law: LawName, fit: Fit) -> Fit:
-        """The fit of another law, to its end unless it could not be probable even there."""
-        other = self._fit(law, fit.measurement, fit, rounds=1, steps=QUICK)
+    def _rival(self, law: LawName, fit: Fit, quick: Fit | None) -> Fit:
+        """The fit of another law, to its end unless it could not be probable even there.
+
+        Args:
+            law: The other law.
+            fit: By the best law.
+            quick: A few steps from there, if they were made already.
+        """
+        other = quick or self._fit(law, fit.measurement, fit, rounds=1, steps=QUICK)
         if self._shifted(other, fit.measurement).log_posterior > fit.log_posterior - IMPROBABLE:
             other = self._fit(law, fit.measurement, other)
         return other
@@ -194,6 +206,8 @@ class Identifier:
             return best
         for start in self._elsewhere(best.estimate):
             try:
+                held = self._fit(rough.law, rough.measurement, None, start, held=True, rounds=1, steps=QUICK)
+                start = np.where(self._is_width, start, held.estimate.z)
                 other = self._fit(rough.law, rough.measurement, None, start)
             except NoSolutionError:
                 continue
@@ -203,20 +217,29 @@ class Identifier:
         return best
 
     def _elsewhere(self, found: Estimate) -> Iterator[FloatArray]:
-        """Standardised values, shape (p,), to start again from: a wide contact there, and in the middle.
+        """Standardised values, shape (p,), to start again from: wider contacts.
 
         Where little is explained, places far away follow; where nothing is, they are all.
         """
         if "width" in self._names and found.inflation < HOPELESS:
-            wide = found.z.copy()
-            wide[self._names.index("width")] = 3.0
-            yield wide
-            yield np.where(np.isin(self._names, ("position", "tangential_force", "eccentricity")), 0.0, wide)
+            yield from (np.where(self._is_width, wide, found.z) for wide in WIDE)
         if "position" in self._names and found.inflation > 10:
             for away in (-2.0, 2.0):
                 start = np.zeros(len(self._names))
                 start[self._names.index("position")] = away
                 yield start
+
+    @property
+    def _is_width(self) -> BoolArray:
+        """Mask of the contact's width, shape (p,)."""
+        return np.array([name == "width" for name in self._names])
+
+    def _holding(self, width: float) -> list[Parameter]:
+        """The parameters with the contact's width held at a standardised value."""
+        return [
+            replace(each, start=float(each.value(width)), scale=HELD) if each.name == "width" else each
+            for each in self.parameters
+        ]
 
     def _fit(
         self,
@@ -224,9 +247,15 @@ class Identifier:
         measurement: MarkerData,
         near: Fit | None,
         start: FloatArray | None = None,
+        *,
+        held: bool = False,
         **limits: int,
     ) -> Fit:
-        """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`."""
+        """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`.
+
+        A wide contact that the start has is soon lost, while the frame and the walls are those of a narrow
+        one; `held`, the width stays, and its value in the fit is zero.
+        """
         model = self.models[law]
         markers = MarkerModel(model, measurement)
         model.restart(None if near is None else near.response)
@@ -242,7 +271,7 @@ class Identifier:
                 reached[values.tobytes()] = found
                 return markers.predicted(found)
             lost.append(values)
-            if len(lost) > MOST_LOST:
+            if len(lost) > MOST_LOST or (other_law and not reached):
                 raise nothing
             return None
 
@@ -250,6 +279,11 @@ class Identifier:
             start = near.estimate.z
         elif start is None:
             start = self._pressed(model, markers)
+        parameters = self.parameters
+        if held:
+            parameters = self._holding(float(start @ self._is_width))
+            start = np.where(self._is_width, 0.0, start)
+        other_law = near is not None and near.law != law  # where one explains the markers, another would
         first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
         nothing = NoSolutionError(
             f"no equilibrium of the {law} law was found near the markers, from rest or from the force of a "
@@ -259,7 +293,7 @@ class Identifier:
             predict,
             measurement.observed,
             measurement.noise,
-            self.parameters,
+            parameters,
             start,
             cost_change=self._cost_change,
             **limits,

@@ -10,9 +10,9 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.wall_motion import WallMotion
-from geometry.registration import Pictures, Similarity
+from geometry.registration import PARTS, Homography, Pictures
 from solvers.assimilation.estimation import Parameter
-from solvers.assimilation.pictures import PARTS, picture_parameters
+from solvers.assimilation.pictures import picture_parameters
 from solvers.elasticity import Lame, LawName, lame_derivatives
 from solvers.identification.boundary import FrontTraction
 from solvers.problem import Material, Problem, contact_ends
@@ -69,7 +69,7 @@ class HypothesisSlopes(NamedTuple):
     moduli: FloatArray
     changes: FloatArray
     softness: FloatArray
-    pressed: FloatArray  # By the values of the similarities, shape (p, 4)
+    pressed: FloatArray  # By the values of the homographies, shape (p, 6)
     drawn: FloatArray
 
 
@@ -151,7 +151,7 @@ class Unknowns:
             lame=material.lame,
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
-            pictures=Pictures(*(self.similarity(picture, named) for picture in ("pressed", "drawn"))),
+            pictures=Pictures(*(self.homography(picture, named) for picture in ("pressed", "drawn"))),
         )
 
     def slopes(self, values: FloatArray) -> HypothesisSlopes:
@@ -183,9 +183,9 @@ class Unknowns:
         changed = {name: value for name, value in named.items() if name in ("young", "poisson")}
         return self.problem.material.model_copy(update=changed)
 
-    def similarity(self, picture: str, named: Mapping[str, float]) -> Similarity:
-        """The similarity of `pressed` or `drawn` pictures with values by name, zero for the rest."""
-        return Similarity(self._centre, np.array([named.get(f"{picture}_{part}", 0.0) for part in PARTS]))
+    def homography(self, picture: str, named: Mapping[str, float]) -> Homography:
+        """The homography of `pressed` or `drawn` pictures with values by name, zero for the rest."""
+        return Homography(self._centre, np.array([named.get(f"{picture}_{part}", 0.0) for part in PARTS]))
 
     def _named(self, values: FloatArray) -> dict[str, float]:
         return dict(zip(self.names, map(float, values), strict=True))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.registration import FIXED, Registration, Similarity
+from geometry.registration import FIXED, Homography, Registration, nearest_similarity
 
 LAID = Registration(turn=1.0, shift=1.0, scale=0.01)
 """How a finger lies on its sheet before anything was measured, and how exactly that is printed."""
@@ -25,7 +25,7 @@ FEWEST = 3
 class Alignment(NamedTuple):
     """What takes the markers at rest to the drawing; distances are root mean squares over the markers."""
 
-    similarity: Similarity
+    similarity: Homography
     known: Registration  # How well
     before: float  # Distance from the drawing in the film's frame, mm
     after: float  # Once aligned, mm
@@ -38,11 +38,11 @@ class Alignment(NamedTuple):
     def numbers(self) -> dict[str, float]:
         """The alignment as numbers with units in their names."""
         names = ("turn_deg", "shift_x_mm", "shift_y_mm", "scale")
-        found = dict(zip(names, self.similarity.values.tolist(), strict=True))
+        found = dict(zip(names, self.similarity.values[:4].tolist(), strict=True))
         return found | {"offset_rms_before_mm": self.before}
 
     def __str__(self) -> str:
-        turn, x, y, scale = self.similarity.values
+        turn, x, y, scale, *_ = self.similarity.values
         return (
             f"turned by {turn:z.2f} degrees, shifted by ({x:z.2f}, {y:z.2f}) mm and scaled by {scale:z.2%} "
             f"onto the drawing's markers, {self.after:.2g} mm (rms) off"
@@ -61,24 +61,15 @@ def align(positions: FloatArray, expected: FloatArray) -> Alignment | None:
     extent = float(np.linalg.norm(places - places.mean(axis=0))) if count else 0.0
     if count < FEWEST or extent == 0:
         return None
-    centre = places.mean(axis=0)
-    a, b = (offsets @ [1, 1j] for offsets in (places - centre, drawn - drawn.mean(axis=0)))
-    factor = complex(np.vdot(a, b)) / extent**2
-    misfit = float(np.sqrt((np.abs(factor * a - b) ** 2).sum() / (2 * count - 4)))
+    fitted = nearest_similarity(places, drawn)
+    misfit = float(np.linalg.norm(fitted.moved(places) - drawn) / np.sqrt(2 * count - 4))
     error = max(misfit, LEAST)
     exact = Registration(np.degrees(error / extent), error / np.sqrt(count), error / extent)
-    found = {
-        "turn": np.degrees(np.angle(factor)),
-        "shift": drawn.mean(axis=0) - centre,
-        "scale": abs(factor) - 1,
-    }
-    shares = {
-        name: getattr(LAID, name) ** 2 / (getattr(LAID, name) ** 2 + getattr(exact, name) ** 2)
-        for name in found
-    }
-    values = np.hstack([shares[name] * value for name, value in found.items()])
-    similarity = Similarity(centre, values)
-    known = Registration(*(float(np.sqrt(share)) * getattr(exact, name) for name, share in shares.items()))
+    variances = exact.deviations**2
+    shares = LAID.deviations**2 / np.maximum(LAID.deviations**2 + variances, np.finfo(float).tiny)
+    similarity = Homography(fitted.centre, shares * fitted.values)
+    turn, shift, _, scale, *_ = np.sqrt(shares * variances).tolist()
+    known = Registration(turn, shift, scale)
     before, after = (
         float(np.sqrt(((moved - drawn) ** 2).sum(axis=1).mean()))
         for moved in (places, similarity.moved(places))

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.registration import Similarity
+from geometry.registration import Homography
 from vision.calibration.camera import Camera, Pose
 
 CORNERS = 24
@@ -91,9 +91,9 @@ class MarkerPlane:
         middle = [((of + np.roll(of, -1, axis=1)) * turns).sum(axis=1) for of in (x, y)]
         return np.asarray(np.stack(middle, axis=1) / (3 * turns.sum(axis=1)[:, None]))
 
-    def aligned(self, similarity: Similarity) -> "MarkerPlane":
-        """The plane in the frame to which a similarity takes its points."""
-        return replace(self, projection=AlignedProjection(self.projection, similarity))
+    def aligned(self, homography: Homography) -> "MarkerPlane":
+        """The plane in the frame to which a homography takes its points."""
+        return replace(self, projection=AlignedProjection(self.projection, homography))
 
     def scales(self, points: FloatArray) -> FloatArray:
         """Pixels per mm at points of the plane, shape (n,): the root of the ratio of areas."""
@@ -130,23 +130,24 @@ class MarkerPlane:
 
 @dataclass(frozen=True, eq=False)
 class AlignedProjection:
-    """A projection of a plane whose points a similarity has taken to another frame."""
+    """A projection of a plane whose points a homography has taken to another frame."""
 
     projection: PlaneProjection
-    similarity: Similarity
+    homography: Homography
 
     def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
         """See `PlaneProjection`."""
-        return self.projection.pixels(self.similarity.undone(points), parameters)
+        return self.projection.pixels(self.homography.undone(points), parameters)
 
     def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
         """See `PlaneProjection`."""
-        return self.similarity.moved(self.projection.points(pixels, parameters))
+        return self.homography.moved(self.projection.points(pixels, parameters))
 
     def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
         """See `PlaneProjection`."""
-        before = self.projection.jacobians(self.similarity.undone(points), parameters)
-        return before._replace(point=before.point @ np.linalg.inv(self.similarity.matrix))
+        film = self.homography.undone(points)
+        before = self.projection.jacobians(film, parameters)
+        return before._replace(point=before.point @ np.linalg.inv(self.homography.jacobians(film)))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from compare.evaluation.evaluation import Evaluation
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
-from geometry.registration import Similarity
+from geometry.registration import Homography
 from pinnray.cli import main
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
@@ -70,7 +70,7 @@ def test_an_outline_is_drawn_in_the_picture_whose_frame_was_found():
     mesh = finger_mesh(Design(), settings=MeshSettings(size=2.0))
     solution = FemSolver(estimate=False).solve(Problem(mesh))
     known = Evaluation.of(solution, mesh)
-    picture = Similarity(mesh.markers.mean(axis=0), np.array([2.0, 0.4, -0.3, 0.01]))
+    picture = Homography(mesh.markers.mean(axis=0), np.array([2.0, 0.4, -0.3, 0.01, 0.0, 0.0]))
     shown = picture.moved(mesh.markers + known.marker_displacement) - mesh.markers
     observed = observed_at(mesh.markers, shown, 0.01)
     moved = mesh.points + known.node_displacement

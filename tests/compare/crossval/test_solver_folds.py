@@ -14,7 +14,7 @@ from geometry.arrays import FloatArray
 from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from geometry.registration import Pictures, Similarity
+from geometry.registration import Homography, Pictures
 from solvers.assimilation.misfit import misfit_of
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
@@ -175,8 +175,8 @@ def test_force_place_and_stated_intervals_are_judged_by_the_truth(task, coarse_m
 def test_errors_are_those_in_the_picture_whose_frame_was_found(task, truth, observations, monkeypatch):
     """The picture at half the load is another one."""
     centre = observations.points.mean(axis=0)
-    turned = Similarity(centre, np.array([3.0, 0.3, -0.2, 0.01]))
-    pictures = Pictures(turned, Similarity(centre, np.zeros(4)))
+    turned = Homography(centre, np.array([3.0, 0.3, -0.2, 0.01, 0.0, 0.0]))
+    pictures = Pictures(turned, Homography(centre, np.zeros(6)))
     results = []
     for label, each in (("fixed", truth), ("turned", replace(truth, pictures=pictures))):
         monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_, each=each: lambda _: each)

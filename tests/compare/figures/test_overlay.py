@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.overlay import draw_overlay
 from geometry.observations import Observations
-from geometry.registration import Pictures, Similarity
+from geometry.registration import Homography, Pictures
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
 from tests.compare.conftest import BendingField
@@ -33,9 +33,9 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
         status=Status(True, "a closed form"),
         stats={},
     )
-    pressed = Similarity(points.mean(axis=0), np.array([3.0, 0.1, 0.2, 0.01]))
+    pressed = Homography(points.mean(axis=0), np.array([3.0, 0.1, 0.2, 0.01, 0.0, 0.0]))
     if turned:
-        still = Similarity(points.mean(axis=0), np.zeros(4))
+        still = Homography(points.mean(axis=0), np.zeros(6))
         solution = replace(solution, pictures=Pictures(pressed, still))
     field = solution.displacement(points)
     observations = Observations(

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.registration import FIXED, Pictures, Registration, Similarity
+from geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
 from solvers.assimilation.pictures import FreePictures
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 from tests.solvers.conftest import observed_at
 
-KNOWN = Registration(turn=3.0, shift=0.3, scale=0.01)
-OFF = np.array([2.5, 0.3, -0.2, -0.012])  # degrees, mm, a share
+KNOWN = Registration(turn=3.0, shift=0.3, scale=0.01, tilt=0.01)
+OFF = np.array([2.5, 0.3, -0.2, -0.012, 0.01, -0.005])  # degrees, mm, shares
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def pictured(problem, off, drawn=0.0):
     points = problem.mesh.markers
     moved = make_solver("fem", estimate=False).solve(problem).displacement(points)
     centre = points.mean(axis=0)
-    pictures = Pictures(Similarity(centre, off), Similarity(centre, np.array([0, 0, 0, drawn])))
+    pictures = Pictures(Homography(centre, off), Homography(centre, np.array([0, 0, 0, drawn, 0, 0])))
     observed = observed_at(points, pictures.shown(points, moved), 0.01)
     return replace(observed, pressed=KNOWN), moved
 
@@ -33,7 +33,7 @@ def pictured(problem, off, drawn=0.0):
 def test_pictures_show_what_is_their_own(problem):
     observed, moved = pictured(problem, OFF, drawn=0.02)
     centre = observed.points.mean(axis=0)
-    pictures = Pictures(Similarity(centre, OFF), Similarity(centre, np.array([0, 0, 0, 0.02])))
+    pictures = Pictures(Homography(centre, OFF), Homography(centre, np.array([0, 0, 0, 0.02, 0, 0])))
     own = pictures.own(observed.points, observed.displacements)
     np.testing.assert_allclose(own, moved, atol=1e-12)
 
@@ -42,10 +42,10 @@ def test_observations_are_linear_in_the_frames(problem):
     """By steps of one standard deviation: the finger's displacements are observed minus frames z."""
     observed, _ = pictured(problem, OFF)
     free = FreePictures.of(replace(observed, drawn=Registration(turn=0.5, shift=0.1, scale=0.005)))
-    assert len(free.parameters) == 8
-    z = np.linspace(-1, 1, 8)
+    assert len(free.parameters) == 10
+    z = np.linspace(-1, 1, 10)
     framed = free.about(z)
-    for step in 0.001 * np.eye(8):
+    for step in 0.001 * np.eye(10):
         own = free.at(z + step).own(observed.points, observed.displacements)
         linear = framed.observed - np.tensordot(z + step, framed.frames, axes=1)
         np.testing.assert_allclose(linear, own, atol=2e-7)
@@ -63,12 +63,12 @@ def test_frames_are_those_of_the_joint_normal_distribution(problem):
     distance = np.linalg.norm(data.points[:, None] - data.points, axis=2) * np.sqrt(5) / lengths[0]
     kernel = (1 + distance + distance**2 / 3) * np.exp(-distance)
     process = np.einsum("mn,cd->mcnd", kernel, np.diag(amplitudes**2)).reshape(count, count)
-    frames = data.frames.reshape(4, count)
+    frames = data.frames.reshape(6, count)
     whole = by_load + process + 0.01**2 * np.eye(count) + frames.T @ frames
     left = data.observed.ravel() - factor * data.load @ shapes
     mean, covariance = posterior.frames
     np.testing.assert_allclose(mean, frames @ np.linalg.solve(whole, left), atol=1e-6)
-    expected = np.eye(4) - frames @ np.linalg.solve(whole, frames.T)
+    expected = np.eye(6) - frames @ np.linalg.solve(whole, frames.T)
     np.testing.assert_allclose(covariance, expected, atol=1e-6)
 
 
@@ -79,8 +79,8 @@ def test_a_turned_picture_is_found(problem, solver):
     observed, moved = pictured(problem, OFF)
     made = make_solver(solver, **options)
     found = made.solve(replace(problem, observations=observed))
-    names = ("pressed_turn", "pressed_shift_x", "pressed_shift_y", "pressed_scale")
-    for name, value in zip(names, OFF, strict=True):
+    for part, value in zip(PARTS, OFF, strict=True):
+        name = f"pressed_{part}"
         assert found.stats[f"{name}_low"] < value < found.stats[f"{name}_high"], name
     field = found.displacement(observed.points)
     np.testing.assert_allclose(found.shown(observed.points, field), observed.displacements, atol=0.03)
@@ -120,7 +120,7 @@ def test_deviations_in_the_picture_are_those_of_markers_left_out(problem, solver
 def test_a_marker_left_out_is_predicted_in_its_picture(problem, solver):
     """`gp` is as good as without the turn; `statfem`, which is told that there is none, is far off."""
     turned, _ = pictured(problem, OFF)
-    straight, _ = pictured(problem, np.zeros(4))
+    straight, _ = pictured(problem, np.zeros(6))
     made, errors = make_solver(solver), {}
     for name, observed in (
         ("free", turned),
@@ -143,7 +143,7 @@ def test_the_frames_of_fem_asm_are_those_of_the_least_energy_plus_misfit(problem
     made = make_solver("fem-asm", weights=weights, scale=2.0)
     found = made.solve(replace(problem, observations=observed))
     pictures = FreePictures.of(observed)
-    deviations = np.array([KNOWN.turn, KNOWN.shift, KNOWN.shift, KNOWN.scale])
+    deviations = KNOWN.deviations
     z = np.array([found.stats[each.name] for each in pictures.parameters]) / deviations
 
     def least(z):
@@ -152,7 +152,7 @@ def test_the_frames_of_fem_asm_are_those_of_the_least_energy_plus_misfit(problem
         return solution.energy + solution.stats["misfit"] + 0.5 * 2.0 * float(z @ z)
 
     own = least(z)
-    for step in 0.03 * np.vstack([np.eye(4), -np.eye(4)]):
+    for step in 0.03 * np.vstack([np.eye(6), -np.eye(6)]):
         assert own < least(z + step)
     np.testing.assert_allclose(found.pictures.pressed.values, z * deviations, atol=1e-9)
     assert found.problem.observations is observed

@@ -1,4 +1,4 @@
-"""Contact, walls and law from the markers: equilibria, derivatives, twin experiments, doubtful markers."""
+"""Contact, walls and law from the markers: twin experiments, deviations, other loads."""
 
 from dataclasses import replace
 
@@ -7,239 +7,17 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.mesh.boundary import mean_thickness
 from geometry.mesh.quadrature import body_quadrature
-from geometry.registration import FIXED, HAND_HELD, Registration, Similarity
+from geometry.registration import FIXED, HAND_HELD, Homography, Registration
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import FemBody, FemIdSolver
-from solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
-from solvers.identification.result import Identified
-from solvers.identification.search import MOST_LOST, Identifier
-from solvers.identification.unknowns import CONTACT, DEFAULT, LAW_ODDS, LAWS, PARTS, Unknowns
+from solvers.identification.model import EXACT
+from solvers.identification.search import Identifier
+from solvers.identification.unknowns import DEFAULT, PARTS
 from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Material, Problem
-from solvers.solver import NoSolutionError
+from solvers.problem import Load
 from tests.solvers.conftest import observed_at
-
-NOISE = 0.01
-NAMES = (*DEFAULT, "young")
-VALUES = {
-    "position": 36.3,
-    "width": 5.0,
-    "normal_force": 0.16,
-    "tangential_force": 0.02,
-    "eccentricity": 0.4,
-    "front_thickness": 2.1,
-    "back_thickness": 1.92,
-    "rib_thickness": 2.05,
-    "base_thickness": 2.4,
-    "base_compliance": 0.5,
-    "poisson": 0.43,
-    "young": 10.0,
-}
-
-
-@pytest.fixture(scope="module")
-def problem(coarse_mesh):
-    return Problem(coarse_mesh, Material(law="neo-hookean"), Load(displacement=(None, -6.0)))
-
-
-def model_of(problem, names=NAMES):
-    unknowns = Unknowns(problem, names)
-    return ResponseModel(FemBody(unknowns, 1), unknowns)
-
-
-@pytest.fixture(scope="module")
-def model(problem):
-    return model_of(problem)
-
-
-@pytest.fixture(scope="module")
-def markers(problem, model):
-    return marked(model)
-
-
-def marked(model):
-    """The default finger's markers in a model."""
-    observed = observed_at(model.unknowns.problem.mesh.markers, np.zeros((9, 2)), NOISE)
-    return MarkerModel(model, MarkerData.of(model.unknowns.problem.mesh, observed, None, None))
-
-
-def values_of(unknowns, changed=VALUES):
-    drawn = {parameter.name: parameter.start for parameter in unknowns.parameters(1.0)}
-    return np.array([(drawn | changed)[name] for name in unknowns.names])
-
-
-def test_a_measurement_of_some_markers_is_the_one_without_the_others(problem):
-    """A marker that was dropped as doubtful stays dropped where the fit goes on with other deviations."""
-    moved = np.arange(18.0).reshape(9, 2)
-    seen = np.arange(9) != 4
-    observed = replace(observed_at(problem.mesh.markers, moved, NOISE), visible=seen)
-    kept = np.array([0, 2, 3, 6, 7])
-    found = MarkerData.of(problem.mesh, observed, None, None).only(kept)
-    np.testing.assert_array_equal(found.kept, kept)
-    np.testing.assert_array_equal(found.displacements, moved[seen][kept])
-    assert found.noise.shape == (10,)
-
-
-def test_a_last_step_that_turns_a_point_inside_out_is_not_taken(problem, monkeypatch):
-    """Its forces are not numbers: once the slopes after it were zero, and a force was found to be 74 % off.
-
-    The state before it is within the tolerance, 0.2 % in the energy norm.
-    """
-    fresh = model_of(problem)
-    values = values_of(fresh.unknowns)
-    taken = fresh.response(values)
-    again = model_of(problem)
-    linearised, slopes, reached = again.body.linearised, again.body.force_slopes, []
-
-    def remembered(state, *rest):
-        reached.append(state)
-        return linearised(state, *rest)
-
-    def torn(state, *rest):
-        found = slopes(state, *rest)
-        return found if np.array_equal(state, reached[-1]) else (np.nan * found[0], found[1])
-
-    monkeypatch.setattr(again.body, "linearised", remembered)
-    monkeypatch.setattr(again.body, "force_slopes", torn)
-    left = again.response(values)
-    np.testing.assert_array_equal(left.state, reached[-1])
-    size = np.linalg.norm(taken.state)
-    assert 0 < np.linalg.norm(left.state - taken.state) < 2e-3 * size
-    np.testing.assert_allclose(left.slopes, taken.slopes, atol=2e-3 * np.abs(taken.slopes).max())
-
-
-def test_a_force_holds_the_finger_where_a_prescribed_displacement_does(problem):
-    """`fem-nonlinear` moves the mean of the same contact; its reaction is the force that is given here."""
-    moved = FemNonlinearSolver(degree=1).solve(problem)
-    model = model_of(problem, DEFAULT)
-    left, right = problem.mesh.points[problem.mesh.boundary("contact").ravel(), 0][[0, -1]]
-    contact = {"width": abs(right - left), "base_compliance": 1e-9}
-    force = {"normal_force": -moved.reaction[1], "tangential_force": moved.reaction[0]}
-    response = model.response(values_of(model.unknowns, contact | force), EXACT)
-    assert response is not None
-    # Gauss points of the two differ in number, which is worth some 1e-4 of a contact two elements wide.
-    np.testing.assert_allclose(response.contact, [response.contact[0], -6.0], rtol=2e-3)
-    np.testing.assert_allclose(response.state, moved.field.values, atol=2e-3 * 6.0)
-    lame = problem.material.lame
-    assert model.body.energy(response.state, lame, np.zeros(4)) == pytest.approx(moved.energy, rel=4e-3)
-
-
-def test_moved_walls_are_a_moved_mesh(problem):
-    """The same elements on the nodes that were moved, walls as drawn there: equal to rounding."""
-    here = model_of(problem, DEFAULT)
-    values = values_of(here.unknowns, VALUES | {"base_compliance": 1e-9})
-    response = here.response(values, EXACT)
-    assert response is not None
-    moved_mesh = replace(problem.mesh, points=here.unknowns.motion.moved(response.hypothesis.changes))
-    there = model_of(replace(problem, mesh=moved_mesh), DEFAULT)
-    as_drawn = {name: VALUES[name] for name in CONTACT}
-    again = there.response(
-        values_of(there.unknowns, as_drawn | {"poisson": 0.43, "base_compliance": 1e-9}), EXACT
-    )
-    assert again is not None
-    np.testing.assert_allclose(again.state, response.state, atol=1e-7)
-    energies = [
-        each.body.energy(found.state, found.hypothesis.lame, found.hypothesis.changes)
-        for each, found in ((here, response), (there, again))
-    ]
-    assert energies[0] == pytest.approx(energies[1], rel=1e-9)
-
-
-PICTURES = {
-    f"{picture}_{part}": value
-    for picture, values in (("pressed", (2.0, 0.3, -0.2, 0.01)), ("drawn", (-1.0, 0.1, 0.2, -0.01)))
-    for part, value in zip(PARTS, values, strict=True)
-}
-"""Pictures that are turned, shifted and scaled."""
-
-
-@pytest.fixture(scope="module")
-def unregistered(problem):
-    """The model and the markers with pictures whose frames are unknown."""
-    observed = observed_at(problem.mesh.markers, np.zeros((9, 2)), NOISE)
-    loose = Registration(turn=2.0, shift=0.3, scale=0.01)
-    observed = replace(observed, pressed=loose, drawn=loose)
-    model = model_of(replace(problem, observations=observed))
-    return model, MarkerModel(model, MarkerData.of(problem.mesh, observed, None, None))
-
-
-@pytest.mark.parametrize("name", [*PICTURES, "normal_force", "base_compliance", "rib_thickness"])
-def test_derivatives_by_the_frames_pass_the_taylor_test(unregistered, name):
-    check_taylor(*unregistered, name, VALUES | PICTURES)
-
-
-def test_a_finger_beside_its_drawing_shows_what_lies_where_the_markers_are(problem, unregistered):
-    """The drawing is 0.02 mm and 0.02 degrees off; second order in that is left."""
-    loose, markers = unregistered
-    off = {"drawn_turn": 0.02, "drawn_shift_x": 0.02, "drawn_shift_y": -0.015}
-    response = loose.response(values_of(loose.unknowns, VALUES | off), EXACT)
-    assert response is not None
-    pictures, points = response.hypothesis.pictures, markers.measurement.points
-    there = pictures.drawn.moved(points)
-    fixed = model_of(problem)
-    moved = MarkerModel(fixed, MarkerData.of(problem.mesh, observed_at(there, 0 * there, NOISE), None, None))
-    exact = fixed.response(values_of(fixed.unknowns), EXACT)
-    assert exact is not None
-    shown = pictures.shown(points, moved.predicted(exact)[0].reshape(-1, 2))
-    found = markers.predicted(response)[0].reshape(-1, 2)
-    np.testing.assert_allclose(found, shown, atol=5e-4)
-    start = markers.predicted(loose.response(values_of(loose.unknowns, VALUES), EXACT))[0].reshape(-1, 2)
-    assert np.abs(start - shown).max() > 3e-3
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_derivatives_pass_the_taylor_test(model, markers, name):
-    check_taylor(model, markers, name, VALUES)
-
-
-def check_taylor(model, markers, name, values):
-    """What the first-order expansion of the markers leaves falls by four or more when the step is halved.
-
-    It is rounding where the markers are linear in the parameter to six digits.
-    """
-    unknowns = model.unknowns
-    here, which = values_of(unknowns, values), unknowns.names.index(name)
-    model.restart(None)
-    response = model.response(here, 1e-9)
-    assert response is not None
-    start, slopes = markers.predicted(response)
-    scale = unknowns.parameters(46.0)[which].derivative(0.0)
-    scale = min(abs(scale), 0.1 * abs(here[which]))
-    left = []
-    for step in (0.2 * scale, 0.1 * scale):
-        model.restart(response)
-        there = model.response(here + step * np.eye(len(here))[which], 1e-9)
-        assert there is not None
-        left.append(np.linalg.norm(markers.predicted(there)[0] - start - step * slopes[:, which]))
-    first = np.linalg.norm(0.2 * scale * slopes[:, which])
-    assert first > 0
-    if left[0] < 1e-6 * first:
-        return
-    assert left[0] / left[1] > 3.0  # 2 with a wrong derivative, 8 where the second one is small
-    assert left[0] < 0.2 * first
-
-
-def twin(problem, law, values, *, noise=NOISE, seed=0):
-    """Observations of a finger that has such values, and its force, N/mm."""
-    own = replace(problem, material=problem.material.model_copy(update={"law": law}))
-    model = model_of(own, DEFAULT)
-    response = model.response(values_of(model.unknowns, values), EXACT)
-    assert response is not None
-    moved = marked(model).predicted(response)[0].reshape(-1, 2)
-    moved = moved + noise * np.random.default_rng(seed).normal(size=moved.shape)
-    return observed_at(problem.mesh.markers, moved, NOISE), response
-
-
-TRUE = {"position": 37.5, "normal_force": 0.18, "tangential_force": -0.02, "rib_thickness": 2.08}
-
-
-@pytest.fixture(scope="module")
-def identified(problem):
-    """A twin of the St Venant-Kirchhoff law, and what is found from its markers with noise."""
-    observed, true = twin(problem, "st-venant-kirchhoff", TRUE)
-    return observed, true, FemIdSolver(degree=1).solve(replace(problem, observations=observed))
+from tests.solvers.identification.twins import NOISE, TRUE, marked, model_of, twin
 
 
 def test_a_twin_is_found_with_its_law(identified):
@@ -255,11 +33,11 @@ def test_a_twin_is_found_with_its_law(identified):
     np.testing.assert_allclose(solution.reaction, true.hypothesis.force, rtol=0.1, atol=0.02)
 
 
-@pytest.mark.parametrize("known", [Registration(turn=3.0, shift=0.3, scale=0.01), HAND_HELD])
+@pytest.mark.parametrize("known", [Registration(3.0, 0.3, 0.01, 0.01), HAND_HELD])
 def test_the_frame_of_the_pressed_picture_is_found(problem, known):
-    """Turned by 3 degrees, shifted by 0.3 mm and scaled by 1 %: the force is as if nothing were wrong."""
+    """Turned by 3 degrees, shifted by 0.3 mm, scaled by 1 % and tilted: the force is as if all were right."""
     observed, true = twin(problem, "st-venant-kirchhoff", TRUE)
-    moved = Similarity(observed.points.mean(axis=0), np.array([3.0, 0.3, -0.3, 0.01]))
+    moved = Homography(observed.points.mean(axis=0), np.array([3.0, 0.3, -0.3, 0.01, 0.01, -0.005]))
     shown = moved.moved(observed.points + observed.displacements) - observed.points
     loose = replace(observed, displacements=shown, pressed=known)
     found = FemIdSolver(degree=1).solve(replace(problem, observations=loose))
@@ -283,34 +61,6 @@ def test_the_frame_of_the_pressed_picture_is_found(problem, known):
     assert not fixed.status.converged
     assert "THE PRESSED PICTURE IS NOT IN THE FRAME OF THAT AT REST" in fixed.status.warnings[0]
     assert fixed.stats["pressed_turn"] == pytest.approx(found.stats["pressed_turn"], abs=0.1)
-
-
-def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
-    """Made equally likely by the markers, the laws keep the odds that they had before."""
-    observed, _, solution = identified
-    problem = replace(solution.problem, observations=None)
-    identifier = Identifier(FemIdSolver(degree=1), problem, lambda unknowns: FemBody(unknowns, 1))
-    found = identifier.identify(observed)
-    by_law = {fit.law: fit for fit in found.fits}
-    logs = [by_law[law].log_evidence + np.log(odds) for law, odds in LAW_ODDS.items()]
-    share = dict(zip(LAW_ODDS, np.exp(logs - np.logaddexp(*logs)), strict=True))
-    np.testing.assert_allclose(found.probabilities, [share[fit.law] for fit in found.fits])
-    even = Identified(found.fits, np.array([0.25, 0.75]), {})
-    forces, deviations = np.array([fit.force for fit in found.fits]).T
-    force = even.force()
-    mean = 0.25 * forces[0] + 0.75 * forces[1]
-    variance = np.array([0.25, 0.75]) @ (deviations**2 + (forces - mean) ** 2)
-    assert force.size.value == pytest.approx(mean)
-    assert force.size.high - mean == pytest.approx(1.95996 * np.sqrt(variance), rel=1e-4)
-    # The place is where the force acts: the contact's middle plus the eccentricity of the force.
-    which = [found.best.model.unknowns.names.index(name) for name in ("position", "eccentricity")]
-    places = [float(fit.estimate.values[which].sum()) for fit in found.fits]
-    joint = found.best.estimate.slopes[which]
-    spread = joint @ found.best.estimate.covariance[np.ix_(which, which)] @ joint
-    wall = 0.25 * mean_thickness(problem.mesh)
-    assert found.best.place == pytest.approx((places[0], np.hypot(np.sqrt(spread), wall)))
-    assert force.position.value == pytest.approx(0.25 * places[0] + 0.75 * places[1])
-    assert force.position.low < min(places) < max(places) < force.position.high
 
 
 def test_a_finger_with_a_depth_is_in_no_plane_state(identified):
@@ -408,98 +158,6 @@ def test_a_marker_left_out_in_closed_form_is_nearly_that_of_a_refit(identified, 
         there = again.displacement_in_space(problem.mesh.markers[[marker]])[0]
         # The closed form is of first order, and it takes the mean over the marker's disc.
         np.testing.assert_allclose(solution.left_out[marker], there, atol=0.5 * NOISE)
-
-
-def test_a_wrong_marker_is_found_and_not_used(identified, problem):
-    observed, true, right = identified
-    moved = observed.displacements.copy()
-    moved[5] += [1.6, -1.2]
-    solution = FemIdSolver(degree=1).solve(
-        replace(problem, observations=replace(observed, displacements=moved))
-    )
-    assert "MARKER 6 of those seen CONTRADICTS the others by 2 mm: not used" in solution.status.message
-    assert solution.stats["inflation"] == 1
-    assert solution.stats["force"] == pytest.approx(right.stats["force"], rel=0.1)
-    np.testing.assert_allclose(solution.left_out[5], right.left_out[5], atol=5 * NOISE)
-    assert np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
-
-
-def failing(monkeypatch, *laws):
-    """Let fits of some laws find no equilibrium."""
-    fit = Identifier._fit
-
-    def failed(self, law, *arguments, **options):
-        if law in laws:
-            raise NoSolutionError(f"no equilibrium of the {law} law")
-        return fit(self, law, *arguments, **options)
-
-    monkeypatch.setattr(Identifier, "_fit", failed)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_a_law_without_an_equilibrium_is_left_out_and_said(identified, problem, monkeypatch, law):
-    failing(monkeypatch, law)
-    (other,) = [each for each in LAWS if each != law]
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
-    assert solution.problem.material.law == other
-    assert f"no equilibrium of the {law} law was found near the markers" in solution.status.message
-    assert f"probability {law}" not in solution.stats
-
-
-def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, problem, monkeypatch):
-    settled = Identifier._settled
-
-    def lost(self, fit):
-        if fit.law == "st-venant-kirchhoff":
-            raise NoSolutionError("no equilibrium near the markers")
-        return settled(self, fit)
-
-    monkeypatch.setattr(Identifier, "_settled", lost)
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
-    assert solution.problem.material.law == "neo-hookean"
-    assert "no equilibrium of the st-venant-kirchhoff law" in solution.status.message
-
-
-def test_without_any_law_it_has_no_solution(identified, problem, monkeypatch):
-    failing(monkeypatch, *LAWS)
-    with pytest.raises(NoSolutionError, match="no equilibrium of the"):
-        FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
-
-
-def test_a_search_ends_where_few_hypotheses_have_an_equilibrium(identified, problem, monkeypatch):
-    """Beyond a limit load it would halve its steps for a minute."""
-    asked = []
-
-    def response(self, values, *arguments, **options):
-        self.evaluations += 1
-        asked.append(values)
-        return known(self, values, *arguments, **options) if len(asked) < 3 else None
-
-    known = ResponseModel.response
-    monkeypatch.setattr(ResponseModel, "response", response)
-    with pytest.raises(NoSolutionError, match="see whether the markers are of this finger and load"):
-        FemIdSolver(degree=1, law="given").solve(replace(problem, observations=identified[0]))
-    assert len(asked) <= 2 + 1 + MOST_LOST
-
-
-def test_three_hidden_markers_open_the_intervals(identified, problem):
-    observed, true, right = identified
-    visible = ~np.isin(np.arange(9), (2, 5, 8))
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=replace(observed, visible=visible)))
-    widths = [each.stats["force_high"] - each.stats["force_low"] for each in (solution, right)]
-    assert widths[0] > widths[1]
-    assert solution.stats["force_low"] < np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
-    assert np.isnan(solution.left_out[[2, 5, 8]]).all()
-
-
-def test_no_load_is_no_force(problem):
-    """Noise alone: the interval of the force holds zero, and nothing is said to be known of the place."""
-    noise = NOISE * np.random.default_rng(3).normal(size=(9, 2))
-    observed = observed_at(problem.mesh.markers, noise, NOISE)
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=observed))
-    assert solution.stats["normal_force_low"] < 0 < solution.stats["normal_force_high"]
-    assert solution.stats["force"] < 0.002
-    assert "NOT DETERMINED by the markers, but held by its prior: position" in solution.status.message
 
 
 def test_a_reaction_finds_young(problem):

@@ -24,7 +24,7 @@ def test_mechanics_predict_a_real_finger_better_than_none(name, stroke):
         return float(np.sqrt(((found.left_out - found.problem.observations.displacements) ** 2).mean()))
 
     rivals = min(left_out("gp"), left_out("statfem"))
-    # `pinn-id` takes minutes for A, of which a wide contact is not far from the start.
+    # `pinn-id` takes a minute for A.
     for solver in ("fem-id", "pinn-id") if name == "B" else ("fem-id",):
         best = left_out(solver)
         assert best < 0.45

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geometry.arrays import FloatArray
-from geometry.registration import Similarity
+from geometry.registration import Homography
 from vision.calibration.camera import Camera
 from vision.tracking.marker_plane import (
     HOMOGRAPHY,
@@ -26,7 +26,9 @@ KINDS: dict[str, tuple[PlaneProjection, FloatArray]] = {
     "homography": (HOMOGRAPHY, np.array([8.0, 1.0, 100.0, 0.5, -7.0, 700.0, 1e-3, -5e-4])),
     "similarity": (SIMILARITY, np.array([6.0, -2.0, 300.0, 400.0])),
     "aligned": (
-        AlignedProjection(HOMOGRAPHY, Similarity(np.array([40.0, -8.0]), np.array([3.0, 0.5, -0.3, 0.02]))),
+        AlignedProjection(
+            HOMOGRAPHY, Homography(np.array([40.0, -8.0]), np.array([3.0, 0.5, -0.3, 0.02, 0.01, -0.02]))
+        ),
         np.array([8.0, 1.0, 100.0, 0.5, -7.0, 700.0, 1e-3, -5e-4]),
     ),
 }

@@ -1,0 +1,31 @@
+"""The default finger on a coarse mesh, its model, and a twin of it that was identified."""
+
+from dataclasses import replace
+
+import pytest
+
+from solvers.fem.identification import FemIdSolver
+from solvers.problem import Load, Material, Problem
+from tests.solvers.identification.twins import TRUE, marked, model_of, twin
+
+
+@pytest.fixture(scope="module")
+def problem(coarse_mesh):
+    return Problem(coarse_mesh, Material(law="neo-hookean"), Load(displacement=(None, -6.0)))
+
+
+@pytest.fixture(scope="module")
+def model(problem):
+    return model_of(problem)
+
+
+@pytest.fixture(scope="module")
+def markers(problem, model):
+    return marked(model)
+
+
+@pytest.fixture(scope="module")
+def identified(problem):
+    """A twin of the St Venant-Kirchhoff law, and what is found from its markers with noise."""
+    observed, true = twin(problem, "st-venant-kirchhoff", TRUE)
+    return observed, true, FemIdSolver(degree=1).solve(replace(problem, observations=observed))

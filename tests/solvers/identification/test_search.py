@@ -1,0 +1,177 @@
+"""The search: laws that get lost, doubtful and hidden markers, several starts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.mesh.boundary import mean_thickness
+from solvers.fem.identification import FemBody, FemIdSolver
+from solvers.identification.model import ResponseModel
+from solvers.identification.result import Identified
+from solvers.identification.search import MOST_LOST, WIDE, Identifier
+from solvers.identification.unknowns import LAW_ODDS, LAWS
+from solvers.solver import NoSolutionError
+from tests.solvers.conftest import observed_at
+from tests.solvers.identification.twins import NOISE
+
+
+def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
+    """Made equally likely by the markers, the laws keep the odds that they had before."""
+    observed, _, solution = identified
+    problem = replace(solution.problem, observations=None)
+    identifier = Identifier(FemIdSolver(degree=1), problem, lambda unknowns: FemBody(unknowns, 1))
+    found = identifier.identify(observed)
+    by_law = {fit.law: fit for fit in found.fits}
+    logs = [by_law[law].log_evidence + np.log(odds) for law, odds in LAW_ODDS.items()]
+    share = dict(zip(LAW_ODDS, np.exp(logs - np.logaddexp(*logs)), strict=True))
+    np.testing.assert_allclose(found.probabilities, [share[fit.law] for fit in found.fits])
+    even = Identified(found.fits, np.array([0.25, 0.75]), {})
+    forces, deviations = np.array([fit.force for fit in found.fits]).T
+    force = even.force()
+    mean = 0.25 * forces[0] + 0.75 * forces[1]
+    variance = np.array([0.25, 0.75]) @ (deviations**2 + (forces - mean) ** 2)
+    assert force.size.value == pytest.approx(mean)
+    assert force.size.high - mean == pytest.approx(1.95996 * np.sqrt(variance), rel=1e-4)
+    # The place is where the force acts: the contact's middle plus the eccentricity of the force.
+    which = [found.best.model.unknowns.names.index(name) for name in ("position", "eccentricity")]
+    places = [float(fit.estimate.values[which].sum()) for fit in found.fits]
+    joint = found.best.estimate.slopes[which]
+    spread = joint @ found.best.estimate.covariance[np.ix_(which, which)] @ joint
+    wall = 0.25 * mean_thickness(problem.mesh)
+    assert found.best.place == pytest.approx((places[0], np.hypot(np.sqrt(spread), wall)))
+    assert force.position.value == pytest.approx(0.25 * places[0] + 0.75 * places[1])
+    assert force.position.low < min(places) < max(places) < force.position.high
+
+
+def test_a_wrong_marker_is_found_and_not_used(identified, problem):
+    observed, true, right = identified
+    moved = observed.displacements.copy()
+    moved[5] += [1.6, -1.2]
+    solution = FemIdSolver(degree=1).solve(
+        replace(problem, observations=replace(observed, displacements=moved))
+    )
+    assert "MARKER 6 of those seen CONTRADICTS the others by 2 mm: not used" in solution.status.message
+    assert solution.stats["inflation"] == 1
+    assert solution.stats["force"] == pytest.approx(right.stats["force"], rel=0.1)
+    np.testing.assert_allclose(solution.left_out[5], right.left_out[5], atol=5 * NOISE)
+    assert np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
+
+
+def failing(monkeypatch, *laws):
+    """Let fits of some laws find no equilibrium."""
+    fit = Identifier._fit
+
+    def failed(self, law, *arguments, **options):
+        if law in laws:
+            raise NoSolutionError(f"no equilibrium of the {law} law")
+        return fit(self, law, *arguments, **options)
+
+    monkeypatch.setattr(Identifier, "_fit", failed)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_without_an_equilibrium_is_left_out_and_said(identified, problem, monkeypatch, law):
+    failing(monkeypatch, law)
+    (other,) = [each for each in LAWS if each != law]
+    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+    assert solution.problem.material.law == other
+    assert f"no equilibrium of the {law} law was found near the markers" in solution.status.message
+    assert f"probability {law}" not in solution.stats
+
+
+def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, problem, monkeypatch):
+    settled = Identifier._settled
+
+    def lost(self, fit):
+        if fit.law == "st-venant-kirchhoff":
+            raise NoSolutionError("no equilibrium near the markers")
+        return settled(self, fit)
+
+    monkeypatch.setattr(Identifier, "_settled", lost)
+    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+    assert solution.problem.material.law == "neo-hookean"
+    assert "no equilibrium of the st-venant-kirchhoff law" in solution.status.message
+
+
+def test_without_any_law_it_has_no_solution(identified, problem, monkeypatch):
+    failing(monkeypatch, *LAWS)
+    with pytest.raises(NoSolutionError, match="no equilibrium of the"):
+        FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+
+
+def test_a_search_ends_where_few_hypotheses_have_an_equilibrium(identified, problem, monkeypatch):
+    """Beyond a limit load it would halve its steps for a minute."""
+    asked = []
+
+    def response(self, values, *arguments, **options):
+        self.evaluations += 1
+        asked.append(values)
+        return known(self, values, *arguments, **options) if len(asked) < 3 else None
+
+    known = ResponseModel.response
+    monkeypatch.setattr(ResponseModel, "response", response)
+    with pytest.raises(NoSolutionError, match="see whether the markers are of this finger and load"):
+        FemIdSolver(degree=1, law="given").solve(replace(problem, observations=identified[0]))
+    assert len(asked) <= 2 + 1 + MOST_LOST
+
+
+def test_a_law_without_an_equilibrium_where_another_one_has_it_is_left_out_at_once(
+    identified, problem, monkeypatch
+):
+    """From the state of the other law and from rest; a search from rest alone would take minutes."""
+    asked, known = [], ResponseModel.response
+
+    def response(self, values, *arguments, **options):
+        if self.unknowns.problem.material.law == LAWS[0]:
+            return known(self, values, *arguments, **options)
+        self.evaluations += 1
+        asked.append(values)
+        return None
+
+    monkeypatch.setattr(ResponseModel, "response", response)
+    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+    assert solution.problem.material.law == LAWS[0]
+    assert "no equilibrium of the st-venant-kirchhoff law" in solution.status.message
+    assert len(asked) <= 3
+
+
+def test_a_wide_contact_is_searched_with_its_width_held(identified, problem, monkeypatch):
+    """Everything else goes first to where the wide contact explains the markers, then all of it."""
+    asked, known = [], Identifier._fit
+
+    def fit(self, law, measurement, near, start=None, **options):
+        found = known(self, law, measurement, near, start, **options)
+        if options.get("held"):
+            width = list(self._names).index("width")
+            assert found.estimate.parameters[width].start == self.parameters[width].value(start[width])
+            assert abs(found.estimate.z[width]) < 5
+            asked.append(start[width])
+        return found
+
+    monkeypatch.setattr(Identifier, "_fit", fit)
+    moved = identified[0].displacements + 0.1 * np.random.default_rng(1).normal(size=(9, 2))
+    FemIdSolver(degree=1, law="given").solve(
+        replace(problem, observations=replace(identified[0], displacements=moved))
+    )
+    assert tuple(asked[:2]) == WIDE
+
+
+def test_three_hidden_markers_open_the_intervals(identified, problem):
+    observed, true, right = identified
+    visible = ~np.isin(np.arange(9), (2, 5, 8))
+    solution = FemIdSolver(degree=1).solve(replace(problem, observations=replace(observed, visible=visible)))
+    widths = [each.stats["force_high"] - each.stats["force_low"] for each in (solution, right)]
+    assert widths[0] > widths[1]
+    assert solution.stats["force_low"] < np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
+    assert np.isnan(solution.left_out[[2, 5, 8]]).all()
+
+
+def test_no_load_is_no_force(problem):
+    """Noise alone: the interval of the force holds zero, and nothing is said to be known of the place."""
+    noise = NOISE * np.random.default_rng(3).normal(size=(9, 2))
+    observed = observed_at(problem.mesh.markers, noise, NOISE)
+    solution = FemIdSolver(degree=1).solve(replace(problem, observations=observed))
+    assert solution.stats["normal_force_low"] < 0 < solution.stats["normal_force_high"]
+    assert solution.stats["force"] < 0.002
+    assert "NOT DETERMINED by the markers, but held by its prior: position" in solution.status.message

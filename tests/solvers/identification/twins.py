@@ -1,0 +1,57 @@
+"""Twin experiments: markers of a finger whose values are known."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from solvers.fem.identification import FemBody
+from solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
+from solvers.identification.unknowns import DEFAULT, Unknowns
+from tests.solvers.conftest import observed_at
+
+NOISE = 0.01
+NAMES = (*DEFAULT, "young")
+VALUES = {
+    "position": 36.3,
+    "width": 5.0,
+    "normal_force": 0.16,
+    "tangential_force": 0.02,
+    "eccentricity": 0.4,
+    "front_thickness": 2.1,
+    "back_thickness": 1.92,
+    "rib_thickness": 2.05,
+    "base_thickness": 2.4,
+    "base_compliance": 0.5,
+    "poisson": 0.43,
+    "young": 10.0,
+}
+
+
+def model_of(problem, names=NAMES):
+    unknowns = Unknowns(problem, names)
+    return ResponseModel(FemBody(unknowns, 1), unknowns)
+
+
+def marked(model):
+    """The default finger's markers in a model."""
+    observed = observed_at(model.unknowns.problem.mesh.markers, np.zeros((9, 2)), NOISE)
+    return MarkerModel(model, MarkerData.of(model.unknowns.problem.mesh, observed, None, None))
+
+
+def values_of(unknowns, changed=VALUES):
+    drawn = {parameter.name: parameter.start for parameter in unknowns.parameters(1.0)}
+    return np.array([(drawn | changed)[name] for name in unknowns.names])
+
+
+def twin(problem, law, values, *, noise=NOISE, seed=0):
+    """Observations of a finger that has such values, and its force, N/mm."""
+    own = replace(problem, material=problem.material.model_copy(update={"law": law}))
+    model = model_of(own, DEFAULT)
+    response = model.response(values_of(model.unknowns, values), EXACT)
+    assert response is not None
+    moved = marked(model).predicted(response)[0].reshape(-1, 2)
+    moved = moved + noise * np.random.default_rng(seed).normal(size=moved.shape)
+    return observed_at(problem.mesh.markers, moved, NOISE), response
+
+
+TRUE = {"position": 37.5, "normal_force": 0.18, "tangential_force": -0.02, "rib_thickness": 2.08}
