@@ -26,10 +26,11 @@ from benchmarks.tracker.films import HIDDEN, Finger, Score, coverage, film_of, o
 from compare.runtime.tables import terminal_table
 from geometry.errors import UserError
 from geometry.finger.design import Design
+from vision.calibration.camera import Pose
 from vision.discs.colour import DARK
 from vision.discs.colour_picker import pick_colour
 from vision.discs.disc_detector import METHODS, DetectionMethod
-from vision.frames.frame import Frames
+from vision.frames.frame import Frames, Image
 from vision.frames.sources import open_frames
 from vision.rig.bench import BENCH, Bench
 from vision.rig.exposure import Exposure
@@ -92,6 +93,24 @@ class Case:
     picked: bool = False
     layout: str = "front"
     fiducials: bool = True
+    bumped: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Bumped(Recording):
+    """A film whose camera is in another place once the finger is no longer at rest."""
+
+    after: Pose
+
+    def frames(self) -> Iterator[tuple[Image, FrameTruth]]:
+        """The frames in order, each with its truth."""
+        return (self.frame(number) for number in range(len(self.motion)))
+
+    def frame(self, number: int) -> tuple[Image, FrameTruth]:
+        """One frame."""
+        pose = self.pose if number < self.motion.rest else self.after
+        settings = {name: value for name, value in vars(self).items() if name != "after"}
+        return Recording(**settings | {"pose": pose}).frame(number)
 
 
 FIVE = {"irregular": 0.05}
@@ -125,6 +144,8 @@ CASES: dict[tuple[str, str], Case] = {
     ("camera", "rolling shutter, half of a frame"): Case(motion=ROLLING),
     ("camera", "monochrome"): Case(exposure={"monochrome": True}),
     ("camera", "upside down"): Case(turn=180),
+    ("camera", "bumped"): Case(bumped=True),
+    ("camera", "bumped, mp4v"): Case(bumped=True, codec="mp4v"),
     ("no fiducials", ""): Case(hide=fiducials(*range(7)), fiducials=False, tilt=0),
     ("corner", "noise 6, blur 1.5, shading 30 %, tilt 5"): CORNER,
     ("corner", "the same, mjpg, jump, 2 half hidden"): replace(
@@ -195,7 +216,12 @@ def filmed(case: Case, finger: Finger, number: int) -> Recording:
         motion=case.motion,
         seed=number,
     )
-    return replace(recording, occluders=case.hide(recording))
+    recording = replace(recording, occluders=case.hide(recording))
+    if not case.bumped:
+        return recording
+    turn, shift = np.radians((0.1, -0.1, 0.2)), (0.5, -0.3, 0.4)  # mm
+    after = Pose(recording.pose.rotation + turn, recording.pose.translation + shift)
+    return Bumped(**vars(recording), after=after)
 
 
 def seen(case: Case, recording: Recording, methods: Sequence[DetectionMethod] = METHODS) -> Outcome:
