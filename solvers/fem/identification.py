@@ -7,11 +7,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 import ufl
+from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray
+from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from geometry.registration import Registration
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
@@ -23,7 +26,8 @@ from solvers.fem.linear_solvers import Factorisation
 from solvers.identification.body import Linearised
 from solvers.identification.contradiction import with_doubts
 from solvers.identification.model import ResponseModel
-from solvers.identification.search import Identifier
+from solvers.identification.result import Fit, Identified
+from solvers.identification.search import IMPROBABLE, Identifier
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.tracker import ForceTracker, LawTracker
 from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
@@ -31,6 +35,10 @@ from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Family, Progress, check_problem, silent
+
+SOUGHT, FINE = 1.0, 4000
+"""Size of the elements on which unknowns are sought first, mm, and number of triangles from which on that is
+worth while."""
 
 
 class FemBody:
@@ -148,6 +156,43 @@ class FemBody:
         return self._sampled[key]
 
 
+class NestedSearch:
+    """Finds the unknowns on a coarse mesh and carries them to a fine one; see `Identifier`.
+
+    Args:
+        coarse: Seeks by elements on the coarse mesh.
+        fine: Of the same laws, on the fine one.
+    """
+
+    def __init__(self, coarse: Identifier, fine: Identifier) -> None:
+        self._coarse, self._fine = coarse, fine
+        self._weights: csr_matrix | None = None
+
+    def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
+        """The unknowns under every law, and the laws' probabilities; see `Identifier`."""
+        found = self._coarse.identify(observations, progress)
+        least = found.best.log_posterior - IMPROBABLE
+        fits = [self._carried(fit) for fit in found.fits]
+        polished = [
+            self._fine.polished(fit, observations) if fit.log_posterior > least else fit for fit in fits
+        ]
+        return Identified.ranked(polished, found.doubtful, found.lost)
+
+    def _carried(self, fit: Fit) -> Fit:
+        """A coarse fit, whose response is interpolated at the fine nodes."""
+        model, response = self._fine.models[fit.law], fit.response
+        here, there = fit.model.body, model.body
+        if not (isinstance(here, FemBody) and isinstance(there, FemBody)):
+            raise TypeError("the bodies of fem-id are finite elements")
+        if self._weights is None:
+            self._weights = here.space.shape_functions(
+                there.space.mesh.locate_on(here.space.mesh, there.space.nodes)
+            )
+        slopes = np.stack([self._weights @ slope for slope in response.slopes])
+        carried = replace(response, state=self._weights @ response.state, slopes=slopes)
+        return fit._replace(model=model, response=carried)
+
+
 def _both_components(values: FloatArray) -> FloatArray:
     """Rows (r, 2, N, 2) of both components from rows (r, N) of one."""
     return np.asarray(np.einsum("rn,ab->ranb", np.asarray(values), np.eye(2)))
@@ -186,7 +231,7 @@ class FemIdSolver(IdentifyingSolver):
         found = with_doubts(
             lambda given: self.refitter(problem)(given, progress),
             problem.observations,
-            lambda given: self._identifier(problem).expected(given),
+            lambda given: self._identifier(self._coarse(problem) or problem).expected(given),
         )
         progress(1.0, found.force_phrase)
         return found
@@ -194,14 +239,15 @@ class FemIdSolver(IdentifyingSolver):
     def refitter(self, problem: Problem) -> Callable[..., Solution]:
         """A function that finds the unknowns for other observations; see `Refittable`.
 
-        Fits share the elements; each search starts from the last result. It takes a progress, too.
+        Fits share the elements; each search starts from the last result. It takes a progress, too. On a fine
+        mesh the unknowns are sought on a coarse one first.
         """
-        kept: dict[tuple[Registration, Registration], Identifier] = {}
+        kept: dict[tuple[Registration, Registration], Identifier | NestedSearch] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
             started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
             if frames not in kept:
-                kept[frames] = self._identifier(replace(problem, observations=observations))
+                kept[frames] = self._search(replace(problem, observations=observations))
             found = kept[frames].identify(observations, progress)
             stats = {
                 "seconds": time.perf_counter() - started,
@@ -212,6 +258,17 @@ class FemIdSolver(IdentifyingSolver):
             return found.solution(self.name, replace(problem, observations=observations), stats)
 
         return fitted
+
+    def _search(self, problem: Problem) -> Identifier | NestedSearch:
+        fine, coarse = self._identifier(problem), self._coarse(problem)
+        return fine if coarse is None else NestedSearch(self._identifier(coarse), fine)
+
+    def _coarse(self, problem: Problem) -> Problem | None:
+        """The problem on a mesh of elements of the size `SOUGHT`; None where its own has not many more."""
+        if problem.finger is None or len(problem.mesh.triangles) < FINE:
+            return None
+        mesh = finger_mesh(problem.finger, settings=MeshSettings(size=SOUGHT))
+        return replace(problem, mesh=mesh) if 2 * len(mesh.triangles) < len(problem.mesh.triangles) else None
 
     def _identifier(self, problem: Problem) -> Identifier:
         return Identifier(self, problem, lambda unknowns: FemBody(unknowns, self.degree))

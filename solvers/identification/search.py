@@ -136,7 +136,13 @@ class Identifier:
         self._known[fit.law] = fit
 
     def refined(
-        self, fit: Fit, model: ResponseModel, state: FloatArray, observations: Observations
+        self,
+        fit: Fit,
+        model: ResponseModel,
+        state: FloatArray,
+        observations: Observations,
+        *,
+        from_rest: bool = False,
     ) -> Fit | None:
         """A fit by a finer discretisation: its equilibrium, and from there the unknowns to first order.
 
@@ -145,17 +151,34 @@ class Identifier:
             model: The finger by the fit's law, discretised more finely.
             state: Of the finer discretisation, near equilibrium for the fit's values.
             observations: The fit's, with the standard deviations for the finer discretisation.
+            from_rest: Whether to go there from rest where the state is too far from equilibrium.
 
         Returns:
             None if no equilibrium is found in many iterations.
         """
         model.restart(carried(fit.response, state))
         response = model.response(fit.response.values, iterations=20, halvings=0)
+        if response is None and from_rest:
+            model.restart(None)
+            response = model.response(fit.response.values)
         if response is None:
             return None
         about = fit._replace(model=model, response=response, coarser=None)
         measurement = self.measurement(observations).only(fit.measurement.kept)
         return self._shifted(about, measurement)._replace(coarser=fit)
+
+    def polished(self, fit: Fit, observations: Observations) -> Fit:
+        """A fit whose response is near equilibrium, after two steps of first order; see `refined`.
+
+        What is left is of fourth order in what was off. Where there is no equilibrium near the fit, it stays
+        as it is, marked as inexact.
+        """
+        for _ in range(2):
+            found = self.refined(fit, fit.model, fit.response.state, observations, from_rest=True)
+            if found is None:
+                return fit._replace(exact=False)
+            fit = found._replace(coarser=None)
+        return fit
 
     def updated(self, found: Identified, observations: Observations) -> Identified:
         """The unknowns for observations near those of fits, to first order: no equilibrium is solved."""
@@ -206,8 +229,11 @@ class Identifier:
             return best
         for start in self._elsewhere(best.estimate):
             try:
-                held = self._fit(rough.law, rough.measurement, None, start, held=True, rounds=1, steps=QUICK)
-                start = np.where(self._is_width, start, held.estimate.z)
+                if start @ self._is_width:
+                    held = self._fit(
+                        rough.law, rough.measurement, None, start, held=True, rounds=1, steps=QUICK
+                    )
+                    start = np.where(self._is_width, start, held.estimate.z)
                 other = self._fit(rough.law, rough.measurement, None, start)
             except NoSolutionError:
                 continue
@@ -271,7 +297,7 @@ class Identifier:
                 reached[values.tobytes()] = found
                 return markers.predicted(found)
             lost.append(values)
-            if len(lost) > MOST_LOST or (other_law and not reached):
+            if len(lost) > MOST_LOST or (explained_elsewhere and not reached):
                 raise nothing
             return None
 
@@ -283,7 +309,8 @@ class Identifier:
         if held:
             parameters = self._holding(float(start @ self._is_width))
             start = np.where(self._is_width, 0.0, start)
-        other_law = near is not None and near.law != law  # where one explains the markers, another would
+        # Where one law explains the markers, another one does as well, or nowhere.
+        explained_elsewhere = near is not None and near.law != law and near.estimate.converged
         first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
         nothing = NoSolutionError(
             f"no equilibrium of the {law} law was found near the markers, from rest or from the force of a "
