@@ -28,6 +28,9 @@ QUICK = 4
 WIDE = (2.0, 4.0)
 """Standardised widths of a contact from which to start again where none explains the markers."""
 
+POLISHES, POLISHED = 6, 0.02
+"""Steps of first order on a finer mesh at most, and their last size over the standard deviations."""
+
 HELD = 1e-3
 """Standard deviation of a width that is held, of its logarithm."""
 
@@ -168,16 +171,19 @@ class Identifier:
         return self._shifted(about, measurement)._replace(coarser=fit)
 
     def polished(self, fit: Fit, observations: Observations) -> Fit:
-        """A fit whose response is near equilibrium, after two steps of first order; see `refined`.
+        """A fit whose response is near equilibrium, after some steps of first order; see `refined`.
 
-        What is left is of fourth order in what was off. Where there is no equilibrium near the fit, it stays
-        as it is, marked as inexact.
+        Where there is no equilibrium near the fit, it stays as it is, marked as inexact.
         """
-        for _ in range(2):
+        for _ in range(POLISHES):
+            before = fit.estimate.z
             found = self.refined(fit, fit.model, fit.response.state, observations, from_rest=True)
             if found is None:
                 return fit._replace(exact=False)
             fit = found._replace(coarser=None)
+            deviations = np.sqrt(np.diagonal(fit.estimate.covariance))
+            if (np.abs(fit.estimate.z - before) < POLISHED * deviations).all():
+                break
         return fit
 
     def updated(self, found: Identified, observations: Observations) -> Identified:
