@@ -51,6 +51,8 @@ def camera_plane(
         raise UserError(f"{UNDETERMINED}; give the design or workspace, and the camera, of the video")
     # An oblique plane has two similar poses; keep the better one.
     pose, squares = min(fits, key=lambda fit: fit[1])
+    if (angle := np.linalg.norm(pose[:3])) > np.pi:  # the same rotation the other way round
+        pose = np.append(pose[:3] * (1 - 2 * np.pi / angle), pose[3:])
     jacobians = projection.jacobians(points, pose).parameters.reshape(2 * len(points), -1)
     gain, inverse = _gain(jacobians[:, :6], covariances)
     # The fitted pose compensates errors of the intrinsics in part.

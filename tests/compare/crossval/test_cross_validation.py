@@ -329,7 +329,7 @@ def test_a_frame_is_for_simulated_pictures(tmp_path, observations):
         ).check()
     study = CrossvalStudy(design=Design(), variants=[], out=tmp_path, frame=HAND_HELD)
     turned = study.pressed_picture(observations.points, 0)
-    np.testing.assert_allclose(np.abs(turned.values), [5.0, 1.0, 1.0, 0.02])
+    np.testing.assert_allclose(np.abs(turned.values), [5.0, 1.0, 1.0, 0.02, 0.01, 0.01])
     np.testing.assert_array_equal(turned.centre, observations.points.mean(axis=0))
     others = [study.pressed_picture(observations.points, seed).values.tolist() for seed in range(1, 9)]
     assert len({tuple(each) for each in others}) > 3

@@ -120,6 +120,13 @@ def test_errors_of_the_camera_are_in_the_covariance_of_pose_and_intrinsics() -> 
     in_deviations(covariance, slopes @ root @ root.T @ slopes.T)
 
 
+def test_a_rotation_is_by_half_a_turn_at_most() -> None:
+    """Whichever way round the fit ends; a pose and its covariance are compared by their numbers."""
+    for step in np.linspace(0, 0.01, 9):
+        turn = fitted("camera", seen(POINTS) + MISSED + step).parameters[:3]
+        assert np.linalg.norm(turn) <= np.pi
+
+
 def test_fiducials_that_no_pose_explains_are_one_line() -> None:
     """By a camera of half the height, every pose that the search tries is lost."""
     with pytest.raises(UserError, match="do not determine where the camera is; give the design or workspace"):
