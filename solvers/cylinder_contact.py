@@ -1,25 +1,44 @@
-"""A rigid cylinder pressed on the front face without friction: gaps, forces and their tangent.
+"""A rigid cylinder pressed on the front face: gaps, forces, Coulomb friction and their tangent.
 
 The gap is collocated at the nodes of the boundary `front`, which are the points of Simpson's rule on the
 edges of quadratic elements. With g the gap of a node, positive outside the cylinder, and λ its multiplier,
 the nodal force is q = max(0, λ - k g): the augmented Lagrangian of J. C. Simo, T. A. Laursen, Computers &
-Structures 42 (1992) 97-116, without friction. In three dimensions the axis is along z, and k of a node is in
-proportion to its level's share of the depth.
+Structures 42 (1992) 97-116. In three dimensions the axis is along z, and k of a node is in proportion to its
+level's share of the depth.
+
+With friction a node slips by s along the cylinder since the last equilibrium, and the nodal friction is
+τ - k s where it sticks, and else of the length μ λ. That this is of the multiplier, not of the force, keeps
+the tangent symmetric; as λ settles they become one (T. A. Laursen, J. C. Simo, Computer Methods in Applied
+Mechanics and Engineering 108 (1993) 133-146). Which nodes stick is settled between Newton's iterations, with
+the multipliers: within them, nodes far from sticking would make it leap to and fro.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from solvers.extrusion import NodalSpace
 from solvers.problem import Problem, contact_ends, front_points
-from solvers.solution import Contact
+from solvers.solution import Contact, ContactPoints
+
+FRICTION_STEP = 0.2
+"""Travel of a cylinder with friction in one step over its radius; within a step slip has one direction."""
 
 CONTACT_AT_END = (
     "the contact reaches an end of the front face, beyond which none is looked for; "
     "press nearer to its middle or take a smaller stroke or radius"
 )
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """Friction at the nodes of the front: t = 1 component along the cylinder and, of a solid, 2 with z."""
+
+    forces: FloatArray  # Multipliers τ: in equilibrium friction on the finger, shape (l m, t), N/mm
+    places: FloatArray  # On the cylinder at the last equilibrium, from which slip counts, (l m, t), mm
+    sticks: BoolArray  # Whether a node sticks, shape (l m,); else it slips under τ, or does not touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +49,10 @@ class ContactState:
     nodal: FloatArray  # Displacements, shape (N, d), mm
     # Multipliers λ: in equilibrium the forces on the nodes of the front, shape (l m,), N/mm
     contact: FloatArray
+    friction: Friction | None = field(default=None, kw_only=True)  # None without friction
+
+
+StateT = TypeVar("StateT", bound=ContactState)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +65,7 @@ class CylinderContact:
     travel: FloatArray  # Displacement of the cylinder under the full load, shape (2,), mm
     radius: float  # mm
     stiffness: float  # k of a node, N/mm per mm, times its level's share
+    coefficient: float  # μ of friction
     edges: IntArray  # Rows of `positions` along every edge, shape (e, degree + 1)
     shares: FloatArray  # Weights of the levels in a mean over the depth, shape (l,)
 
@@ -65,14 +89,16 @@ class CylinderContact:
             radius=float(load.radius or 0),
             # More would need fewer updates of the multipliers but more Newton iterations.
             stiffness=10.0 * problem.material.young,
+            coefficient=load.friction,
             edges=order[np.searchsorted(nodes[order], np.concatenate(columns, axis=1))],
             shares=space.shares,
         )
 
     @property
     def longest_step(self) -> float:
-        """The fraction of the load in which the cylinder moves by half its radius."""
-        return float(0.5 * self.radius / np.linalg.norm(self.travel))
+        """The fraction of the load in which the cylinder moves by half its radius; FRICTION_STEP with it."""
+        share = FRICTION_STEP if self.coefficient else 0.5
+        return float(share * self.radius / np.linalg.norm(self.travel))
 
     def gaps(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Distances g from the cylinder, shape (l m,), mm, and its outer normals n there, shape (l m, 2)."""
@@ -84,17 +110,90 @@ class CylinderContact:
         """Forces q along the outer normals, shape (l m,), N/mm, never tension; λ is `state.contact`."""
         return np.maximum(0.0, state.contact - self._stiffness * self.gaps(state)[0])
 
+    def started(self, equilibrium: ContactState) -> Friction | None:
+        """Friction as a step begins at an equilibrium: the same; None without friction."""
+        if not self.coefficient:
+            return None
+        places, before = self.places(equilibrium), equilibrium.friction
+        if before is None:
+            return Friction(np.zeros_like(places), places, np.zeros(len(places), dtype=np.bool_))
+        return replace(before, places=places)
+
+    def places(self, state: ContactState) -> FloatArray:
+        """Places on the cylinder: along it from its lowest line and, of a solid, z, shape (l m, t), mm."""
+        away = self._moved(state.nodal) - self.centre - state.fraction * self.travel
+        around = self.radius * np.arctan2(away[:, 0], -away[:, 1])
+        return np.column_stack([around, *state.nodal[self.nodes, 2:].T])
+
+    def frictions(self, state: ContactState) -> FloatArray:
+        """Friction on the finger along the cylinder and, of a solid, along z, (l m, t), N/mm."""
+        assert state.friction is not None
+        slip = self.places(state) - state.friction.places
+        sticking = (state.friction.sticks * self._stiffness)[:, None]
+        return np.asarray(state.friction.forces - sticking * slip)
+
+    def settled(self, state: StateT) -> tuple[StateT, float]:
+        """The state with its forces as multipliers, and how far off the old ones were: gap or slip, mm.
+
+        A node that sticks slips if that takes more than friction gives. One that slips sticks if friction
+        does not oppose its slip.
+        """
+        contact = self.forces(state)
+        gap, _ = self.gaps(state)
+        off = float(max(np.abs(gap[contact > 0]).max(initial=0.0), -gap.min()))
+        if (old := state.friction) is None:
+            return replace(state, contact=contact), off
+        bound, needed = self.coefficient * contact, self.frictions(state)
+        slip = self.places(state) - old.places
+        size = np.linalg.norm(needed, axis=1)
+        held = (old.forces * slip).sum(axis=1) > 0
+        sticks = (contact > 0) & np.where(old.sticks, size <= bound, held)
+        trial = needed - (~old.sticks * self._stiffness)[:, None] * slip
+        length = np.linalg.norm(trial, axis=1, keepdims=True)
+        cut = np.divide(bound[:, None], length, out=np.zeros_like(length), where=length > 0) * trial
+        forces = np.where(sticks[:, None], np.where(old.sticks[:, None], needed, old.forces), cut)
+        change = np.linalg.norm(forces - old.forces, axis=1) / self._stiffness
+        off = max(off, float(change.max())) if np.array_equal(sticks, old.sticks) else np.inf
+        return replace(state, contact=contact, friction=Friction(forces, old.places, sticks)), off
+
     def gradient(self, state: ContactState) -> FloatArray:
-        """Residual force - q n, the derivative of Σ (q^2 - λ^2) / 2 k, in the plane, shape (l m, 2), N/mm."""
-        return -self.forces(state)[:, None] * self.gaps(state)[1]
+        """Residual force - q n less friction, shape (l m, 2) or, with friction on a solid, (l m, 3), N/mm.
+
+        Without friction it is the derivative of Σ (q^2 - λ^2) / 2 k.
+        """
+        gap, normal = self.gaps(state)
+        pressing = -self.forces(state)[:, None] * normal
+        if state.friction is None:
+            return pressing
+        force = self.frictions(state)
+        around = (self.radius / (gap + self.radius) * force[:, 0])[:, None] * _turned(normal)
+        return np.column_stack([pressing - around, *-force[:, 1:].T])
 
     def tangent(self, state: ContactState) -> FloatArray:
-        """Derivative of the gradient, blocks k n n^T - q (I - n n^T) / (g + radius), (l m, 2, 2)."""
+        """Derivative of the gradient by its components, (l m, 2, 2) or (l m, 3, 3).
+
+        Blocks k n n^T - q (I - n n^T) / r of the pressure with r = g + radius. Friction f along t adds
+        f radius (t n^T + n t^T) / r^2 and, where a node sticks, k J^T J with the derivative J of its place.
+        """
         (gap, normal), force = self.gaps(state), self.forces(state)
+        distance = gap + self.radius
         across = np.einsum("mi,mj->mij", normal, normal)
-        turning = (force / (gap + self.radius))[:, None, None] * (np.eye(2) - across)
+        turning = (force / distance)[:, None, None] * (np.eye(2) - across)
         stiffness = (force > 0) * self._stiffness
-        return np.asarray(stiffness[:, None, None] * across - turning)
+        pressing = np.asarray(stiffness[:, None, None] * across - turning)
+        if state.friction is None:
+            return pressing
+        friction = self.frictions(state)
+        count = friction.shape[1]
+        slopes = np.zeros((len(normal), count, count + 1))
+        slopes[:, 0, :2] = (self.radius / distance)[:, None] * _turned(normal)
+        slopes[:, 1:, 2:] = np.eye(count - 1)
+        sticking = state.friction.sticks * self._stiffness
+        blocks = np.einsum("m,mti,mtj->mij", sticking, slopes, slopes)
+        tied = np.einsum("mi,mj->mij", _turned(normal), normal)
+        bend = friction[:, 0] * self.radius / distance**2
+        blocks[:, :2, :2] += pressing + bend[:, None, None] * (tied + tied.transpose(0, 2, 1))
+        return np.asarray(blocks)
 
     @property
     def _stiffness(self) -> FloatArray:
@@ -115,6 +214,11 @@ class CylinderContact:
         shares = {2: (1 / 2, 1 / 2), 3: (1 / 6, 4 / 6, 1 / 6)}[self.edges.shape[1]]
         weights = np.outer(lengths, shares)
         return np.bincount(self.edges.ravel(), weights.ravel(), len(self.positions)).astype(np.float64)
+
+
+def _turned(normal: FloatArray) -> FloatArray:
+    """The directions along the cylinder, counterclockwise, shape (m, 2)."""
+    return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
 
 
 def _touching_centre(problem: Problem) -> FloatArray:
@@ -138,11 +242,15 @@ class ContactRegion:
     spacing: float  # Deformed length between neighbouring nodes there, mm: the resolution of the width
     pressure: float  # Largest Cauchy pressure, MPa
     penetration: float  # Largest depth of a node within the cylinder, mm
-    force: tuple[float, float]  # Integral of the pressure, N/mm: sum of q n
+    friction: float  # Sum of friction along the cylinder, counterclockwise around it, N/mm
+    sticking: float  # Deformed length of what sticks, mm
+    force: tuple[float, float]  # Integral of pressure and friction, N/mm
     at_end: bool  # Whether the region reaches an end of the front face
+    points: ContactPoints
 
     def stats(self) -> dict[str, float | int]:
         """Columns of a solution's `stats`."""
+        rubbed = {"contact_friction_N_per_mm": self.friction, "contact_sticking_mm": self.sticking}
         return {
             "contact_start_mm": self.start,
             "contact_end_mm": self.end,
@@ -151,6 +259,7 @@ class ContactRegion:
             "contact_spacing_mm": self.spacing,
             "contact_pressure_MPa": self.pressure,
             "penetration_mm": self.penetration,
+            **(rubbed if self.points.friction.any() else {}),
         }
 
     @classmethod
@@ -158,10 +267,17 @@ class ContactRegion:
         """The region in equilibrium; None where the cylinder does not touch the finger.
 
         Its ends lie half way between a point that touches and the next one that does not. In three
-        dimensions a point touches if it does so anywhere along z, and the pressure is a mean over the depth.
+        dimensions a point touches if it does so anywhere along z, and slips if it does so wherever it
+        touches; pressure and friction are means over the depth.
         """
         gap, normal = contact.gaps(state)
-        nodal, force = state.nodal, state.contact.reshape(len(contact.shares), -1).sum(axis=0)
+        along, levels = np.zeros(len(gap)), len(contact.shares)
+        sticks = np.zeros(len(gap), dtype=np.bool_)
+        if (rubbed := state.friction) is not None:
+            along, sticks = rubbed.forces[:, 0], rubbed.sticks
+        total = state.contact @ normal + along @ _turned(normal)
+        nodal, force = state.nodal, state.contact.reshape(levels, -1).sum(axis=0)
+        friction, sticks = along.reshape(levels, -1).sum(axis=0), sticks.reshape(levels, -1).any(axis=0)
         touching = np.flatnonzero(force > 0)
         if not len(touching):
             return None
@@ -171,16 +287,26 @@ class ContactRegion:
         moved = contact.front(nodal)
         halves = 0.5 * np.linalg.norm(np.diff(moved, axis=0), axis=1)
         shares = np.append(halves, 0.0) + np.insert(halves, 0, 0.0)
+        lengths = contact.lengths(nodal)[touching]
+        points = ContactPoints(
+            x=x[touching],
+            pressure=force[touching] / lengths,
+            friction=friction[touching] / lengths,
+            slips=~sticks[touching],
+        )
         return cls(
             start=float(between[first]),
             end=float(between[last + 1]),
             parts=int(np.count_nonzero(np.diff(touching) > 1)) + 1,
             width=float(shares[touching].sum()),
             spacing=float(shares[touching].max()),
-            pressure=float((force / contact.lengths(nodal)).max()),
+            pressure=float(points.pressure.max()),
             penetration=float(max(0.0, -gap.min())),
-            force=(float(state.contact @ normal[:, 0]), float(state.contact @ normal[:, 1])),
+            friction=float(friction.sum()),
+            sticking=float(shares[touching][~points.slips].sum()),
+            force=(float(total[0]), float(total[1])),
             at_end=first == 0 or last == len(x) - 1,
+            points=points,
         )
 
 
@@ -189,4 +315,4 @@ def contact_of(problem: Problem, position: float | None, region: ContactRegion |
     if position is None or (problem.load.kind == "cylinder" and region is None):
         return None
     start, end = contact_ends(problem) if region is None else (region.start, region.end)
-    return Contact(position, start, end)
+    return Contact(position, start, end, None if region is None else region.points)

@@ -13,7 +13,7 @@ from geometry.arrays import FloatArray, IntArray
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
-from geometry.finger.parameters import CheckedModel
+from geometry.finger.parameters import CheckedModel, bounded
 from geometry.mesh.quadrature import segment_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -23,6 +23,9 @@ LoadKind = Literal["mean", "point", "patch", "cylinder"]
 
 RADIUS = 5.0
 """Default radius of the cylinder, mm."""
+
+ROUGHEST = 5.0
+"""Largest coefficient of friction; that of rubber on rough ground is below."""
 
 LEAST_TRAVEL = 1e-9
 """Smallest displacement of an indenter that moves, mm: a hundredth of an atom's size."""
@@ -84,12 +87,13 @@ class Load(CheckedModel):
         kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_functional`);
             well posed, the default. `point`: the displacement of the contact's middle node is prescribed, as
             in the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact
-            has the displacement. `cylinder`: a rigid cylinder without friction, which touches the front face
+            has the displacement. `cylinder`: a rigid cylinder, which does not turn and touches the front face
             at the contact's middle from outside, moves by the displacement; the contact zone is found.
         displacement: Prescribed (u, v), mm.
         position: Abscissa of the contact's middle on the front face, mm; None means where the mesh has its
             boundary `contact`, whose width the contact has in any case. A `patch` cannot be elsewhere.
         radius: Radius of the cylinder, mm; None for the other kinds.
+        friction: Coulomb's coefficient of friction between cylinder and finger; 0 for the other kinds.
 
     Raises:
         UserError: If nothing is prescribed, a number is not finite, or a value does not go with the kind.
@@ -99,6 +103,7 @@ class Load(CheckedModel):
     displacement: tuple[float | None, float | None] = (0.0, -10.0)
     position: float | None = None
     radius: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    friction: float = bounded(0.0, 0.0, ROUGHEST, "", "", "Coefficient of friction of a cylinder")
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
@@ -115,8 +120,10 @@ class Load(CheckedModel):
             )
         if (self.kind == "cylinder") != (self.radius is not None):
             raise ValueError("a radius belongs to the load cylinder, and to no other; give it in mm")
+        if self.friction and self.kind != "cylinder":
+            raise ValueError("friction belongs to the load cylinder, and to no other; leave it out")
         if self.kind == "cylinder" and None in self.displacement:
-            raise ValueError("a cylinder is moved in u and v and has no friction: the finger slides along it")
+            raise ValueError("a cylinder is moved in u and v: the finger slides along it as friction lets it")
         if self.kind == "cylinder" and not any(self.displacement):
             raise ValueError("the cylinder does not move; prescribe a displacement (mm)")
         return self
@@ -151,6 +158,7 @@ class Physics(Material):
     direction: float = _number(0.0, -89, 89, "deg", "Direction of the travel")
     slide: bool = False  #: Whether the contact slides along the finger: u is free
     radius: float | None = _number(None, 1e-6, 1e4, "mm", "Radius of a cylinder; none means 5 mm")
+    friction: float = bounded(0.0, 0.0, ROUGHEST, "", "", "Coefficient of friction of a cylinder")
 
     @model_validator(mode="after")
     def _presses(self) -> Self:
@@ -170,6 +178,7 @@ class Physics(Material):
             kind=self.load,
             displacement=(None if self.slide else self.stroke * along, -self.stroke * into),
             radius=RADIUS if self.load == "cylinder" and self.radius is None else self.radius,
+            friction=self.friction,
         )
         return Material(**self.model_dump(include=set(Material.model_fields))), load
 

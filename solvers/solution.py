@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, runtime_checkab
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.notebook import fact_table
@@ -62,6 +62,18 @@ class Contact(NamedTuple):
     position: float  #: Where the resultant force acts
     start: float  #: End of the contact nearer to the base
     end: float  #: The other end
+    points: "ContactPoints | None" = None  #: From a solver that finds the pressure of a cylinder
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """Pressure and friction of a cylinder at the k points of the front that touch it."""
+
+    x: FloatArray  #: Abscissae before the load, shape (k,), mm
+    pressure: FloatArray  #: Cauchy pressure, shape (k,), MPa
+    #: Friction on the finger over area, shape (k,), MPa: positive along x where the cylinder touches below it
+    friction: FloatArray
+    slips: BoolArray  #: Whether the point slips along the cylinder at the end of the load, shape (k,)
 
 
 def _interval(value: float, low: float, high: float) -> str:

@@ -127,6 +127,7 @@ class Traits:
     assimilates: bool = False  #: Whether it uses the observations of a problem
     family: Family | None = None  #: Kind of method; None if unknown
     twin: str | None = None  #: Solver by finite elements that fits the markers in the same way, if any
+    friction: bool = False  #: Whether its load `cylinder` may have friction
 
     @classmethod
     def of(cls, solver: Solver) -> "Traits":
@@ -163,6 +164,11 @@ def check_load(solver: Solver, load: Load) -> None:
         raise UnsupportedProblemError(
             f"{solver.name} takes the loads {', '.join(solver.loads)}, not {load.kind!r}; "
             "`pinnray solvers` lists the loads of each"
+        )
+    if load.friction and not Traits.of(solver).friction:
+        raise UnsupportedProblemError(
+            f"{solver.name} takes a cylinder without friction; leave friction out, or take "
+            "fem-nonlinear or fem-3d"
         )
 
 

@@ -259,6 +259,6 @@ def _contact(solution: Solution) -> TrueContact:
     """Force and place of the contact in a simulation."""
     if solution.contact is None:  # the cylinder has slipped off
         raise UserError(f"the virtual experiment: {solution.status.message}")
-    position, start, end = solution.contact
+    position, start, end, _ = solution.contact
     u, v = solution.reaction.tolist()
     return TrueContact((u, v), position, 0.5 * (start + end), end - start)

@@ -53,11 +53,12 @@ def preset_meanings(settings: Mapping[str, Mapping[str, object]]) -> dict[str, s
 def load_sentence(load: Load, design: Finger) -> str:
     """Sentence on the load."""
     width = f"{design.contact_width:g} mm wide contact"
+    friction = f"with friction {load.friction:g}" if load.friction else "without friction"
     where = {
         "mean": f"The weighted mean displacement of the {width} is prescribed",
         "point": "The displacement of one point, the contact’s middle, is prescribed",
         "patch": f"Every point of the {width} has the prescribed displacement",
-        "cylinder": f"A rigid cylinder of radius {load.radius or 0:g} mm presses without friction where it "
+        "cylinder": f"A rigid cylinder of radius {load.radius or 0:g} mm presses {friction} where it "
         "touches the front, and moves by the prescribed displacement",
     }[load.kind]
     parts = [

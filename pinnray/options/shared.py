@@ -149,8 +149,9 @@ class PhysicsOptions:
         law: Material law of the solvers that have it; default: each solver's own.
         load: Indenter. mean (default): prescribed weighted mean displacement of the contact; point: one
             prescribed point, as in the paper, which has no limit under refinement; patch: rigid patch;
-            cylinder: rigid cylinder without friction.
+            cylinder: rigid cylinder.
         radius: Radius of --load cylinder, mm, default 5.
+        friction: Coefficient of friction of --load cylinder.
         stroke: Travel of the indenter, mm.
         direction: Direction of the travel, degrees: 0 into the finger, 90 along it to the tip.
         slide: Let the contact slide along the finger (u free).
@@ -162,6 +163,7 @@ class PhysicsOptions:
     law: LawName | None = None
     load: LoadKind | None = None
     radius: float | None = None
+    friction: float = 0.0
     stroke: float = 10.0
     direction: float = 0.0
     slide: Flag = False

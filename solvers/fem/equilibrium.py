@@ -133,7 +133,8 @@ class DiscreteEquilibrium:
         internal = self.internal_force(state.nodal)
         balance = internal - self.constraints.at_nodes(state.forces)
         if self.contact is not None:
-            balance[self.contact.nodes, :2] += self.contact.gradient(state)
+            pressing = self.contact.gradient(state)
+            balance[self.contact.nodes, : pressing.shape[1]] += pressing
         return np.where(self.clamped, 0.0, balance), float(np.abs(internal).max())
 
     def factorise(self, state: LoadState, shift: float = 0.0) -> None:
@@ -143,7 +144,7 @@ class DiscreteEquilibrium:
         if self.contact is not None:
             free = ~self.clamped[self.contact.nodes]
             inner = self.contact.tangent(state)
-            blocks = np.pad(inner, ((0, 0), *2 * ((0, self.distributed.dimension - 2),)))
+            blocks = np.pad(inner, ((0, 0), *2 * ((0, self.distributed.dimension - inner.shape[1]),)))
             blocks *= free[:, :, None] & free[:, None, :]
             self.distributed.add_blocks(self.matrix, self.contact.nodes, blocks)
         if shift:
@@ -229,7 +230,8 @@ class DiscreteEquilibrium:
         """The state without load."""
         contact = 0 if self.contact is None else len(self.contact.nodes)
         forces = np.zeros(len(self.constraints.targets))
-        return LoadState(0.0, np.zeros(self.clamped.shape), np.zeros(contact), forces)
+        rest = LoadState(0.0, np.zeros(self.clamped.shape), np.zeros(contact), forces)
+        return rest if self.contact is None else replace(rest, friction=self.contact.started(rest))
 
     def linear_guess(self, fraction: float) -> LoadState:
         """The linear solution at a fraction of the load, by `minimiser`.

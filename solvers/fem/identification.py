@@ -208,6 +208,7 @@ class FemIdSolver(IdentifyingSolver):
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
     loads: ClassVar[tuple[str, ...]] = FemNonlinearSolver.loads  # only the drawn contact is taken from it
+    friction: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.model == "fem":

@@ -159,6 +159,7 @@ class Fem3dSolver(FieldSettings):
     family = "finite elements"
     laws = ("linear", "neo-hookean", "st-venant-kirchhoff")
     loads = ("mean", "patch", "cylinder")
+    friction = True
 
     def __post_init__(self) -> None:
         if self.layers < 1:

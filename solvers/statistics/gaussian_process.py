@@ -51,6 +51,7 @@ class GaussianProcessSolver(FieldSettings):
     family = "statistics"
     laws = ("linear",)
     loads = ("mean", "point", "patch", "cylinder")  # it only needs to know where, for its force
+    friction = True
     assimilates = True
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:

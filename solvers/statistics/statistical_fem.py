@@ -56,6 +56,7 @@ class StatFemSolver(ElementSettings):
     family = "statistics"
     laws = (*FemSolver.laws, *FemNonlinearSolver.laws)
     loads = FemNonlinearSolver.loads
+    friction = True
     assimilates = True
 
     def __post_init__(self) -> None:

@@ -101,7 +101,7 @@ def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):
         (lambda: Load(displacement=(0.0, -1e-200)), "by less than 1e-09 mm, a hundredth of an atom's size"),
         (
             lambda: Load((0.0, -3.0)),
-            r"by name only \(kind, displacement, position, radius\), not \(0.0, -3.0\)$",
+            r"by name only \(kind, displacement, position, radius, friction\), not \(0.0, -3.0\)$",
         ),
         (lambda: Load(np.ones((9, 9))), r"Load takes values by name only .*, not array"),  # many lines
         (lambda: Load(displacement=-3), "displacement = -3: input should be a valid tuple"),

@@ -5,6 +5,7 @@ from benchmarks.verification.cases.calculix import CALCULIX
 from benchmarks.verification.cases.cantilever import CANTILEVER
 from benchmarks.verification.cases.cook import COOK
 from benchmarks.verification.cases.finite_strain import FINITE_STRAIN
+from benchmarks.verification.cases.friction import FRICTION
 from benchmarks.verification.cases.hertz import HERTZ
 from benchmarks.verification.cases.locking import LOCKING
 from benchmarks.verification.cases.manufactured import MANUFACTURED
@@ -23,5 +24,6 @@ CASES = (
     FINITE_STRAIN,
     CALCULIX,
     HERTZ,
+    FRICTION,
     SOLID,
 )

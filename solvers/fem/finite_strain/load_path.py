@@ -153,28 +153,29 @@ class LoadPath:
                 return None, hardest
             if contact is None:
                 return result.state, hardest
-            guess = replace(result.state, contact=contact.forces(result.state))
-            gap, _ = contact.gaps(guess)
-            if max(np.abs(gap[guess.contact > 0]).max(initial=0.0), -gap.min()) <= PENETRATION:
+            guess, off = contact.settled(result.state)
+            if off <= PENETRATION:
                 return guess, hardest
         self._reason = "the contact does not settle"
         return None, hardest
 
     def _guess(self, fraction: float) -> LoadState:
         """The state at a fraction of the load, by the guide or by extrapolation of the last ones."""
-        last = self.points[-1]
+        last, contact = self.points[-1], self.equilibrium.contact
+        friction = None if contact is None else contact.started(last)
         if self._guide is not None:
             before, after = self._guide(last.fraction), self._guide(fraction)
             nodal, forces = after.nodal - before.nodal, after.forces - before.forces
-            return LoadState(fraction, last.nodal + nodal, after.contact, last.forces + forces)
+            forces = last.forces + forces
+            return LoadState(fraction, last.nodal + nodal, after.contact, forces, friction=friction)
         if len(self.points) == 1:
             return self.equilibrium.linear_guess(fraction)
-        known = self.points[-3 if self.equilibrium.contact is None else -2 :]  # contact starts with a kink
+        known = self.points[-3 if contact is None else -2 :]  # contact starts with a kink
         at = np.array([point.fraction for point in known])
         shares = [np.prod((fraction - (rest := np.delete(at, k))) / (at[k] - rest)) for k in range(len(at))]
         nodal = sum(share * point.nodal for share, point in zip(shares, known, strict=True))
         forces = sum(share * point.forces for share, point in zip(shares, known, strict=True))
-        return LoadState(fraction, nodal, last.contact, forces)
+        return LoadState(fraction, nodal, last.contact, forces, friction=friction)
 
     @property
     def phrase(self) -> str:

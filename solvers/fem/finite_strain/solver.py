@@ -27,7 +27,8 @@ ITERATIONS = 40
 class FemNonlinearSolver(ElementSettings):
     """Plane strain by Newton's method, the load applied in adaptive steps; see `LoadPath`.
 
-    A `patch` whose tangential component is free slides. A `cylinder` presses without friction.
+    A `patch` whose tangential component is free slides. A `cylinder` may have friction: its load
+    steps are small, because friction depends on the way there.
     """
 
     first_step: float = 0.05  # First fraction of the load
@@ -39,6 +40,7 @@ class FemNonlinearSolver(ElementSettings):
     family = "finite elements"
     laws = ("neo-hookean", "st-venant-kirchhoff", "gent")
     loads = ("mean", "point", "patch", "cylinder")
+    friction = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -183,6 +185,8 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None], unstable: i
     if (region := regions[-1]) is not None:
         parts = f" in {region.parts} parts" if region.parts > 1 else ""
         taken += f"; contact from x = {region.start:.4g} to {region.end:.4g} mm{parts}"
+        if region.points.friction.any():
+            taken += f", of {region.width:.3g} mm {region.sticking:.3g} mm stick"
     return Status(True, "; ".join(filter(None, [taken, remarks])))
 
 

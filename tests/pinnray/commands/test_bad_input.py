@@ -111,7 +111,9 @@ BAD = [
     ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
     ("compare --radius 5", "a radius belongs to the load cylinder, and to no other"),
     ("solve fem-nonlinear --load cylinder --radius 0", "radius = 0.0: input should be greater than 0"),
-    ("solve fem-nonlinear --load cylinder --slide", "a cylinder .* has no friction"),
+    ("solve fem-nonlinear --load cylinder --slide", "a cylinder is moved in u and v"),
+    ("solve fem-nonlinear --friction 0.5", "friction belongs to the load cylinder"),
+    ("solve fem-nonlinear --load cylinder --friction -1", "friction = -1.* is outside its range, 0 to 5"),
     ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
     ("compare --law hooke", 'Choose from: "linear", "neo-hookean", "st-venant-kirchhoff", "gent"'),
     (

@@ -1,15 +1,22 @@
-"""The rigid cylinder: what contact without friction must obey (`tests/verification` has Hertz)."""
+"""The rigid cylinder: what contact must obey (`tests/verification` has Hertz, Cattaneo and Mindlin)."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
 from geometry.errors import UserError
+from solvers.cylinder_contact import ContactState, CylinderContact
+from solvers.extrusion import ExtrudedSpace
 from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.load_path import PENETRATION
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
+from solvers.fem.solid import Fem3dSolver
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem, contact_ends
+from solvers.registry import make_solver
 from tests.solvers.conftest import bar_mesh
 
 
@@ -86,10 +93,112 @@ def test_linear_solvers_refuse_a_cylinder(coarse_mesh):
         ({"kind": "cylinder"}, "a radius belongs to the load cylinder"),  # none
         ({"kind": "mean", "radius": 5.0}, "a radius belongs to the load cylinder"),  # one too many
         ({"kind": "cylinder", "radius": -1.0}, "greater than 0"),
-        ({"kind": "cylinder", "radius": 5.0, "displacement": (None, -1.0)}, "has no friction"),
+        ({"kind": "cylinder", "radius": 5.0, "displacement": (None, -1.0)}, "as friction lets it"),
         ({"kind": "cylinder", "radius": 5.0, "displacement": (0.0, 0.0)}, "does not move"),
+        ({"kind": "mean", "friction": 0.5}, "friction belongs to the load cylinder"),
+        (
+            {"kind": "cylinder", "radius": 5.0, "friction": 50.0},
+            "friction = 50 is outside its range, 0 to 5",
+        ),
     ],
 )
 def test_a_cylinder_that_makes_no_sense_is_refused(values, said):
     with pytest.raises(ValueError, match=said):
         Load(**values)
+
+
+def test_without_friction_nothing_rubs(pressed):
+    assert pressed.contact.points.slips.all()
+    assert not pressed.contact.points.friction.any()
+    assert "contact_friction_N_per_mm" not in pressed.stats
+
+
+@pytest.fixture(scope="module")
+def rough(coarse_mesh):
+    """The same with a friction of 0.5."""
+    load = Load(kind="cylinder", radius=5.0, friction=0.5)
+    return FemNonlinearSolver().solve(Problem(coarse_mesh, Material(law="neo-hookean"), load))
+
+
+def test_friction_takes_the_finger_along(pressed, rough):
+    """The finger bends and slides toward its base: friction holds it back, and the work done is more."""
+    assert rough.status.converged
+    points = rough.contact.points
+    assert points.pressure.min() > 0
+    assert (np.abs(points.friction) <= 0.5 * points.pressure * (1 + 1e-6)).all()
+    slipping = points.slips
+    np.testing.assert_allclose(np.abs(points.friction[slipping]), 0.5 * points.pressure[slipping], rtol=1e-3)
+    assert rough.stats["contact_friction_N_per_mm"] > 0
+    assert rough.reaction[0] - pressed.reaction[0] > 0.05
+    work = trapezoid(rough.history["reaction_y"], -10.0 * rough.history["load_fraction"])
+    assert rough.energy < work
+
+
+def test_the_indenters_force_is_pressure_and_friction(rough):
+    """By the elements' own balance at the nodes of the front."""
+    space = rough.field.space
+    nodes = space.boundary_nodes("front")
+    nodes = nodes[space.nodes[nodes, 0] > 0]
+    forces = DiscreteEquilibrium(rough.problem, space).internal_force(rough.field.values)[nodes]
+    np.testing.assert_allclose(forces.sum(axis=0), rough.reaction, rtol=1e-6)
+    middle = np.mean(contact_ends(rough.problem))
+    away = space.nodes[nodes] + rough.field.values[nodes] - [middle, 5.0 - 10.0]
+    normal = away / np.linalg.norm(away, axis=1)[:, None]
+    along = forces @ np.array([[0.0, -1.0], [1.0, 0.0]]).T
+    rubbed = (along * normal).sum(axis=1).sum()
+    # The contact is settled to 1e-5 mm, in which its stiffness of 114 N/mm2 makes 1e-3 N/mm a node.
+    assert abs(rubbed) == pytest.approx(rough.stats["contact_friction_N_per_mm"], abs=1e-3)
+
+
+def test_finer_steps_change_the_friction_little(coarse_mesh, rough):
+    fine = FemNonlinearSolver(first_step=0.02, max_step=0.02).solve(rough.problem)
+    np.testing.assert_allclose(fine.reaction, rough.reaction, rtol=0.01)
+
+
+@pytest.mark.parametrize("solid", [False, True])
+def test_the_tangent_of_friction_is_the_derivative_of_its_gradient(coarse_mesh, solid):
+    """Some nodes stick, some slip, and all are a little off their places."""
+    problem = Problem(
+        coarse_mesh, Material(law="neo-hookean"), Load(kind="cylinder", radius=5.0, friction=0.5)
+    )
+    space = ExtrudedSpace.of(coarse_mesh, 1, 1.0) if solid else LagrangeSpace(coarse_mesh, 2)
+    contact = CylinderContact.of(problem, space)
+    rng = np.random.default_rng(1)
+    rest = ContactState(0.1, np.zeros(space.nodes.shape), np.full(len(contact.nodes), 0.3))
+    started = contact.started(rest)
+    assert started is not None
+    state = replace(
+        rest,
+        nodal=0.001 * rng.standard_normal(space.nodes.shape),
+        friction=replace(
+            started,
+            forces=0.1 * rng.standard_normal(started.forces.shape),
+            sticks=rng.random(len(contact.nodes)) < 0.5,
+        ),
+    )
+    tangent = contact.tangent(state)
+    size, step = tangent.shape[-1], 1e-6
+    assert size == (3 if solid else 2)
+    for axis in range(size):
+        moved = np.zeros(space.nodes.shape)
+        moved[contact.nodes, axis] = step
+        slopes = (
+            contact.gradient(replace(state, nodal=state.nodal + moved))
+            - contact.gradient(replace(state, nodal=state.nodal - moved))
+        ) / (2 * step)
+        np.testing.assert_allclose(slopes, tangent[:, :, axis], atol=1e-4)
+
+
+def test_solid_in_plane_strain_rubs_as_the_plane_does(coarse_mesh):
+    load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -3.0), friction=0.5)
+    problem = Problem(coarse_mesh, Material(law="neo-hookean"), load)
+    plane = FemNonlinearSolver().solve(problem)
+    solid = Fem3dSolver(layers=1, sides="held").solve(problem)
+    assert solid.status.converged
+    np.testing.assert_allclose(solid.reaction, plane.reaction, rtol=0.02)
+
+
+def test_a_network_refuses_friction(coarse_mesh):
+    load = Load(kind="cylinder", radius=5.0, friction=0.5)
+    with pytest.raises(UserError, match="pinn-std takes a cylinder without friction; leave friction out"):
+        make_solver("pinn-std").solve(Problem(coarse_mesh, Material(law="neo-hookean"), load))

@@ -1,0 +1,143 @@
+"""Friction of a rigid cylinder: a layer that is sheared, and Cattaneo and Mindlin's partial slip."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.verification.cases.hertz import FINEST, INDENTATION, RADIUS, block
+from benchmarks.verification.meshes import mapped_mesh
+from benchmarks.verification.record import Case, Row, about, at_most
+from geometry.arrays import FloatArray
+from solvers.cylinder_contact import ContactPoints, ContactRegion
+from solvers.fem.finite_strain.load_path import LoadPath
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Load, Material, Problem
+from solvers.solver import silent
+
+COEFFICIENT = 0.3
+LAYER = Material(poisson=0.0, law="neo-hookean")
+INCOMPRESSIBLE = Material(poisson=0.49, law="neo-hookean")
+"""Cattaneo and Mindlin neglect that pressure moves a surface along itself, as it does not at 0.5."""
+SHIFT = 0.007
+"""Travel along the block after the indentation, mm: friction is then 0.4 of its limit."""
+
+
+def friction() -> tuple[Row, ...]:
+    """Forces on the layer over those of the closed forms; partial slip of the block."""
+    sticking, slipping = pressed_layer(20.0), pressed_layer(60.0)
+    stiffness = 0.5 * np.tan(np.radians(20.0))
+    return (
+        Row(
+            "layer that sticks, friction / pressure / elastic",
+            middle_ratio(sticking) / stiffness,
+            about(1, 0.03),
+            2,
+            "strain",
+        ),
+        Row(
+            "layer that slips, friction / pressure / μ",
+            middle_ratio(slipping) / COEFFICIENT,
+            about(1, 1e-6),
+            2,
+            "strain",
+        ),
+        *partial_slip(),
+    )
+
+
+def pressed_layer(direction: float) -> ContactPoints:
+    """The contact of a layer under a nearly flat cylinder that travels at an angle, degrees."""
+    layer = mapped_mesh(lambda square: square * [40.0, 1.0] - [0.0, 1.0], 160, 4)
+    way = 0.02 * np.array([np.sin(np.radians(direction)), -np.cos(np.radians(direction))])
+    load = Load(kind="cylinder", radius=500.0, displacement=(way[0], way[1]), friction=COEFFICIENT)
+    contact = FemNonlinearSolver(max_iterations=50).solve(Problem(layer, LAYER, load)).contact
+    assert contact is not None
+    assert contact.points is not None
+    return contact.points
+
+
+def middle_ratio(points: ContactPoints) -> float:
+    """Friction over pressure, mean over the middle half of the layer."""
+    middle = np.abs(points.x - 20.0) < 4.0
+    return float((points.friction[middle] / points.pressure[middle]).mean())
+
+
+def partial_slip() -> tuple[Row, ...]:
+    """Pressed without friction, then shifted along the block with it: width that sticks, and friction."""
+    load = Load(kind="cylinder", radius=RADIUS, displacement=(0.0, -INDENTATION))
+    region = shifted(Problem(block(), INCOMPRESSIBLE, load))
+    points = region.points
+    modulus = INCOMPRESSIBLE.young / (1 - INCOMPRESSIBLE.poisson**2)
+    pressing, shear = -region.force[1], region.friction
+    half = np.sqrt(4 * pressing * RADIUS / (np.pi * modulus))
+    sticking = half * np.sqrt(1 - abs(shear) / (COEFFICIENT * pressing))
+    x = points.x - 30.0 - 0.5 * (points.x[0] + points.x[-1] - 60.0)
+    peak = COEFFICIENT * 2 * pressing / (np.pi * half)
+    law = ellipse(x / half) - sticking / half * ellipse(x / sticking)
+    away = np.sqrt(np.mean((np.abs(points.friction) / peak - law) ** 2))
+    return (
+        Row(
+            "friction / limit of friction",
+            abs(shear) / (COEFFICIENT * pressing),
+            about(0.4, 0.1),
+            2,
+            "strain",
+        ),
+        Row(
+            "width that sticks / that of Mindlin",
+            region.sticking / 2 / sticking,
+            about(1, FINEST / sticking),
+            2,
+            "strain",
+        ),
+        Row("friction less Mindlin's / μ peak pressure, rms", float(away), at_most(0.06), 2, "strain"),
+    )
+
+
+def shifted(problem: Problem) -> ContactRegion:
+    """The contact after the load of a problem and a shift along the block."""
+    path: LoadPath = FemNonlinearSolver().path(problem, LagrangeSpace(problem.mesh, 2))
+    path.follow(silent)
+    contact = path.equilibrium.contact
+    assert contact is not None
+    assert path.points[-1].fraction == 1
+    path.equilibrium.contact = replace(
+        contact,
+        centre=contact.centre + contact.travel,
+        travel=np.array([SHIFT, 0.0]),
+        coefficient=COEFFICIENT,
+    )
+    path.points = [replace(path.points[-1], fraction=fraction) for fraction in (-1.0, 0.0)]
+    path.follow(silent)
+    region = path.region(path.points[-1])
+    path.close()
+    assert region is not None
+    assert path.points[-1].fraction == 1
+    return region
+
+
+def ellipse(x: FloatArray) -> FloatArray:
+    """√(1 - x²), zero beyond 1."""
+    return np.sqrt(np.maximum(1 - x**2, 0.0))
+
+
+FRICTION = Case(
+    name="cylinder with friction",
+    answer="closed forms for small strain",
+    source="K. L. Johnson, Contact Mechanics, Cambridge University Press, 1985, section 7.2",
+    text="""
+`fem-nonlinear` with friction, μ = 0.3. *A layer* of 40 mm by 1 mm, ν = 0, clamped below, under a cylinder of
+radius 500 mm, flat beside the layer, that travels by 0.02 mm in a direction between straight down and along
+the layer. Each part of a thin layer is sheared and pressed on its own: at 20° friction is G tan 20° / 2 G =
+0.18 of the pressure, below μ, and the layer sticks; at 60° it would be 0.87, and the layer slips: friction is
+μ times the pressure, to rounding. Means over the middle 8 mm; the closed form leaves out the strain of 2 %.
+
+*Partial slip*: the cylinder and the block of the case above, ν = 0.49, so that pressing does not move the
+surface along itself, are pressed without friction and then shifted by 0.007 mm with it. Cattaneo and Mindlin:
+for a force Q along the surface the middle sticks over c = a √(1 - Q / μ P), and friction is μ times the
+pressure of the cylinder less that of one which touches over c. Tolerances: an element for the width, and the
+pressure's own 5 % at the nodes, which is the scatter of friction where it slips.
+""",
+    measure=friction,
+)
