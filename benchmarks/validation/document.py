@@ -1,7 +1,6 @@
-"""A real soft beam: COMSOL's figures repeated, Young's modulus from one film, the others predicted.
+"""Printed fingers, and a soft beam: COMSOL's figures, Young's modulus from one film, the others predicted.
 
-Writes docs/validation.md, whose words are in `page.md`, and docs/pictures/soft-beam.png; four minutes on a
-free core.
+Writes docs/validation.md, whose words are in `page.md`, and its pictures; seven minutes on a free core.
 """
 
 import logging
@@ -14,6 +13,7 @@ from rich.table import Table
 
 from benchmarks.tables import DOCS, markdown
 from benchmarks.validation import comsol
+from benchmarks.validation.fingers import of_fingers
 from benchmarks.validation.half_beam import CELLS, HalfBeam
 from benchmarks.validation.markers import (
     FEET,
@@ -55,7 +55,12 @@ def main() -> Table:
     words = Template(Path(__file__).with_name("page.md").read_text(encoding="utf-8"))
     values = of_comsol() | of_frames(runs, fitted) | of_predictions(outcome) | of_choices(runs, fitted)
     loads = {case: f"{load:.2f}" for case, load in LOADS.items()}
-    write_text(PAGE, reflowed(words.substitute(loads, predictions=markdown(HEADER, rows), **values)))
+    printed, pictures = of_fingers()
+    for name, each in pictures.items():
+        each.save(PICTURE.with_name(f"printed-{name}.png"))
+    write_text(
+        PAGE, reflowed(words.substitute(loads | printed, predictions=markdown(HEADER, rows), **values))
+    )
     side_view(outcome).save(PICTURE)
     title = f"Soft beam: E = {1000 * outcome.modulus:.0f} kPa from gravity alone"
     return terminal_table(title, HEADER, rows, left=["case"])

@@ -6,6 +6,7 @@ from compare.runtime.provenance import program_version
 from pinnray.commands.camera.calibrate import calibrate
 from pinnray.commands.camera.fiducials import fiducials
 from pinnray.commands.camera.pick import pick
+from pinnray.commands.camera.points import points
 from pinnray.commands.camera.rig import rig
 from pinnray.commands.camera.track import track
 from pinnray.commands.comparison.compare import compare
@@ -34,7 +35,7 @@ pinnray = App(
 COMMANDS = (
     *(compare, report, design, mesh, solve, sweep, predict, optimise),
     *(gridsearch, crossval, solvers),
-    *(fiducials, calibrate, pick, rig, track),
+    *(fiducials, calibrate, pick, points, rig, track),
 )
 for command in COMMANDS:
     config = take_options if command is compare else None

@@ -4,11 +4,13 @@ import re
 
 import numpy as np
 import pytest
+import shapely
 from scipy.spatial.transform import Rotation
 
 from benchmarks.tables import DOCS
-from benchmarks.validation import comsol
+from benchmarks.validation import comsol, printed_finger
 from benchmarks.validation.document import PAGE
+from benchmarks.validation.fingers import Experiment
 from benchmarks.validation.half_beam import HEIGHT, POISSON, WIDTH, Deformation, HalfBeam, loaded_nodes
 from benchmarks.validation.markers import (
     FEET,
@@ -23,6 +25,7 @@ from benchmarks.validation.markers import (
     read_runs,
     rigid_fit,
 )
+from benchmarks.validation.printed_finger import FINGERS
 from benchmarks.validation.study import all_cases, length, predict
 from geometry.errors import UserError
 
@@ -135,3 +138,32 @@ def test_the_summary_says_what_the_table_has():
     assert [round(error, 1) for error in errors] == [float(value) for value in said[:2]]
     assert percent == [float(value) for value in said[2:]]
     assert (DOCS / "pictures" / "soft-beam.png").is_file()
+
+
+@pytest.mark.parametrize("finger", FINGERS, ids=["A", "B"])
+def test_drawings_of_the_printed_fingers_are_what_the_code_draws(finger, tmp_path, monkeypatch):
+    kept = [finger.drawing.with_suffix(suffix).read_text(encoding="utf-8") for suffix in (".svg", ".toml")]
+    monkeypatch.setattr(printed_finger, "FOLDER", tmp_path)
+    finger.draw()
+    made = [finger.drawing.with_suffix(suffix).read_text(encoding="utf-8") for suffix in (".svg", ".toml")]
+    assert made == kept
+
+    def inside(x, y):
+        return shapely.contains_xy(finger.body, x, y)
+
+    for angle in np.radians([15.0, 0.0, -15.0]):  # half way between the walls, and beside the rib
+        x, slope = 35 + 50 * np.tan(angle), np.tan(angle)
+        assert inside(x + 4 * slope, -5.0) == bool(finger.ribs)
+        assert not inside(x + 4 * slope + 1.7, -5.0)
+        assert not inside(x + 4 * slope - 1.7, -5.0)
+    assert inside(30.0, -1.9)
+    assert not inside(30.0, -2.1)
+    assert inside(0.1, -35.9)  # the back wall's foot
+
+
+def test_clicks_on_the_printed_fingers_lie_where_they_were_marked():
+    """Walls are marked every 10 mm; the rest of the misfit is of print and clicks."""
+    for finger in FINGERS:
+        steps = np.linalg.norm(np.diff(finger.markers, axis=0), axis=1)
+        assert steps == pytest.approx(10.0)
+        assert Experiment(finger).seen.standard_deviations.max() < 0.7

@@ -1,0 +1,123 @@
+"""Points clicked in two photographs: scale, mirror image, order and noise are found, bad lists refused."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.registration import HAND_HELD
+from vision.clicked_points import Clicks, clicked_points, read_clicks
+
+MARKERS = np.array(
+    [[10.0, -1], [20, -1], [30, -1], [40, -1], [50, -1], [45, -8], [35, -14], [25, -20], [12, -29]]
+)
+MOVED = np.column_stack([-0.02 * MARKERS[:, 0], -0.1 * MARKERS[:, 0]])
+
+
+def picture(places, scale, *, turn=25.0, order=slice(None), flip=True):
+    """Clicks on places, mm, in pixels with y down."""
+    angle = np.radians(turn)
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    pixels = (places @ rotation.T / scale + [800, 300]) * [1, -1 if flip else 1]
+    return Clicks(pixels[order], None, 0.0)
+
+
+def found(rest, pressed, **settings):
+    return clicked_points(rest, pressed, MARKERS, marker_radius=0.5, source="clicks", **settings)
+
+
+@pytest.mark.parametrize("flip", [True, False])
+def test_pictures_of_one_camera_give_the_displacements(flip):
+    result = found(picture(MARKERS, 0.2, flip=flip), picture(MARKERS + MOVED, 0.2, flip=flip))
+    assert result.mirrored == flip
+    assert result.scales == pytest.approx((0.2, 0.2))
+    np.testing.assert_allclose(result.observations.displacements, MOVED, atol=1e-9)
+    assert result.observations.pressed == HAND_HELD
+    assert not result.observations.simulated
+
+
+def test_each_picture_has_the_scale_of_the_lengths_along_the_walls():
+    turned = MARKERS @ np.array([[0.99, 0.14], [-0.14, 0.99]]) / np.hypot(0.99, 0.14)
+    result = found(picture(MARKERS, 0.2), picture(turned, 0.25), scale="lengths")
+    assert result.scales == pytest.approx((0.2, 0.25))
+    shift = result.observations.displacements - (turned - MARKERS)
+    np.testing.assert_allclose(shift, np.broadcast_to(shift[0], shift.shape), atol=1e-9)  # of the origin
+
+
+def test_given_scales_are_taken():
+    result = found(picture(MARKERS, 0.2), picture(MARKERS + MOVED, 0.25), scale=(0.2, 0.25))
+    shift = result.observations.displacements - MOVED
+    np.testing.assert_allclose(shift, np.broadcast_to(shift[0], shift.shape), atol=1e-9)  # of the origin
+
+
+def test_points_in_another_order_get_the_nearest_markers():
+    order = np.random.default_rng(3).permutation(len(MARKERS))
+    result = found(picture(MARKERS, 0.2, order=order), picture(MARKERS + MOVED, 0.2, order=order))
+    np.testing.assert_allclose(result.observations.displacements, MOVED, atol=1e-9)
+
+
+def test_noise_is_the_misfit_at_rest():
+    rng = np.random.default_rng(5)
+    noises = []
+    for _ in range(40):
+        rest, pressed = (
+            picture(each + rng.normal(0, 0.3, MARKERS.shape), 0.2) for each in (MARKERS, MARKERS)
+        )
+        result = found(rest, pressed)
+        noises.append(result.noise)
+        assert result.observations.standard_deviations == pytest.approx(np.sqrt(2) * result.noise)
+    # The standard deviation of 0.3 from 14 degrees of freedom, a mean of 40: 0.009.
+    assert np.sqrt(np.mean(np.square(noises))) == pytest.approx(0.3, abs=0.03)
+
+
+def test_noise_of_repeats_and_of_a_lattice(tmp_path):
+    rng = np.random.default_rng(6)
+    places = picture(MARKERS, 0.2).places
+    lines = ["# ImageJ", "x,y,point"]
+    for repeat in range(4):
+        del repeat
+        for number, place in enumerate(places + rng.normal(0, 1.5, places.shape)):
+            lines.append(f"{place[0]},{place[1]},{number}")
+    path = tmp_path / "rest.csv"
+    path.write_text("\n".join(lines))
+    clicks = read_clicks(path)
+    assert len(clicks.places) == len(MARKERS)
+    assert clicks.noise == pytest.approx(1.5 / 2, rel=0.25)  # a mean of four
+    assert found(clicks, clicks).reason == "the repeats"
+    coarse = Clicks(places, None, 5.0)
+    result = found(coarse, coarse)
+    assert result.noise == pytest.approx(1.0 / np.sqrt(12))
+    assert "lattice of 1 mm" in result.reason
+    path.write_text("x,y\n0,0.5\n1.5,2\n3,0\n")
+    assert read_clicks(path).lattice == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("u,v\n1,2\n", "the header must name the columns x and y, and may name point; it has 'u', 'v'"),
+        ("", "it is empty"),
+        ("x,y\n1,2\n3,4\n", "has 2 points; give at least 3"),
+        ("x,y\n1,2\n3,four\n5,6\n", "line 3: '3,four' has no number"),
+        ("# a\nx,y\n1,2\n3\n5,6\n", "line 4: '3' has no number"),
+        ("x,y\n1,2\n3,nan\n5,6\n", "line 3: '3,nan' has a number that is not finite"),
+    ],
+)
+def test_a_bad_list_is_one_line(tmp_path, text, said):
+    path = tmp_path / "rest.csv"
+    path.write_text(text)
+    with pytest.raises(UserError, match=said):
+        read_clicks(path)
+
+
+def test_points_of_another_finger_are_refused():
+    other = np.random.default_rng(1).uniform(0, 50, MARKERS.shape)
+    with pytest.raises(UserError, match="do not lie as the markers do: at best"):
+        found(picture(other, 0.2), picture(other, 0.2))
+    with pytest.raises(UserError, match="8 points at rest, 9 pressed, 9 markers on the drawing"):
+        found(picture(MARKERS[1:], 0.2), picture(MARKERS, 0.2))
+
+
+def test_points_on_one_line_do_not_tell_the_mirror_image():
+    line = np.column_stack([np.arange(10.0, 60, 10), np.full(5, -1.0)])
+    with pytest.raises(UserError, match="their mirror image fit the drawing alike"):
+        clicked_points(picture(line, 0.2), picture(line, 0.2), line, marker_radius=0.5, source="clicks")
