@@ -139,8 +139,8 @@ def compare(
         solvers: Solvers or their names; those of the complete table that support the problem if None.
         measurements: Marker displacements: a data frame or CSV file (x_mm, y_mm, u_mm, v_mm), or a video to
             track without a camera file; simulated by a finite-strain run if None.
-        truth: What is simulated then: "sliding", "stvk", "gent", "cylinder", "oblique", "friction", "3d" or
-            "sticking".
+        truth: What is simulated then: "sliding", "stvk", "gent", "cylinder", "oblique", "friction",
+            "rubbing", "3d" or "sticking".
         size: Largest element in walls and ribs, mm.
         adapt: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
         material: The elastic constants; each solver takes the law that it has.

@@ -39,7 +39,8 @@ class Truth:
         poisson: Poisson's ratio; that of the material if None.
         scaled: Factors of wall thicknesses, by their names in `Design`.
         thicker: Additions to wall thicknesses, mm, by their names in `Design`.
-        radius: Radius of a rigid cylinder without friction, mm; a patch of the contact's width if None.
+        radius: Radius of a rigid cylinder, mm; a patch of the contact's width if None.
+        friction: Coefficient of friction of the cylinder.
         slope: Displacement of the indenter along the front over the stroke; None lets a patch slide.
         solid: Whether the finger has its depth, with side faces free of traction, of which one is seen; else
             it is in plane strain.
@@ -52,6 +53,7 @@ class Truth:
     scaled: Mapping[str, float] = field(default_factory=dict)
     thicker: Mapping[str, float] = field(default_factory=dict)
     radius: float | None = None
+    friction: float = 0.0
     slope: float | None = None
     solid: bool = False
 
@@ -122,7 +124,8 @@ class Truth:
         along = None if self.slope is None else self.slope * stroke
         if self.radius is None:
             return Load(kind="patch", displacement=(along, -stroke))
-        return Load(kind="cylinder", displacement=(along, -stroke), radius=self.radius)
+        moved = (along, -stroke)
+        return Load(kind="cylinder", displacement=moved, radius=self.radius, friction=self.friction)
 
 
 _PRINTED = {"front_thickness": 1.05, "back_thickness": 0.95, "rib_thickness": 1.05}
@@ -131,6 +134,7 @@ _THICK_BASE = {"base_thickness": 1.0}
 _PATCH = "contact patch that is pressed in by {:.4g} mm"
 _SLIDES = f"{_PATCH} and slides along x"
 _CYLINDER = "rigid cylinder of radius {} mm without friction that is pressed in by {{:.4g}} mm"
+_ROUGH = _CYLINDER.format(10).replace("without friction", "with friction 0.5")
 _WALLS = "front wall and ribs printed 5 % thicker"
 _BASE = f"{_WALLS}, back wall 5 % thinner and base wall 1 mm thicker than drawn"
 
@@ -168,6 +172,13 @@ _TRUTHS = (
         "friction",
         f"neo-Hookean, {_PATCH} and that friction holds half way between sliding and sticking",
         slope=-0.07,
+    ),
+    Truth(
+        "rubbing",
+        f"neo-Hookean, {_ROUGH}",
+        radius=10.0,
+        friction=0.5,
+        slope=0.0,
     ),
     Truth(
         "3d",

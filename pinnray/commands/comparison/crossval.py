@@ -52,7 +52,7 @@ def crossval(
             three variants (linear law).
         schemes: Hold-out schemes, separated by commas.
         truth: Truths, separated by commas, or all: sliding, stvk, gent, print, base, cylinder, oblique,
-            mixed, friction, 3d, sticking.
+            mixed, friction, rubbing, 3d, sticking.
         layouts: Marker layouts at which the same truth is sampled, separated by commas; default: the
             design's own.
         seeds: Number of noise draws.

@@ -52,7 +52,7 @@ def test_walls_are_redrawn_around_the_axes_of_the_ribs():
 
 def test_laws_and_loads_are_those_of_the_names():
     problems = {
-        name: (truth.material(Material()), truth.load(10.0).model_dump(exclude_none=True))
+        name: (truth.material(Material()), truth.load(10.0).model_dump(exclude_defaults=True))
         for name, truth in TRUTHS.items()
     }
     laws = {name: (material.law, material.poisson) for name, (material, _) in problems.items()}
@@ -61,17 +61,18 @@ def test_laws_and_loads_are_those_of_the_names():
         "gent": ("gent", 0.45),
         "mixed": ("st-venant-kirchhoff", 0.42),
     }
-    named = ("sliding", "print", "base", "cylinder", "oblique", "friction", "3d", "sticking")
+    named = ("sliding", "print", "base", "cylinder", "oblique", "friction", "rubbing", "3d", "sticking")
     assert laws.items() >= (dict.fromkeys(named, ("neo-hookean", 0.45)) | expected).items()
     sliding = {"kind": "patch", "displacement": (None, -10.0)}
-    cylinder = {"kind": "cylinder", "displacement": (0.0, -10.0), "radius": 10.0}
+    cylinder = {"kind": "cylinder", "radius": 10.0}
     loads = {
         **dict.fromkeys(("sliding", "stvk", "gent", "print", "base", "3d"), sliding),
         "cylinder": cylinder,
         "oblique": {"kind": "cylinder", "displacement": (3.0, -10.0), "radius": 20.0},
         "mixed": cylinder,
         "friction": {"kind": "patch", "displacement": (pytest.approx(-0.7), -10.0)},
-        "sticking": {"kind": "patch", "displacement": (0.0, -10.0)},
+        "rubbing": {**cylinder, "friction": 0.5},
+        "sticking": {"kind": "patch"},
     }
     assert {name: problems[name][1] for name in loads} == loads
 
@@ -85,7 +86,7 @@ def test_the_source_names_law_and_load(mesh):
 
 def test_a_drawing_has_the_truths_that_keep_its_walls():
     drawn = beam()
-    possible = "sliding, stvk, gent, cylinder, oblique, friction, 3d, "
+    possible = "sliding, stvk, gent, cylinder, oblique, friction, rubbing, 3d, "
     with pytest.raises(UserError, match=f"it can have {possible}"):
         TRUTHS["print"].finger(drawn)
     assert TRUTHS["oblique"].finger(drawn) is drawn
