@@ -83,7 +83,8 @@ def test_a_solver_of_ours_has_its_family_and_its_twin_assimilates_too(name):
     kinds = {"fem": "finite elements", "pinn": "neural network"}
     assert traits.family == kinds.get(name.partition("-")[0], "statistics")
     if traits.twin:
-        assert Traits.of(make_solver(traits.twin)) == Traits(True, "finite elements")
+        twin = Traits.of(make_solver(traits.twin))
+        assert (twin.assimilates, twin.family, twin.twin) == (True, "finite elements", None)
 
 
 def test_a_missing_library_is_said_and_the_other_solvers_work(monkeypatch):
