@@ -34,6 +34,7 @@ class Clicks:
     places: FloatArray  # Mean of the clicks at every point, shape (m, 2), pixels or any other unit
     noise: float | None  # Standard deviation of such a mean from repeats, a coordinate; None without repeats
     lattice: float  # Step of the lattice on which all coordinates lie; 0 if there is none
+    numbers: tuple[float, ...] = ()  # Of the points, ascending; empty where none were given
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,8 @@ class ClickedPoints:
 def read_clicks(path: Path) -> Clicks:
     """Clicks from a CSV file with columns x and y, a row a click.
 
-    With a column `point`, clicks of one number are repeats. A `UserError` names what cannot be read.
+    With a column `point`, clicks of one number are repeats, and points are in the order of their numbers. A
+    `UserError` names what cannot be read.
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -82,7 +84,9 @@ def read_clicks(path: Path) -> Clicks:
     clicks = table[:, :2]
     if table.shape[1] == 2:
         return Clicks(clicks, None, _lattice(clicks))
-    _, first, group = np.unique(table[:, 2], return_index=True, return_inverse=True)
+    numbers, group = np.unique(table[:, 2], return_inverse=True)
+    if len(numbers) < FEWEST:
+        raise UserError(f"{path} has {len(numbers)} points; give at least {FEWEST}")
     counts = np.bincount(group)
     means = np.column_stack([np.bincount(group, weights=clicks[:, axis]) / counts for axis in (0, 1)])
     freedom = len(clicks) - len(counts)
@@ -90,7 +94,7 @@ def read_clicks(path: Path) -> Clicks:
     if freedom:
         squares = float(((clicks - means[group]) ** 2).sum()) / (2 * freedom)
         noise = float(np.sqrt(squares * (1 / counts).mean()))
-    return Clicks(means[np.argsort(first)], noise, _lattice(clicks))
+    return Clicks(means, noise, _lattice(clicks), tuple(numbers.tolist()))
 
 
 def clicked_points(
@@ -109,7 +113,7 @@ def clicked_points(
 
     Args:
         rest: At rest.
-        pressed: Pressed, in the same order.
+        pressed: Pressed, in the same order; numbered points have the same numbers in both.
         markers: On the drawing.
         marker_radius: Of the markers, mm.
         scale: Millimetres per unit of both pictures; or "same": both have that which brings the picture at
@@ -118,8 +122,13 @@ def clicked_points(
         source: A sentence for the observations.
 
     Raises:
-        UserError: If the numbers of points differ, or the points at rest do not lie as on the drawing.
+        UserError: If the points of both are not the same, or those at rest do not lie as on the drawing.
     """
+    if rest.numbers != pressed.numbers:
+        alone = sorted({*rest.numbers} ^ {*pressed.numbers})
+        raise UserError(
+            f"a point is numbered in one picture only: {', '.join(f'{each:g}' for each in alone)}"
+        )
     counts = len(rest.places), len(pressed.places), len(markers)
     if len(set(counts)) > 1:
         raise UserError(

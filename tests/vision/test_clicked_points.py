@@ -91,6 +91,20 @@ def test_noise_of_repeats_and_of_a_lattice(tmp_path):
     assert read_clicks(path).lattice == pytest.approx(0.5)
 
 
+def test_numbered_points_are_those_of_their_number(tmp_path):
+    """Clicked in another order in the second picture."""
+    lists = []
+    for places, order in ((MARKERS, range(9)), (MARKERS + MOVED, [4, 2, 8, 0, 1, 3, 7, 6, 5])):
+        pixels = picture(places, 0.2).places
+        rows = [f"{pixels[number, 0]},{pixels[number, 1]},{number}" for number in order]
+        path = tmp_path / "clicks.csv"
+        path.write_text("\n".join(["x,y,point", *rows]))
+        lists.append(read_clicks(path))
+    np.testing.assert_allclose(found(*lists).observations.displacements, MOVED, atol=1e-9)
+    with pytest.raises(UserError, match="numbered in one picture only: 0, 1, 2"):
+        found(lists[0], picture(MARKERS, 0.2))
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -1,8 +1,10 @@
 """Displacements from points that were clicked in two photographs."""
 
 from pathlib import Path
+from typing import cast, get_args
 
 from geometry.errors import UserError
+from pinnray.commands.camera.pick import read_numbers
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
@@ -31,26 +33,26 @@ def points(
             millimetres per unit of both pictures, such as 0.21,0.22.
         out: Output file.
     """
-    from vision.clicked_points import clicked_points, read_clicks
+    from vision.clicked_points import Scale, clicked_points, read_clicks
     from vision.measurements import write_measurements
 
     design, _ = finger.read()
     if out.suffix.lower() != ".csv":
         raise UserError(f"--out {out}: give the name of a table, such as observations.csv")
-    if scale not in ("same", "lengths"):
-        try:
-            given = tuple(float(part) for part in scale.split(","))
-        except ValueError:
-            given = ()
-        if len(given) not in (1, 2) or not all(0 < each < 1e6 for each in given):
+    chosen: Scale | tuple[float, float]
+    if scale in get_args(Scale):
+        chosen = cast(Scale, scale)
+    else:
+        given = read_numbers("--scale", scale, counts=(1, 2))
+        if not all(0 < each < 1e6 for each in given):
             raise UserError(f"--scale {scale}: give same, lengths, or millimetres per unit such as 0.21,0.22")
-        known = given[0], given[-1]
+        chosen = given[0], given[-1]
     found = clicked_points(
         read_clicks(rest),
         read_clicks(pressed),
         design.markers,
         marker_radius=design.marker_radius,
-        scale=known if scale not in ("same", "lengths") else scale,  # type: ignore[arg-type]
+        scale=chosen,
         source=f"points clicked in two photographs, {rest.name} and {pressed.name}",
     )
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -61,6 +63,6 @@ def points(
         print("the points are in another order than the markers: each was given the nearest one")
     print(f"{found.misfit:.2g} mm from the drawing at rest (rms of a coordinate)")
     print(f"a clicked coordinate is known to {found.noise:.2g} mm, by {found.reason}")
-    print("the turn of the pressed picture counts as unknown: 5 degrees, 1 mm, 2 %")
+    print(f"how the pressed picture lies is not known: {found.observations.pressed}")
     print(out)
     return 0
