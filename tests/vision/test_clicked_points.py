@@ -39,6 +39,11 @@ def test_each_picture_has_the_scale_of_the_lengths_along_the_walls():
     turned = MARKERS @ np.array([[0.99, 0.14], [-0.14, 0.99]]) / np.hypot(0.99, 0.14)
     result = found(picture(MARKERS, 0.2), picture(turned, 0.25), scale="lengths")
     assert result.scales == pytest.approx((0.2, 0.25))
+    order = np.array([3, 0, 1, 2, 4, 5, 6, 8, 7])  # lines are between clicks, not between markers
+    bent = MARKERS + np.outer(np.arange(9) > 4, [0.0, 3.0])
+    rest, pressed = picture(MARKERS, 0.2, order=order), picture(bent, 0.25, order=order)
+    own, moved = (np.linalg.norm(np.diff(each[order], axis=0), axis=1).sum() for each in (MARKERS, bent))
+    assert found(rest, pressed, scale="lengths").scales == pytest.approx((0.2, 0.25 * own / moved))
     shift = result.observations.displacements - (turned - MARKERS)
     np.testing.assert_allclose(shift, np.broadcast_to(shift[0], shift.shape), atol=1e-9)  # of the origin
 

@@ -189,6 +189,23 @@ def test_the_tangent_of_friction_is_the_derivative_of_its_gradient(coarse_mesh, 
         np.testing.assert_allclose(slopes, tangent[:, :, axis], atol=1e-4)
 
 
+def test_slip_counts_from_the_last_equilibrium(coarse_mesh):
+    """A step that begins at an equilibrium has its frictions, however far that one slipped."""
+    problem = Problem(
+        coarse_mesh, Material(law="neo-hookean"), Load(kind="cylinder", radius=5.0, friction=0.5)
+    )
+    space = LagrangeSpace(coarse_mesh, 2)
+    contact = CylinderContact.of(problem, space)
+    rest = ContactState(0.0, np.zeros(space.nodes.shape), np.full(len(contact.nodes), 0.3))
+    first = contact.started(rest)
+    forces = np.linspace(-0.1, 0.1, len(contact.nodes))[:, None]
+    stuck = replace(first, forces=forces, sticks=np.ones(len(contact.nodes), dtype=bool))
+    slipped = replace(rest, nodal=rest.nodal + [0.5, 0.0], friction=stuck)
+    assert np.abs(contact.frictions(slipped) - forces).max() > 1
+    begun = replace(slipped, friction=contact.started(slipped))
+    np.testing.assert_allclose(contact.frictions(begun), forces, atol=1e-12)
+
+
 def test_solid_in_plane_strain_rubs_as_the_plane_does(coarse_mesh):
     load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -3.0), friction=0.5)
     problem = Problem(coarse_mesh, Material(law="neo-hookean"), load)
