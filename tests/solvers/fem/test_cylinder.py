@@ -200,7 +200,7 @@ def test_slip_counts_from_the_last_equilibrium(coarse_mesh):
     first = contact.started(rest)
     forces = np.linspace(-0.1, 0.1, len(contact.nodes))[:, None]
     stuck = replace(first, forces=forces, sticks=np.ones(len(contact.nodes), dtype=bool))
-    slipped = replace(rest, nodal=rest.nodal + [0.5, 0.0], friction=stuck)
+    slipped = replace(rest, nodal=np.add(rest.nodal, [0.5, 0.0]), friction=stuck)
     assert np.abs(contact.frictions(slipped) - forces).max() > 1
     begun = replace(slipped, friction=contact.started(slipped))
     np.testing.assert_allclose(contact.frictions(begun), forces, atol=1e-12)
