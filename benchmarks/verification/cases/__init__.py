@@ -2,6 +2,7 @@
 
 from benchmarks.verification.cases.another_program import ANOTHER_PROGRAM
 from benchmarks.verification.cases.calculix import CALCULIX
+from benchmarks.verification.cases.calculix_contact import CALCULIX_CONTACT
 from benchmarks.verification.cases.cantilever import CANTILEVER
 from benchmarks.verification.cases.cook import COOK
 from benchmarks.verification.cases.finite_strain import FINITE_STRAIN
@@ -25,5 +26,6 @@ CASES = (
     CALCULIX,
     HERTZ,
     FRICTION,
+    CALCULIX_CONTACT,
     SOLID,
 )

@@ -22,7 +22,7 @@ from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 
 PROGRAM = "ccx"
-SECONDS = 300.0
+SECONDS = 900.0
 """Time after which a run of `ccx` is given up."""
 
 BOUNDS = {"linear": (2e-6, 2e-6), "st-venant-kirchhoff": (5e-5, 5e-4)}
@@ -84,17 +84,21 @@ def solve(problem: Problem, space: LagrangeSpace | ExtrudedSpace) -> Answer:
     Raises:
         UserError: If `ccx` does not finish.
     """
+    return solved(deck(problem, space), len(space.nodes), space.nodes.shape[1])
+
+
+def solved(lines: str, nodes: int, dimension: int) -> Answer:
+    """What `ccx` prints last for an input of so many nodes; a `UserError` if it does not finish."""
     with TemporaryDirectory() as folder:
-        (Path(folder) / "job.inp").write_text(deck(problem, space), encoding="ascii")
+        (Path(folder) / "job.inp").write_text(lines, encoding="ascii")
         run = subprocess.run(
             [PROGRAM, "-i", "job"], cwd=folder, capture_output=True, text=True, timeout=SECONDS, check=False
         )
         output = Path(folder) / "job.dat"
         printed = output.read_text(encoding="ascii") if output.is_file() else ""
     values = table(printed, "displacements")
-    if run.returncode or "*ERROR" in run.stdout or len(values) != len(space.nodes):
+    if run.returncode or "*ERROR" in run.stdout or len(values) != nodes:
         raise UserError(f"ccx has not solved the problem; its last words: {run.stdout.strip()[-200:]}")
-    dimension = space.nodes.shape[1]
     return Answer(values[:, 1 : dimension + 1], table(printed, "total force")[0, :dimension])
 
 
