@@ -311,11 +311,9 @@ def _observations(
         raise UserError(
             f"measurements that are a {type(given).__name__}; give a data frame, Observations, or a file"
         )
-    flags = "visible" in given and given["visible"].dtype == bool
-    frame = given.assign(visible=given["visible"].astype(int)) if flags else given
     with TemporaryDirectory() as folder:
         path = Path(folder) / "measurements.csv"
-        frame.to_csv(path, index=False)
+        given.to_csv(path, index=False)
         try:
             read = read_measurements(path, marker_radius=design.marker_radius)
         except UserError as error:

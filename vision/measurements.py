@@ -2,7 +2,8 @@
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from math import hypot
 from pathlib import Path
 
@@ -13,11 +14,18 @@ from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from geometry.observations import Observations
 from geometry.registration import FIXED, HAND_HELD, Registration
+from vision.foreign_tables import foreign_table
 
 POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")
 REQUIRED = (*POSITION, *DISPLACEMENT)
 OPTIONAL = {"std_u_mm": 0.0, "std_v_mm": 0.0, "visible": 1.0}
+WORDS = {"true": "1", "false": "0", "yes": "1", "no": "0"}
+"""Other ways to write `visible`, in lower case."""
+EMPTY = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+"""Texts of a number that is not there, in lower case: as of pandas, R and spreadsheets."""
+MOST_TITLES = 12
+"""Titles of a refused header that a message names."""
 CLICKED = 0.05
 """Median standard deviation, mm, from which points were set by hand: fixed cameras do better."""
 SMALLEST_DISTANCE = 1e-3
@@ -61,12 +69,15 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     """Read observations of markers whose discs have a radius, mm: `Design.marker_radius`.
 
     The columns `x_mm, y_mm` (initial position in the finger's frame) and `u_mm, v_mm` (displacement, final
-    minus initial) are needed; `std_u_mm, std_v_mm` (standard deviations) and `visible` (1 or 0) may be left
-    out. Only the position is read of a marker that is not visible. Comment lines start with `#`;
-    `# source: TEXT` names the origin of the numbers, `# simulated` means that no camera was involved;
-    `# pressed picture: TEXT` says how well the pressed picture's frame is known in that at rest, and
-    `# picture at rest: TEXT` how well that one's is in the drawing, in words of `Registration.parse`. Where
-    nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose points were `CLICKED`.
+    minus initial) are needed; `std_u_mm, std_v_mm` (standard deviations) and `visible` (1 or 0, or one of
+    `WORDS`) may be left out. Only the position is read of a marker that is not visible; one whose u and v are
+    both `EMPTY` is not, unless `visible` says that it is.
+
+    Comment lines start with `#`. `# source: TEXT` names the origin of the numbers, `# simulated` means that
+    no camera was involved. `# pressed picture: TEXT` says how well the pressed picture's frame is known in
+    that at rest, and `# picture at rest: TEXT` how well that one's is in the drawing, in words of
+    `Registration.parse`. Where nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose
+    points were `CLICKED`.
 
     Raises:
         UserError: If the file cannot be read, a column is missing, a value is no number
@@ -76,9 +87,11 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     header = table[0][1] if table else []
     for name in REQUIRED:
         if name not in header:
+            if other := foreign_table([cells for _, cells in table]):
+                raise UserError(f"{path} has no column {name}; {other}")
             raise UserError(
                 f"{path} has no column {name}; the header must name {', '.join(REQUIRED)} "
-                f"and may name {', '.join(OPTIONAL)}, with commas between"
+                f"and may name {', '.join(OPTIONAL)}, with commas between; it {_titles(header)}"
             )
     for name in (*REQUIRED, *OPTIONAL):
         if header.count(name) > 1:
@@ -139,46 +152,98 @@ def _said(comments: Sequence[str], mark: str) -> list[str]:
     return [found[1] for each in comments if (found := re.match(rf"#\s*{words}\s*(.*)", each, re.I))]
 
 
+def _titles(header: Sequence[str]) -> str:
+    """A clause on the titles that a header has."""
+    if not header:
+        return "is empty"
+    named = ", ".join(repr(title[:30]) for title in header[:MOST_TITLES])
+    return f"names {named}" + (f" and {rest} more" if (rest := len(header) - MOST_TITLES) > 0 else "")
+
+
 def _lines(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The comments, and the cells of the other lines with their line numbers.
+    """The comments, and the cells of the other rows with the numbers of their first lines.
 
     A spreadsheet program that saves the file puts a byte-order mark before the first line, quotes comments
-    with a comma, and appends commas to them: the mark "simulated" must survive that.
+    with a comma, and appends commas to them: the mark "simulated" must survive that. Within quotation marks a
+    row goes on in the next line.
     """
     comments: list[str] = []
     table: list[tuple[int, list[str]]] = []
     try:
-        for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), start=1):
-            cells = [cell.strip() for cell in next(csv.reader([line]), [])]
-            if cells and cells[0].startswith("#"):
-                comments.append((cells[0] if line.lstrip().startswith('"') else line).strip(" \t,;"))
-            elif any(cells):
-                table.append((number, cells))
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            numbered = enumerate(file, start=1)
+            for number, line in numbered:
+                if line.lstrip().startswith("#"):
+                    comments.append(line.strip(" \t\r\n,;"))
+                    continue
+                cells = _row(line, (more for _, more in numbered), f"{path}, line {number}")
+                if cells and cells[0].startswith("#"):
+                    comments.append(" ".join(cells[0].split()).strip(" ,;"))
+                elif any(cells):
+                    table.append((number, cells))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not a CSV file in UTF-8"
         raise UserError(f"cannot read the measurements {path}: {reason}") from None
     return comments, table
 
 
+def _row(line: str, following: Iterator[str], where: str) -> list[str]:
+    """Cells of a row that begins with `line` and takes as many of the following lines as its quotes ask for.
+
+    Raises:
+        UserError: If a quotation mark is not closed: the rest of the file would be one cell.
+    """
+    lines = 0
+    quotes = 0
+
+    def taken() -> Iterator[str]:
+        nonlocal lines, quotes
+        for each in chain([line], following):
+            lines, quotes = lines + 1, quotes + each.count('"')
+            yield each
+
+    cells = next(csv.reader(taken()), [])
+    if lines > 1 and quotes % 2:
+        raise UserError(f"{where}: a quotation mark is opened and not closed")
+    return [cell.strip() for cell in cells]
+
+
 def _marker(cells: Mapping[str, str], where: str) -> dict[str, float]:
     """The numbers of one row; zeros instead of the displacement of a marker that was not seen."""
-    visible = _number(cells, "visible", where)
-    if visible not in (0, 1):
-        raise UserError(f"{where}: visible is {cells['visible']!r}; it must be 1 (seen) or 0 (not seen)")
-    values = {"visible": visible} | dict.fromkeys((*DISPLACEMENT, "std_u_mm", "std_v_mm"), 0.0)
+    said = cells.get("visible")
+    if said is None:
+        visible = float(any(cells[name].lower() not in EMPTY for name in DISPLACEMENT))
+    else:
+        visible = _float(WORDS.get(said.lower(), said))
+        if visible not in (0, 1):
+            raise UserError(
+                f"{where}: visible is {said!r}; it must be 1 or True (seen), or 0 or False (not seen)"
+            )
+    values = dict.fromkeys((*DISPLACEMENT, "std_u_mm", "std_v_mm"), 0.0)
     for name in values if visible else ():
         values[name] = _number(cells, name, where)
-    return values | {name: _number(cells, name, where) for name in POSITION}
+    return values | {"visible": visible} | {name: _number(cells, name, where) for name in POSITION}
 
 
 def _number(cells: Mapping[str, str], name: str, where: str) -> float:
     text = cells.get(name, str(OPTIONAL.get(name, "")))
-    try:
-        value = float(text if "_" not in text else "nan")  # Python reads 2_0 as 20
-    except ValueError:
-        value = float("nan")
+    value = _float(text)
     if not np.isfinite(value):
-        raise UserError(f"{where}: {name} is {text!r}, which is not a number")
+        remedy = ""
+        if text.lower() in EMPTY:
+            if name in DISPLACEMENT:
+                remedy = "; of a marker that was not seen leave u and v empty, and put 0 into visible"
+            elif name not in POSITION:
+                remedy = "; give one, 0 if it is not known, or leave the column out"
+        raise UserError(f"{where}: {name} is {text!r}, which is not a number{remedy}")
     if abs(value) > LARGEST:
         raise UserError(f"{where}: {name} is {text}, beyond {LARGEST:g} mm; give mm")
     return value
+
+
+def _float(text: str) -> float:
+    """A number; NaN where there is none."""
+    try:
+        return float(text if "_" not in text else "nan")  # Python reads 2_0 as 20
+    except ValueError:
+        return float("nan")

@@ -147,8 +147,8 @@ FRAME = pd.DataFrame({"x_mm": [20.0, 50.0], "y_mm": -1.0, "u_mm": [-1.0, -1.5], 
             "the data frame, line 2: visible is '0.9'; it must be 1",
         ),
         (
-            lambda: pr.compare("default", "fem", measurements=FRAME.assign(visible=["yes", "no"]), **COARSE),
-            "the data frame, line 2: visible is 'yes', which is not a number",
+            lambda: pr.compare("default", "fem", measurements=FRAME.assign(visible=["yes", "?"]), **COARSE),
+            "the data frame, line 3: visible is '[?]'; it must be 1",
         ),
     ],
 )

@@ -1,5 +1,7 @@
 """Points clicked in two photographs: scale, mirror image, order and noise are found, bad lists refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -140,3 +142,36 @@ def test_points_on_one_line_do_not_tell_the_mirror_image():
     line = np.column_stack([np.arange(10.0, 60, 10), np.full(5, -1.0)])
     with pytest.raises(UserError, match="their mirror image fit the drawing alike"):
         clicked_points(picture(line, 0.2), picture(line, 0.2), line, marker_radius=0.5, source="clicks")
+
+
+TRACKPY = "frame,particle,x,y,mass\n" + "\n".join(
+    f"{frame},{point},{10 * x + 5 * (frame > 1)},{-10 * y},1"
+    for frame in range(4)
+    for point, (x, y) in enumerate(MARKERS)
+)
+DEEPLABCUT = (
+    "scorer"
+    + ",net" * 27
+    + "\nbodyparts"
+    + "".join(f",m{n},m{n},m{n}" for n in range(9))
+    + "\ncoords"
+    + ",x,y,likelihood" * 9
+    + "\n"
+    + "\n".join(
+        f"{frame}" + "".join(f",{10 * x + 5 * (frame > 1)},{-10 * y},0.99" for x, y in MARKERS)
+        for frame in range(4)
+    )
+)
+
+
+@pytest.mark.parametrize(("program", "content"), [("trackpy", TRACKPY), ("deeplabcut", DEEPLABCUT)])
+def test_the_page_makes_clicks_of_an_export(tmp_path, monkeypatch, program, content):
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "measurements.md").read_text(encoding="utf-8")
+    names: dict = {}
+    exec(page.split("```python\n")[1].split("```")[0], names)
+    monkeypatch.chdir(tmp_path)
+    Path("tracks.csv").write_text(content, encoding="utf-8")
+    names["write_means"](names[program]("tracks.csv"), (0, 1), (2, 3))
+    result = found(read_clicks(Path("rest.csv")), read_clicks(Path("pressed.csv")))
+    assert result.mirrored
+    np.testing.assert_allclose(result.observations.displacements, np.full((9, 2), (0.5, 0)), atol=1e-9)

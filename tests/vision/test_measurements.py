@@ -4,11 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from geometry.errors import UserError
 from geometry.observations import Observations
 from geometry.registration import FIXED, FREE, HAND_HELD, Registration
+from vision.clicked_points import read_clicks
 from vision.measurements import read_measurements, write_measurements
 
 HEADER = "x_mm,y_mm,u_mm,v_mm"
@@ -128,6 +130,91 @@ def test_columns_may_be_in_any_order_among_others(tmp_path):
     assert (found.points.tolist(), found.displacements.tolist()) == ([[9, -1]], [[0.5, -2]])
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        'x_mm,y_mm,u_mm,v_mm,note\n1,2,3,4,"a,\nb"\n5,6,7,8,c\n',  # at the end of a row
+        'note,x_mm,y_mm,u_mm,v_mm\n"a ""b""\n\nc",1,2,3,4\nd,5,6,7,8\n',  # at its start, an empty line
+        '"x_mm",y_mm,u_mm,v_mm,"note\n(by hand)"\n1,2,3,4,\n5,6,7,8,\n',  # in the header
+        '"# source: a, b\nsecond line",,\nx_mm,y_mm,u_mm,v_mm\n1,2,3,4\n5,6,7,8\n',  # in a comment
+        '# 5" ruler\nx_mm,y_mm,u_mm,v_mm\n1,2,3,4\n5,6,7,8\n',  # no quotation
+    ],
+)
+def test_a_line_break_within_quotation_marks_ends_no_row(tmp_path, content, end):
+    found = read(tmp_path, content.replace("\n", end))
+    assert found.points.tolist() == [[1, 2], [5, 6]]
+    assert found.displacements.tolist() == [[3, 4], [7, 8]]
+
+
+def test_a_row_after_a_line_break_keeps_the_number_of_its_line(tmp_path):
+    with pytest.raises(UserError, match="line 4: u_mm is 'three'"):
+        read(tmp_path, f'{HEADER},note\n1,2,3,4,"a\nb"\n1,2,three,4,\n')
+
+
+@pytest.mark.parametrize(
+    ("seen", "hidden"), [("True", "False"), ("TRUE", "FALSE"), ("yes", "No"), ("1.0", "0.0"), ("1", "0")]
+)
+def test_visible_may_be_a_word(tmp_path, seen, hidden):
+    found = read(tmp_path, f"{HEADER},visible\n1,2,3,4,{seen}\n5,6,,,{hidden}\n")
+    assert found.visible.tolist() == [True, False]
+
+
+@pytest.mark.parametrize("cell", ["", "NaN", "nan", "N/A", "#N/A", "None", " "])
+def test_a_marker_without_displacement_was_not_seen(tmp_path, cell):
+    found = read(tmp_path, f"{HEADER},std_u_mm\n1,2,3,4,0.1\n5,6,{cell},{cell},{cell}\n")
+    assert found.visible.tolist() == [True, False]
+    assert found.displacements.tolist() == [[3, 4], [0, 0]]
+
+
+def test_a_table_of_pandas_is_read(tmp_path):
+    frame = pd.DataFrame({"x_mm": [1, 5], "y_mm": [2, 6], "u_mm": [3, np.nan], "v_mm": [4, np.nan]})
+    frame.to_csv(tmp_path / "plain.csv")  # with its index
+    frame.assign(visible=[True, False]).to_csv(tmp_path / "flags.csv", na_rep="NaN")
+    for name in ("plain", "flags"):
+        assert read_measurements(tmp_path / f"{name}.csv", marker_radius=1).visible.tolist() == [True, False]
+
+
+DEEPLABCUT = """scorer,DLC_resnet50_fin,DLC_resnet50_fin,DLC_resnet50_fin
+bodyparts,tip,tip,tip
+coords,x,y,likelihood
+0,512.2,300.1,0.99
+"""
+OPTITRACK = """Format Version,1.23,Take Name,Take 1,Capture Frame Rate,120,Length Units,Millimeters
+
+,,Marker,Marker,Marker
+,,fin:1,fin:1,fin:1
+,,Position,Position,Position
+Frame,Time (Seconds),X,Y,Z
+0,0.0,101.2,33.1,5.0
+"""
+EXPORTS = {
+    "DeepLabCut": [DEEPLABCUT, DEEPLABCUT.replace("bodyparts", "individuals,a,a,a\nbodyparts")],
+    "OptiTrack": [OPTITRACK, "\ufeff" + OPTITRACK, OPTITRACK[OPTITRACK.index("Frame,") :]],
+    "TrackPy": [
+        ",y,x,mass,size,ecc,signal,raw_mass,ep,frame,particle\n0,3,4,5,6,0,1,2,0,0,0\n",
+        "x,y,frame,particle\n3,4,0,0\n",
+    ],
+    "TrackMate": [
+        "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME\n,1,0,1,2,3,0,0,0\n"
+    ],
+    "SLEAP": ["track,frame_idx,instance.score,tip.x,tip.y,tip.score\n,0,0.9,1,2,0.9\n"],
+}
+
+
+@pytest.mark.parametrize(
+    ("program", "content"), [(program, text) for program, texts in EXPORTS.items() for text in texts]
+)
+def test_an_export_of_another_program_is_named_with_the_way_from_it(tmp_path, program, content):
+    path = tmp_path / "markers.csv"
+    path.write_text(content, encoding="utf-8")
+    for reading in (lambda: read_measurements(path, marker_radius=1), lambda: read_clicks(path)):
+        with pytest.raises(UserError, match=f"an export of {program}, .*pinnray points") as error:
+            reading()
+        assert "markers.csv" in str(error.value)
+        assert "\n" not in str(error.value)
+
+
 def test_comments_and_blank_lines_may_stand_anywhere(tmp_path):
     content = f"\n# of May\n  # indented\n{HEADER}\n#1,2,3,4\n9,-1,0,0\n\n,,,\n# source: late\n"
     found = read(tmp_path, content)
@@ -160,20 +247,33 @@ def test_a_spreadsheet_may_save_the_file(tmp_path):
         ("# only a comment\n", "has no column x_mm"),
         ("x_mm,y_mm,u_mm\n1,2,3\n", "has no column v_mm"),
         ("x_mm;y_mm;u_mm;v_mm\n1;2;3;4\n", "with commas between"),  # another separator
-        ("9,-1,0,0\n", "has no column x_mm"),  # no header
+        ("9,-1,0,0\n", "has no column x_mm; .*; it names '9', '-1', '0', '0'$"),  # no header
+        ("x,y,u,v\n1,2,3,4\n", "the header must name x_mm, .*; it names 'x', 'y', 'u', 'v'$"),
+        (",".join(f"c{n}" for n in range(20)) + "\n", "it names 'c0', .*, 'c11' and 8 more$"),
         (f"{HEADER}\n", "has a header but no marker"),
         (f"{HEADER},u_mm\n1,2,3,4,5\n", "has the column u_mm twice"),
         (f"{HEADER}\n1,2,3,4\n5,6,7,8\n1,2.0,3,4\n", r"line 4: there is already a marker at \(1, 2\) mm"),
         (f"# c\n{HEADER}\n1,2,3,4\n1,2,three,4\n", "line 4: u_mm is 'three', which is not a number"),
         (f"{HEADER}\n1,2,nan,4\n", "line 2: u_mm is 'nan', which is not a number"),
         (f"{HEADER}\n1,2,3,inf\n", "line 2: v_mm is 'inf'"),
-        (f"{HEADER}\n1,2,3,\n", "line 2: v_mm is ''"),  # a seen marker must have all its numbers
+        (
+            f"{HEADER}\n1,2,3,\n",
+            "line 2: v_mm is ''.* put 0 into visible",
+        ),  # a seen marker must have all its numbers
         (f"{HEADER},visible\n1,2,3,4,1\n,2,,,0\n", "line 3: x_mm is ''"),  # an unseen one its position
-        (f"{HEADER},std_u_mm\n1,2,3,4,\n", "line 2: std_u_mm is ''"),  # not zero without saying so
+        (
+            f"{HEADER},std_u_mm\n1,2,3,4,\n",
+            "line 2: std_u_mm is ''.* or leave the column out",
+        ),  # not zero without saying so
+        (
+            f'{HEADER},remark\n1,2,3,4,"5 inch\n5,6,7,8,\n',
+            "line 2: a quotation mark is opened and not closed",
+        ),
         (f"{HEADER}\n1,2,3\n", "line 2: the header names 4 columns, this line has 3"),
         (f"{HEADER}\n1,0,2,0,3,0,4,0\n", "this line has 8; .* decimals with a point"),  # decimal commas
         (f"{HEADER},visible\n1,2,3,4,2\n", "line 2: visible is '2'; it must be 1 .* or 0"),
-        (f"{HEADER},visible\n1,2,3,4,yes\n", "line 2: visible is 'yes'"),
+        (f"{HEADER},visible\n1,2,3,4,perhaps\n", "line 2: visible is 'perhaps'"),
+        (f"{HEADER},visible\n1,2,,,True\n", "u_mm is '', which is not a number; .* put 0 into visible"),
         (f"{HEADER},visible\n1,2,3,4,\n", "line 2: visible is ''"),
         (f"{HEADER},visible\n1,2,3,4,0\n", "markers.csv: none of the markers is visible"),
         (f"{HEADER},std_v_mm\n1,2,3,4,-1\n", "markers.csv: standard deviations must be zero or more"),

@@ -4,43 +4,20 @@ import re
 import warnings
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
 from glob import glob, has_magic
 from pathlib import Path
-from typing import Any
 
 import cv2
-import numpy as np
 
 from geometry.atomic import write_bytes
 from geometry.errors import UserError
+from vision.frames.decoder import JPEG, PNG_HEADER, Decoder, content_of, picture_end
+from vision.frames.formats import HEAD, PNG, UNREAD_SUFFIXES, has_pages, refusal, unread_format
 from vision.frames.frame import RIG_MARK, CapturedImage, Image, ImageStream
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
-JPEG, PNG, PNG_END = b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"\0\0\0\0IEND\xaeB`\x82"
-PNG_HEADER = 33
-"""Length of a PNG's signature and first chunk, bytes."""
-DEFLATE = 1032
-"""Largest ratio by which a PNG's compression makes data smaller. Source: zlib, technical details."""
-
-DEPTHS = (10, 12, 14, 16)
-"""Possible numbers of significant bits in 16-bit pictures."""
-
-_JPEG_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]", re.DOTALL)
-"""Starts a segment of a JPEG; the excluded ones may stand within its compressed data."""
-_AS_STORED = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
-
-
-@contextmanager
-def silenced() -> Iterator[None]:
-    """Keeps OpenCV's messages off standard error: the caller reports what they mean to a user."""
-    opencv: Any = cv2
-    logging = opencv if hasattr(opencv, "setLogLevel") else opencv.utils.logging  # OpenCV 4 and 5
-    level = logging.setLogLevel(0)
-    try:
-        yield
-    finally:
-        logging.setLogLevel(level)
+ANIMATIONS = {".gif": "GIF"}
+"""Pictures of many frames that FFmpeg reads as films, each by itself, by suffix."""
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:
@@ -53,11 +30,18 @@ def picture_paths(source: str | Path) -> list[Path]:
     """The pictures of a folder, but hidden ones, or of a glob, in natural order, or the file `source` itself.
 
     Raises:
-        UserError: If there is none.
+        UserError: If there is none, or a folder also holds some of a format that is not read.
     """
     path = Path(source)
     if path.is_dir():
-        shown = (file for file in path.iterdir() if not file.name.startswith("."))
+        shown = [file for file in path.iterdir() if not file.name.startswith(".")]
+        names = UNREAD_SUFFIXES | ANIMATIONS
+        others = sorted((file for file in shown if file.suffix.lower() in names), key=natural_order)
+        if others:
+            more = f" and {len(others) - 1} more" if len(others) > 1 else ""
+            kind = names[others[0].suffix.lower()]
+            remedy = "a GIF is a film of its own" if kind == "GIF" else refusal(kind)
+            raise UserError(f"{path} holds {others[0].name}{more}: {remedy}; or take them out")
         found = [file for file in shown if file.suffix.lower() in SUFFIXES and file.is_file()]
     elif path.exists() or not has_magic(str(source)):
         found = [path]
@@ -72,13 +56,32 @@ def picture_paths(source: str | Path) -> list[Path]:
     return sorted(found, key=natural_order)
 
 
+def is_picture(path: Path) -> bool:
+    """True for a file that is a picture by its suffix or its content; False for a film, or without a file.
+
+    Raises:
+        UserError: If it is a photograph of a format that is not read.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except OSError:
+        return False
+    suffix = path.suffix.lower()
+    if name := unread_format(head) or UNREAD_SUFFIXES.get(suffix):
+        raise UserError(f"cannot read the picture {path}: {refusal(name)}")
+    return suffix in SUFFIXES or has_pages(head)
+
+
 def images_of_files(paths: Sequence[Path], rate: float) -> ImageStream:
     """The images of picture files, decoded one by one to the same scale."""
     decode = Decoder()
-    for number, path in enumerate(paths):
-        content = _content(path)
-        image = decode(content, f"the picture {path}")
-        yield CapturedImage(image, number / rate, path.name, is_marked(content))
+    number = 0
+    for path in paths:
+        content = content_of(path)
+        for name, image in decode(content, f"the picture {path}", path.name):
+            yield CapturedImage(image, number / rate, name, is_marked(content))
+            number += 1
 
 
 def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> ImageStream:
@@ -88,89 +91,12 @@ def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> Imag
     and is one or two behind a live source.
     """
     decode = Decoder()
-    for number, content in enumerate(split(read, name)):
-        label = f"picture {number + 1} of {name}"
-        yield CapturedImage(decode(content, label), number / rate, label, is_marked(content))
-
-
-class Decoder:
-    """Decodes the pictures of one sequence into 8 bits, all to the same scale.
-
-    A 16-bit picture has 10, 12, 14 or 16 significant bits, as many as the brightest pixel of the first one
-    needs: many cameras of 10 to 14 bits leave the highest ones empty.
-    """
-
-    def __init__(self) -> None:
-        self._white: int | None = None
-
-    def __call__(self, content: bytes, label: str) -> Image:
-        """The image in a file's content.
-
-        Raises:
-            UserError: If it is no whole picture, or neither of 8 nor of 16 bits.
-        """
-        if not content:
-            raise UserError(f"cannot read {label}: it is empty")
-        if content.startswith((JPEG, PNG)) and picture_end(content) is None:
-            raise UserError(f"cannot read {label}: its end is missing")
-        if content.startswith(PNG) and (fault := _png_fault(content)):
-            raise UserError(f"cannot read {label}: {fault}")
-        image = None
-        with silenced(), suppress(cv2.error):  # raised for more pixels than `vision.MOST_PIXELS`
-            image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _AS_STORED)
-        if image is None:
-            raise UserError(
-                f"cannot read {label}: it is damaged, too large, or not one that OpenCV knows, such as PNG "
-                "or JPEG"
-            )
-        if image.dtype == np.uint8:
-            return np.asarray(image, dtype=np.uint8)
-        if image.dtype != np.uint16:
-            raise UserError(f"cannot read {label}: its pixels are {image.dtype}; they must have 8 or 16 bits")
-        if self._white is None:
-            brightest = int(image.max()).bit_length()
-            self._white = 2 ** next(bits for bits in DEPTHS if bits >= brightest) - 1
-        return np.asarray(cv2.convertScaleAbs(image, alpha=255 / self._white), dtype=np.uint8)
-
-    def file(self, path: Path) -> Image:
-        """The image in a file.
-
-        Raises:
-            UserError: If the file cannot be read, is no whole picture, or has neither 8 nor 16 bits.
-        """
-        return self(_content(path), f"the picture {path}")
-
-
-def _png_fault(content: bytes) -> str:
-    """A clause if a chunk of a PNG is damaged, or its pixels are too many: OpenCV would take gigabytes.
-
-    Source: PNG specification, third edition, sections 5.3, 5.5 and 11.2.1.
-    """
-    position, kind, kinds = len(PNG), b"", list[bytes]()
-    while kind != b"IEND":
-        length = int.from_bytes(content[position : position + 4], "big")
-        body, end = content[position + 4 : position + 8 + length], position + 12 + length
-        kind = body[:4]
-        if end > len(content) or zlib.crc32(body) != int.from_bytes(content[end - 4 : end], "big"):
-            return "one of its parts is damaged"
-        position = end
-        kinds.append(kind)
-    if kinds[0] != b"IHDR" or kinds.count(b"IHDR") > 1 or len(content) < PNG_HEADER:
-        return "it has no header, or more than one"
-    if b"IDAT" not in kinds:
-        return "it has no pixels"
-    width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
-    samples = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(content[25], 1)
-    if width * height * samples * content[24] // 8 > DEFLATE * len(content):
-        return "its header asks for more pixels than the file can hold"
-    return ""
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise UserError(f"cannot read the picture {path}: {error.strerror}") from None
+    number = 0
+    for count, content in enumerate(split(read, name), start=1):
+        label = f"picture {count} of {name}"
+        for page, image in decode(content, label, label):
+            yield CapturedImage(image, number / rate, page, is_marked(content))
+            number += 1
 
 
 def write_picture(path: Path, image: Image, *, comment: str = "") -> None:
@@ -220,20 +146,3 @@ def split(read: Callable[[int], bytes], name: str) -> Iterator[bytes]:
         if not more and buffer:
             warnings.warn(f"{name} ended within a picture, which is left out", stacklevel=2)
             return
-
-
-def picture_end(content: bytes | bytearray) -> int | None:
-    """End of the JPEG or PNG at the start of `content`; None if it does not hold all of it.
-
-    Source: PNG specification, third edition, section 5.3; ITU-T T.81, annex B. A JPEG is walked segment by
-    segment, since a preview in one of them has an end marker of its own.
-    """
-    if content.startswith(PNG):
-        return end + len(PNG_END) if (end := content.find(PNG_END)) >= 0 else None
-    position = len(JPEG)
-    while content.startswith(JPEG) and (marker := _JPEG_MARKER.search(content, position)):
-        position = marker.end()
-        if marker[0] == b"\xff\xd9":
-            return position
-        position += int.from_bytes(content[position : position + 2], "big")
-    return None

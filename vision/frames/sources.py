@@ -7,13 +7,15 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from glob import has_magic
-from itertools import chain, count
+from itertools import chain, count, islice
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from geometry.errors import UserError
+from vision.frames.decoder import Decoder, content_of, silenced
+from vision.frames.formats import pages
 from vision.frames.frame import (
     DEFAULT_RATE,
     MAX_RATE,
@@ -24,13 +26,13 @@ from vision.frames.frame import (
     ImageStream,
     plausible_rate,
 )
-from vision.frames.pictures import SUFFIXES, Decoder, images_of_files, images_of_pipe, picture_paths, silenced
+from vision.frames.pictures import images_of_files, images_of_pipe, is_picture, picture_paths
 from vision.frames.video import video_frames
 
 LIVE_SIZE = (1280, 720)
 """(width, height) that a camera is asked for, pixels."""
 FRAMES_OF_A_VIDEO = 40
-"""Largest number of photographs from a video, spread evenly."""
+"""Largest number of photographs from a video or from the pages of one picture, spread evenly."""
 
 
 def open_frames(
@@ -39,8 +41,9 @@ def open_frames(
     """Frames of a video, of pictures, of a camera or of a pipe.
 
     Args:
-        source: A video file; a picture; a folder or glob of pictures, taken in natural order; the number of a
-            camera, or its device; or "-", JPEG or PNG pictures one after another on standard input.
+        source: A video file; a picture, whose pages are frames; a folder or glob of pictures, taken in
+            natural order; the number of a camera, or its device; or "-", JPEG or PNG pictures one after
+            another on standard input.
         rate: Frames a second, where the source does not say: of pictures and pipes, 30 if not given. A camera
             is asked for it.
         size: (width, height) that a camera is asked for, pixels.
@@ -60,12 +63,14 @@ def open_frames(
     camera = re.fullmatch(r"(?:/dev/video)?(\d+)", str(source))
     if camera and (isinstance(source, int) or not (path.is_file() or path.is_dir())):
         return camera_frames(int(camera[1]), size=size, rate=rate)
-    if path.is_file() and path.suffix.lower() not in SUFFIXES:
+    if path.is_file() and not is_picture(path):
         return video_frames(path, rate)
     if not str(source) or not (path.is_file() or path.is_dir() or has_magic(str(source))):
         raise UserError(f"{str(source)!r}: there is no such video, picture or folder")
     paths = picture_paths(str(source))
-    return Frames(str(source), images_of_files(paths, usual), rate=usual, count=len(paths))
+    single = len(paths) == 1
+    number = len(pages(content_of(paths[0]), f"the picture {paths[0]}")) if single else len(paths)
+    return Frames(str(source), images_of_files(paths, usual), rate=usual, count=number)
 
 
 def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = None) -> Frames:
@@ -124,9 +129,11 @@ def photographs(sources: Iterable[Path], *, without: Sequence[str] = ()) -> Iter
 
 def _images(source: Path) -> Iterator[tuple[str, Image]]:
     """Names and images of one source."""
-    if not source.is_file() or source.suffix.lower() in SUFFIXES:
+    if not source.is_file() or is_picture(source):
         for path in picture_paths(source):
-            yield str(path), Decoder().file(path)
+            content, label = content_of(path), f"the picture {path}"
+            every = max(1, len(pages(content, label)) // FRAMES_OF_A_VIDEO)
+            yield from islice(Decoder()(content, label, str(path)), None, None, every)
         return
     with open_frames(source) as frames:
         every = max(1, (frames.count or 0) // FRAMES_OF_A_VIDEO)

@@ -1,0 +1,150 @@
+"""Pictures of several pages are films; photographs of formats that are not read are named, never left out."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from geometry.errors import UserError
+from vision.frames.formats import pages
+from vision.frames.sources import open_frames, photographs
+
+LEVELS = (10, 40, 70, 100, 130, 160)
+
+
+def box(brand: bytes, *others: bytes) -> bytes:
+    """The start of a file of ISO's base media format."""
+    body = b"ftyp" + brand + bytes(4) + b"".join(others)
+    return (len(body) + 4).to_bytes(4, "big") + body + bytes(200)
+
+
+HEIC, AVIF = box(b"heic", b"mif1", b"heic"), box(b"avif", b"mif1", b"miaf")
+
+
+def stack(path: Path, *, colour: bool = False, levels=LEVELS, **options) -> Path:
+    """A picture of a page for every grey level."""
+    shape = (12, 16, 3) if colour else (12, 16)
+    images = [Image.fromarray(np.full(shape, level, np.uint8)) for level in levels]
+    images[0].save(path, save_all=True, append_images=images[1:], **options)
+    return path
+
+
+def seen(source: Path | str) -> list[int]:
+    with open_frames(source) as frames:
+        return [int(frame.image.mean()) for frame in frames]
+
+
+@pytest.mark.parametrize("colour", [False, True])
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("stack.tif", {}),
+        ("stack.tif", {"compression": "tiff_lzw"}),
+        ("stack.tif", {"big_tiff": True}),
+        ("stack.stk", {"format": "TIFF"}),  # of MetaMorph
+        ("moving.webp", {"lossless": True, "duration": 50}),
+        ("moving.png", {"duration": 50}),
+        ("moving.apng", {"format": "PNG", "duration": 50}),
+        ("moving.gif", {"duration": 50}),
+    ],
+)
+def test_every_page_is_a_frame(tmp_path, name, options, colour):
+    path = stack(tmp_path / name, colour=colour, **options)
+    assert seen(path) == pytest.approx(LEVELS, abs=1)
+    assert [int(image.mean()) for _, image in photographs([path])] == pytest.approx(LEVELS, abs=1)
+    with open_frames(path) as frames:
+        assert frames.count == 6
+        assert {frame.image.ndim for frame in frames} <= {2, 3}
+
+
+def test_stacks_of_a_folder_follow_each_other(tmp_path):
+    stack(tmp_path / "run2.tif", levels=(50, 60))
+    stack(tmp_path / "run1.tif", levels=(30, 40))
+    stack(tmp_path / "run10.tif", levels=(70,))
+    assert seen(tmp_path) == [30, 40, 50, 60, 70]
+    names = [Path(name).name for name, _ in photographs([tmp_path])]
+    assert names == ["run1.tif:0", "run1.tif:1", "run2.tif:0", "run2.tif:1", "run10.tif"]
+    assert len(list(photographs([tmp_path], without=["run1.tif:1"]))) == 4
+
+
+def test_a_long_stack_gives_a_calibration_forty_pages(tmp_path):
+    path = stack(tmp_path / "long.tif", levels=range(100))
+    assert [int(image.mean()) for _, image in photographs([path])] == list(range(0, 100, 2))
+
+
+def test_pages_of_16_bits_have_one_scale(tmp_path):
+    path = tmp_path / "deep.tif"
+    assert cv2.imwritemulti(str(path), [np.full((12, 16), level, np.uint16) for level in (1000, 500)])
+    assert seen(path) == [249, 125]
+
+
+def test_a_smaller_copy_is_no_page(tmp_path):
+    """As of the tag NewSubfileType, which a thumbnail has."""
+    path = tmp_path / "thumb.tif"
+    small = Image.fromarray(np.full((3, 4), 9, np.uint8))
+    small.encoderinfo = {"tiffinfo": {254: 1}}
+    Image.fromarray(np.full((12, 16), 70, np.uint8)).save(path, save_all=True, append_images=[small])
+    assert seen(path) == [70]
+    assert pages(path.read_bytes(), "a") == [0]
+
+
+def test_pages_of_another_size_are_named(tmp_path):
+    images = [Image.fromarray(np.full(shape, 70, np.uint8)) for shape in ((12, 16), (6, 8))]
+    images[0].save(tmp_path / "two.tif", save_all=True, append_images=images[1:])
+    with pytest.raises(UserError, match=r"two.tif:0 has 16x12 pixels and two.tif:1 8x6"):
+        seen(tmp_path / "two.tif")
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (
+            lambda path: stack(path, tiffinfo={270: "ImageJ=1.53t\nimages=9000\n"}),
+            "6 of its 9000 pages",
+        ),
+        (lambda path: path.write_bytes(stack(path).read_bytes()[:-150]), "of its pages can be|is damaged"),
+        (lambda path: path.write_bytes(stack(path, format="PNG").read_bytes()[:-60]), "its end is missing"),
+    ],
+)
+def test_a_stack_that_lacks_pages_is_named(tmp_path, make, said):
+    path = tmp_path / "stack.tif"
+    make(path)
+    with pytest.raises(UserError, match=f"stack.tif: .*({said})"):
+        seen(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("IMG_1.HEIC", HEIC, "HEIC is not read; convert it to JPEG"),
+        ("IMG_1.heif", box(b"mif1", b"heic"), "HEIC is not read"),
+        ("IMG_1.jpg", HEIC, "HEIC is not read"),  # renamed
+        ("a.avif", AVIF, "AVIF is not read"),
+        ("a.png", box(b"mif1", b"avif"), "AVIF is not read"),
+        ("a.jxl", b"\xff\x0a" + bytes(50), "JPEG XL is not read"),
+        ("DSC_1.NEF", b"MM\0*" + bytes(50), "raw photographs are not read; convert it to TIFF"),
+        ("a.dng", b"II*\0" + bytes(50), "raw photographs are not read"),
+        ("a.cr3", box(b"crx "), "raw photographs are not read"),
+    ],
+)
+def test_a_format_that_is_not_read_is_named_alone_and_among_others(tmp_path, name, content, said):
+    path = tmp_path / name
+    path.write_bytes(content)
+    done, jpeg = cv2.imencode(".jpg", np.full((12, 16), 70, np.uint8))
+    assert done
+    (tmp_path / "other.jpg").write_bytes(jpeg.tobytes())
+    for source in (path, tmp_path):
+        for reading in (seen, lambda source: list(photographs([source]))):
+            with pytest.raises(UserError, match=said) as error:
+                reading(source)
+            assert name in str(error.value)
+            assert "\n" not in str(error.value)
+
+
+def test_a_film_among_pictures_is_named(tmp_path):
+    stack(tmp_path / "a.gif")
+    stack(tmp_path / "b.tif", levels=(70,))
+    with pytest.raises(UserError, match=r"holds a.gif: a GIF is a film of its own"):
+        seen(tmp_path)
