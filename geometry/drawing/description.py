@@ -17,7 +17,7 @@ Coordinates = tuple[float, float]
 class Description(CheckedModel):
     """Clamp, contact and markers of a drawing, in the file's coordinates; what is missing is proposed.
 
-    Lengths are in the file's unit, as the coordinates are.
+    Lengths are in the file's unit, as the coordinates are; only the tolerance is in mm.
     """
 
     name: str | None = Field(
@@ -25,8 +25,11 @@ class Description(CheckedModel):
         pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$",
         description="What files and reports call the finger; none means the file's name",
     )
-    units: Literal["um", "mm", "cm", "m", "in"] | None = Field(
+    units: Literal["um", "mm", "cm", "dm", "m", "mil", "in", "ft", "yd", "pt", "px"] | None = Field(
         default=None, description="Unit of the file's coordinates; none means the file's own, or mm"
+    )
+    tolerance: float | None = bounded(
+        None, 1e-6, 0.5, "", "mm", "Largest gap between two ends of curves that is closed; none means 0.001"
     )
     plane: str | None = Field(default=None, description="Plane in which a solid is cut, such as z = 6")
     clamp: tuple[tuple[Coordinates, Coordinates], ...] | str | None = Field(

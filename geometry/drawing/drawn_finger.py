@@ -49,7 +49,7 @@ class DrawnFinger:
         sources: `given`, `drawn` or `proposed` for `clamp`, `contact`, `contact_width`, `markers`,
             `marker_diameter`, `marker_height` and `depth`.
         unit: Length of one unit of the file's coordinates, mm.
-        reading: `units` and `plane` of the description, where they were given.
+        reading: `units`, `plane` and `tolerance` of the description, where they were given.
         mesh: The file's own triangle mesh, in the finger's frame, or None.
 
     Raises:
@@ -70,7 +70,7 @@ class DrawnFinger:
     placement: Placement
     sources: Mapping[str, str] = field(default_factory=dict)
     unit: float = 1.0
-    reading: Mapping[str, str] = field(default_factory=dict)
+    reading: Mapping[str, str | float] = field(default_factory=dict)
     mesh: TriangleMesh | None = None
 
     def __post_init__(self) -> None:

@@ -48,20 +48,23 @@ def finger_from_file(path: str | Path, description: Description | None = None) -
     path = Path(path)
     if description is None:
         description = load_description(description_beside(path))
-    drawing = read_drawing(path, description.units, description.plane)
+    drawing = read_drawing(path, description.units, description.plane, description.tolerance)
     try:
         return finger_of(drawing, description)
     except UserError as error:
         raise UserError(f"{path.name}: {error}") from None
 
 
-def read_drawing(path: Path, units: str | None = None, plane: str | None = None) -> Drawing:
+def read_drawing(
+    path: Path, units: str | None = None, plane: str | None = None, tolerance: float | None = None
+) -> Drawing:
     """The curves of a STEP, DXF, SVG or MSH file.
 
     Args:
         path: The file.
         units: Unit of its coordinates; None means the file's own, or mm.
         plane: Plane in which a solid is cut, such as `z = 6`.
+        tolerance: Largest gap between two ends of curves that is closed, mm; None means 0.001 mm.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
@@ -74,7 +77,7 @@ def read_drawing(path: Path, units: str | None = None, plane: str | None = None)
         digest = file_digest(path)
         kind = suffix[1:].replace("stp", "step")
         read = getattr(import_module(f"geometry.drawing.formats.{kind}"), f"read_{kind}")
-        drawing: Drawing = read(path, units, plane) if kind == "step" else read(path, units)
+        drawing: Drawing = read(path, units, tolerance, *([plane] if kind == "step" else []))
     except OSError as error:
         raise UserError(f"cannot read the drawing {path}: {error.strerror}") from None
     except UserError as error:
@@ -135,7 +138,9 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
             "depth": depth_source,
         },
         unit=drawing.unit,
-        reading={key: value for key in ("units", "plane") if (value := getattr(description, key))},
+        reading={
+            key: value for key in ("units", "plane", "tolerance") if (value := getattr(description, key))
+        },
         mesh=mesh,
     )
 

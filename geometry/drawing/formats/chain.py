@@ -2,21 +2,27 @@
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import shapely
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.drawing.formats.drawing import LABELS, Drawing, place
-from geometry.drawing.formats.pieces import FARTHEST, Piece, is_near
+from geometry.arrays import FloatArray
+from geometry.drawing.formats.drawing import LABELS, Drawing, Scale, place
+from geometry.drawing.formats.ends import JOIN, check_ends, check_extent, check_twice, joined
+from geometry.drawing.formats.pieces import Piece
 from geometry.errors import UserError
 from geometry.section.loop import STRAIGHT, Loop
 
-JOIN = 1e-3
-"""Largest distance of two ends that count as one, mm."""
+ROUND = 0.02
+"""Largest relative difference of the radii of a closed curve that is a circle, of arcs or short lines."""
+
+
+class Closed(NamedTuple):
+    """Closed curves, and in words the gaps that a tolerance closed in them."""
+
+    loops: tuple[Loop, ...]
+    note: str = ""
 
 
 class Marks:
@@ -40,47 +46,88 @@ class Marks:
             self._contact = centre
         return label in ("markers", "contact")
 
-    def drawing(self, pieces: Sequence[Piece], **facts: Any) -> Drawing:
+    def drawing(
+        self, pieces: Sequence[Piece], scale: Scale, tolerance: float | None, note: str, **facts: Any
+    ) -> Drawing:
         """The drawing with its curves closed.
+
+        Args:
+            pieces: Lines and arcs, mm.
+            scale: Unit of the file's coordinates.
+            tolerance: Largest gap that is closed, mm; None means `JOIN`.
+            note: How the file was read.
+            facts: Further attributes of the drawing.
 
         Raises:
             UserError: If a curve does not close, the markers differ in diameter, or one is no circle.
         """
-        if strange := next((piece for piece in pieces if piece.label == "markers"), None):
-            raise UserError(f"the marker at {place(strange.start)} is no circle; draw circles or points")
+        self._take_round([piece for piece in pieces if piece.label == "markers"])
         sizes = [diameter for diameter in self._diameters if diameter > 0]
-        if sizes and np.ptp(sizes) > 1e-3:
+        if sizes and np.ptp(sizes) > 0.01 * max(sizes):
             raise UserError(
                 f"the markers have diameters from {min(sizes):.4g} to {max(sizes):.4g} mm; give all the same"
             )
+        rest = [piece for piece in pieces if piece.label != "markers"]
+        closed = closed_loops(rest, frozenset(LABELS) - {"markers"}, scale, tolerance)  # which may lie on top
         return Drawing(
-            loops=closed_loops(pieces, frozenset(LABELS) - {"markers"}),  # which may lie on top
+            loops=closed.loops,
+            note=note + closed.note,
             markers=np.array(self._centres).reshape(-1, 2),
             marker_diameter=float(np.mean(sizes)) if sizes else None,
             contact=self._contact,
             **facts,
         )
 
+    def _take_round(self, pieces: Sequence[Piece]) -> None:
+        """Keep closed curves of arcs or short lines as markers: circles of their areas."""
+        if not pieces:
+            return
+        no_circle = "the marker at {} is no circle; draw circles or points"
+        try:
+            loops = _chained(pieces, JOIN).loops
+        except UserError:
+            raise UserError(no_circle.format(place(pieces[0].start))) from None
+        for loop in loops:
+            shares = np.linspace(0, 1, 16, endpoint=False)
+            points = np.concatenate([loop.along(which, shares) for which in range(len(loop.points))])
+            centre = np.array(shapely.Polygon(points).centroid.coords[0])
+            radii = np.linalg.norm(points - centre, axis=1)
+            if np.ptp(radii) > ROUND * radii.max():
+                raise UserError(no_circle.format(place(loop.points[0])))
+            self.took(centre, 2 * float(np.sqrt(abs(loop.area) / np.pi)), "markers")
 
-def closed_loops(pieces: Sequence[Piece], markings: frozenset[str] = frozenset()) -> tuple[Loop, ...]:
+
+def closed_loops(
+    pieces: Sequence[Piece],
+    markings: frozenset[str] = frozenset(),
+    scale: Scale = Scale(),  # noqa: B008
+    tolerance: float | None = None,
+) -> Closed:
     """Closed curves from pieces in any order and direction, mm.
 
     Pieces labelled as one of `markings` may be part of a curve, or lie on top of it and only name it.
+
+    Args:
+        pieces: Lines and arcs.
+        markings: Labels of pieces that may lie on top.
+        scale: Unit of the file's coordinates.
+        tolerance: Largest gap between two ends that is closed, mm; None means `JOIN`.
     """
-    _check_extent(pieces)
+    check_extent(pieces, scale)
+    reach = JOIN if tolerance is None else tolerance
     labels = sorted({piece.label for piece in pieces if piece.label in markings})
     for count in range(len(labels), 0, -1):
         for on_top in combinations(labels, count):
             if not (rest := [piece for piece in pieces if piece.label not in on_top]):
                 continue  # they are all there is
             try:
-                loops = _chained(rest)
+                loops, note = _chained(rest, reach)
             except UserError:
                 continue  # they are part of the boundary
             for mark in (piece for piece in pieces if piece.label in on_top):
                 loops = _marked(loops, mark)
-            return loops
-    return _chained(pieces)
+            return Closed(loops, note)
+    return _chained(pieces, reach)
 
 
 def straightened(loop: Loop, deviation: float = 1e-7) -> Loop:
@@ -129,11 +176,12 @@ def _nearest_fraction(loop: Loop, which: int, point: FloatArray) -> float:
     return 0.0 if np.linalg.norm(point - start) <= np.linalg.norm(point - end) else 1.0
 
 
-def _chained(loose: Sequence[Piece]) -> tuple[Loop, ...]:
+def _chained(loose: Sequence[Piece], reach: float) -> Closed:
     """Closed curves of pieces that are all part of one."""
-    pieces, nodes, places = _joined(loose)
-    _check_twice(pieces, nodes, places)
-    _check_ends(nodes, places)
+    found = joined(loose, reach)
+    check_twice(found)
+    check_ends(found, reach)
+    pieces, nodes, places, gaps = found
     at: dict[int, list[int]] = {}
     for number, pair in enumerate(nodes):
         for node in pair:
@@ -152,71 +200,12 @@ def _chained(loose: Sequence[Piece]) -> tuple[Loop, ...]:
             node = int(nodes[number, 1 if forward else 0])
             number = next((each for each in at[node] if each in left), number)
         loops.append(Loop(np.array(corners), np.array(bulges), tuple(names)))
-    return tuple(loops)
-
-
-def _joined(pieces: Sequence[Piece]) -> tuple[list[Piece], IntArray, FloatArray]:
-    """Pieces with length, the nodes at their ends (p, 2), and the nodes' places (n, 2)."""
-    ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
-    pairs = cKDTree(ends).query_pairs(JOIN, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
-    _, node = connected_components(links, directed=False)
-    _, first = np.unique(node, return_index=True)
-    nodes = node.reshape(-1, 2).astype(np.int64)
-    long = nodes[:, 0] != nodes[:, 1]
-    lost = np.setdiff1d(nodes[~long], nodes[long])
-    if len(lost):
-        raise UserError(
-            f"what is drawn at {place(ends[first][lost[0]])} is smaller than {JOIN:g} mm; delete it"
-        )
-    return [piece for piece, kept in zip(pieces, long, strict=True) if kept], nodes[long], ends[first]
-
-
-def _check_extent(pieces: Sequence[Piece]) -> None:
-    if not pieces:
-        raise UserError("there is no line or arc in it; draw the boundary of the section")
-    ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
-    if not is_near(ends):
-        raise UserError(
-            f"a coordinate is not finite or beyond {FARTHEST:g} mm; draw the section near the origin"
-        )
-    extent = float(np.ptp(ends, axis=0).max())
-    if not 1 <= extent <= 2000:
-        other = "metres for millimetres" if extent < 1 else "micrometres for millimetres"
-        raise UserError(f"the drawing measures {extent:.4g} mm, not 1 to 2000 mm: {other}? give units")
-
-
-def _check_twice(pieces: Sequence[Piece], nodes: IntArray, places: FloatArray) -> None:
-    seen: dict[tuple[int, int, float], int] = {}
-    for number, (piece, (start, end)) in enumerate(zip(pieces, nodes.tolist(), strict=True)):
-        forward = start < end
-        key = (min(start, end), max(start, end), round(piece.bulge if forward else -piece.bulge, 6) + 0.0)
-        if key in seen:
-            raise UserError(
-                f"the curve from {place(places[start])} to {place(places[end])} is drawn twice; delete one"
-            )
-        seen[key] = number
-
-
-def _check_ends(nodes: IntArray, places: FloatArray) -> None:
-    numbers, times = np.unique(nodes, return_counts=True)
-    if (times > 2).any():
-        where = places[numbers[times > 2][0]]
-        raise UserError(
-            f"{times.max()} curves meet at {place(where)}; a boundary has two at every corner and does not "
-            "touch itself"
-        )
-    loose = places[numbers[times == 1]]
-    if not len(loose):
-        return
-    apart = np.linalg.norm(loose[:, None] - loose, axis=2) + np.diag(np.full(len(loose), np.inf))
-    gaps = apart.min(axis=1)
-    one = int(gaps.argmin())
-    other = int(apart[one].argmin())
-    raise UserError(
-        f"the boundary is open at {place(loose[one])}: a gap of {gaps[one]:.4g} mm to the next end at "
-        f"{place(loose[other])}; ends join within {JOIN:g} mm"
+        if np.ptp(loops[-1].points, axis=0).max() <= JOIN and max(map(abs, bulges)) < 1:
+            raise UserError(f"what is drawn at {place(corners[0])} is smaller than {JOIN:g} mm; delete it")
+    closed = (
+        f", {len(gaps)} gap{'s' * (len(gaps) > 1)} of up to {gaps.max():.3g} mm closed" if len(gaps) else ""
     )
+    return Closed(tuple(loops), closed)
 
 
 def _marked(loops: tuple[Loop, ...], mark: Piece) -> tuple[Loop, ...]:

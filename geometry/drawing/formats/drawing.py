@@ -1,7 +1,9 @@
 """A drawing as read: closed curves with labels, marker circles and the file that they come from."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +13,29 @@ from geometry.section.loop import Loop
 LABELS = {"clamp": "base", "base": "base", "front": "front", "contact": "contact", "markers": "markers"}
 """Labels that mean something to the finger, by their names in files."""
 
-UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+UNITS = {
+    **{"um": 1e-3, "mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0},
+    **{"mil": 0.0254, "in": 25.4, "ft": 304.8, "yd": 914.4, "pt": 25.4 / 72, "px": 25.4 / 96},
+}
 """Units of length, mm."""
+
+WORDS = {
+    **{"um": "micrometres", "mm": "millimetres", "cm": "centimetres", "dm": "decimetres", "m": "metres"},
+    **{"mil": "mils", "in": "inches", "ft": "feet", "yd": "yards"},
+}
+"""Names of units in sentences."""
+
+
+class Scale(NamedTuple):
+    """Length of one unit of a file's coordinates, mm, with its name and where it comes from."""
+
+    length: float = 1.0
+    name: str = "mm"
+    origin: str = "assumed"  # or `given`, `of the header`, `of the file`
+
+    def __str__(self) -> str:
+        """In words, such as `mm (assumed)`."""
+        return f"{self.name} ({self.origin})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +65,8 @@ class Drawing:
 
 
 def label_of(text: str) -> str:
-    """A label in lower case."""
-    return text.strip().lower()
+    """A label in lower case, without the number that Fusion adds to names, as in `clamp:2`."""
+    return re.sub(r":\d+$", "", text.strip().lower())
 
 
 def place(point: FloatArray) -> str:

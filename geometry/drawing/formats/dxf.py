@@ -8,68 +8,41 @@ from typing import Any
 
 import ezdxf
 import numpy as np
-from ezdxf.lldxf.const import DXFError
 
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import Marks
-from geometry.drawing.formats.drawing import UNITS, Drawing, label_of
+from geometry.drawing.formats.drawing import Drawing, label_of
+from geometry.drawing.formats.dxf_blocks import Walk, sound
+from geometry.drawing.formats.dxf_file import document_of, scale_of
 from geometry.drawing.formats.pieces import Curve, Piece, arc_through, arcs_along, full_circle, line
 from geometry.errors import UserError
-
-HEADER_UNITS = {1: "in", 4: "mm", 5: "cm", 6: "m", 13: "um"}
-"""Units of length by `$INSUNITS` of the header."""
 
 WITHOUT_GEOMETRY = re.compile("TEXT|MTEXT|DIMENSION|(MULTI)?LEADER|HATCH|IMAGE|ATTDEF|ATTRIB|POINT")
 """Entities that show or annotate and bound nothing."""
 
 
-def read_dxf(path: Path, units: str | None = None) -> Drawing:
+def read_dxf(path: Path, units: str | None = None, tolerance: float | None = None) -> Drawing:
     """The closed curves in the model space of a DXF file.
 
-    Lines, arcs, circles and polylines are exact; ellipses and splines become arcs within 1e-3 mm. Layers that
-    are off or frozen, texts, dimensions and hatches are left out. Circles and points of the layer `markers`
-    are markers, a point of the layer `contact` is the contact.
+    Lines, arcs, circles and polylines are exact; ellipses and splines become arcs within 1e-3 mm. Invisible
+    entities, layers that are off or frozen, texts, dimensions and hatches are left out. Circles and points of
+    the layer `markers` are markers, a point of the layer `contact` is the contact.
 
     Args:
         path: The file.
         units: Unit of its coordinates; None means the header's, or mm if the header has none.
+        tolerance: Largest gap between two ends that is closed, mm; None means 0.001 mm.
     """
-    try:
-        document = ezdxf.filemanagement.readfile(path)
-    except (OSError, DXFError, UnicodeDecodeError) as error:
-        raise UserError(f"it cannot be read as DXF: {str(error).splitlines()[0]}") from None
-    except Exception:  # a damaged file can make ezdxf raise anything
-        raise UserError("it cannot be read as DXF: it is damaged") from None
-    declared = HEADER_UNITS.get(document.units)
-    unit = UNITS[units or declared or "mm"]
-    marks, pieces = Marks(), list[Piece]()
-    for entity in _plain(list(document.modelspace())):
-        layer = label_of(_layer(entity))
-        entry = document.layers.get(_layer(entity)) if _layer(entity) in document.layers else None
-        if layer == "defpoints" or (entry and (entry.is_off() or entry.is_frozen())):
-            continue
-        if not marks.took(*_mark(entity, unit), layer):
-            pieces += _pieces(entity, layer, unit)
-    origin = "given" if units else "of the header" if declared else "assumed"
-    note = f"DXF, {units or declared or 'mm'} ({origin})"
-    return marks.drawing(pieces, unit=unit, note=note)
-
-
-def _plain(entities: list[Any]) -> Iterator[Any]:
-    """The entities, blocks and polylines taken apart."""
-    for entity in entities:
-        if entity.dxftype() in ("INSERT", "LWPOLYLINE", "POLYLINE"):
-            yield from _plain(list(entity.virtual_entities()))
-        else:
-            yield entity
-
-
-def _layer(entity: Any) -> str:
-    """The layer of an entity; `0`, the format's default, where it has none."""
-    try:
-        return str(entity.dxf.layer)
-    except DXFError:  # of a kind that ezdxf does not know
-        return "0"
+    document, repaired = document_of(path)
+    scale = scale_of(document, path, units)
+    marks, pieces, unit = Marks(), list[Piece](), min(scale.length, 1e4)
+    for entity, shown in Walk(document):
+        layer = label_of(shown)
+        with sound(entity, shown):
+            if not marks.took(*_mark(entity, unit), layer):
+                pieces += _pieces(entity, layer, unit)
+    pieces = [piece.scaled(scale.length / unit) for piece in pieces]  # of miles and more, to be refused
+    return marks.drawing(pieces, scale, tolerance, f"DXF, {scale}{repaired}", unit=scale.length)
 
 
 def _mark(entity: Any, unit: float) -> tuple[FloatArray | None, float]:
@@ -114,7 +87,7 @@ def _pieces(entity: Any, layer: str, unit: float) -> Iterator[Piece]:
                 yield piece.scaled(unit)
     elif not WITHOUT_GEOMETRY.fullmatch(kind):
         raise UserError(
-            f"cannot read the {kind} on layer {_layer(entity)!r}; draw the boundary by lines, "
+            f"cannot read the {kind} on layer {layer!r}; draw the boundary by lines, "
             "arcs, circles, polylines, ellipses and splines, or freeze that layer"
         )
 

@@ -1,7 +1,6 @@
 """Reads a Gmsh mesh: a plane triangle mesh as it is, or the section of an extruded body's mesh."""
 
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -10,17 +9,15 @@ from typing import Any, NamedTuple
 
 import gmsh
 import numpy as np
+from scipy.interpolate import BarycentricInterpolator
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.drawing.formats.chain import closed_loops, straightened
-from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, label_of
-from geometry.drawing.formats.pieces import line
+from geometry.drawing.formats.chain import Closed, closed_loops, straightened
+from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, Scale, label_of
+from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, line
 from geometry.drawing.formats.planes import axes_across, plane_text
 from geometry.errors import UserError
 from geometry.mesh.mesher import session
-
-CORNERS = {2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 9: 3, 10: 4, 11: 4, 12: 8, 13: 6, 14: 5, 16: 4, 17: 8, 18: 6}
-"""Number of corners by Gmsh's types of elements, of first and second order."""
 
 FACES = {
     4: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]],
@@ -37,6 +34,10 @@ SAME = 0.01
 """Largest relative difference of an extruded body's two ends, and of its volume: curved sides have facets."""
 
 
+Close = Callable[[Sequence[Piece]], Closed]
+"""Makes closed curves of pieces."""
+
+
 class RawMesh(NamedTuple):
     """Nodes and elements of a file."""
 
@@ -45,26 +46,34 @@ class RawMesh(NamedTuple):
     dimension: int  # 2 or 3
     edges: Mapping[str, IntArray]  # of the physical curves by name, (k, 2) each
     nodes: Mapping[str, IntArray]  # of the physical points by name
+    bent: Mapping[tuple[int, int], list[int]]  # nodes along each bent side by its corners, the lesser first
+
+    @property
+    def used(self) -> IntArray:
+        """Numbers of the nodes that are corners of an element."""
+        return np.asarray(np.unique(np.concatenate([cells.ravel() for cells in self.cells.values()])))
 
 
-def read_msh(path: Path, units: str | None = None) -> Drawing:
-    """The section of a Gmsh mesh.
+def read_msh(path: Path, units: str | None = None, tolerance: float | None = None) -> Drawing:
+    """The section of a Gmsh mesh, of any version of the format.
 
     A plane mesh gives its boundary, with the physical groups as labels; a triangle mesh with the groups
     `base` (or `clamp`) and `contact` is kept as it is. The mesh of an extruded body gives the boundary of its
-    end face; sides in one line are joined.
+    end face; sides in one line are joined. Bent sides of elements of higher order become arcs.
 
     Args:
         path: The file.
         units: Unit of its coordinates; None means mm.
+        tolerance: Largest gap between two ends that is closed, mm; None means 0.001 mm.
     """
-    unit = UNITS[units or "mm"]
-    raw = _raw(path, unit)
-    return _plane_mesh(raw, unit) if raw.dimension == 2 else _extruded_mesh(raw, unit)
+    scale = Scale(UNITS[units], units, "given") if units else Scale()
+    raw = _raw(path, scale.length)
+    drawing = _plane_mesh if raw.dimension == 2 else _extruded_mesh
+    return drawing(raw, lambda pieces: closed_loops(pieces, scale=scale, tolerance=tolerance), scale.length)
 
 
-def _plane_mesh(raw: RawMesh, unit: float) -> Drawing:
-    extent = np.ptp(raw.points, axis=0)
+def _plane_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
+    extent = np.ptp(raw.points[raw.used], axis=0)
     across = int(extent.argmin())
     if extent[across] > FLAT:
         raise UserError("its surface is not plane; give a mesh of a plane section or of a solid")
@@ -73,12 +82,12 @@ def _plane_mesh(raw: RawMesh, unit: float) -> Drawing:
     groups = sorted(raw.edges, key=lambda name: name in ("base", "contact"))  # these win over `front`
     named = {tuple(sorted(edge)): name for name in groups for edge in raw.edges[name].tolist()}
     sides = [edge for count, cells in raw.cells.items() for edge in _sides(cells, count)]
-    pieces = [line(points[first], points[last], named.get((first, last), "")) for first, last in _once(sides)]
-    loops = tuple(straightened(loop, FLAT) for loop in closed_loops(pieces))
+    pieces = [piece for side in _once(sides) for piece in _pieces(raw, points, side, named.get(side, ""))]
+    loops, gaps = close(pieces)
     markers = raw.nodes.get("markers", np.empty(0, dtype=np.int64))
     contact = raw.nodes.get("contact", np.empty(0, dtype=np.int64))
     ready = None
-    if set(raw.cells) == {3} and {"base", "contact"} <= set(raw.edges):
+    if set(raw.cells) == {3} and {"base", "contact"} <= set(raw.edges) and not raw.bent:
         used, triangles = np.unique(raw.cells[3], return_inverse=True)
         number = np.full(len(points), -1)
         number[used] = np.arange(len(used))
@@ -88,16 +97,16 @@ def _plane_mesh(raw: RawMesh, unit: float) -> Drawing:
             edges={name: number[edges] for name, edges in raw.edges.items()},
         )
     return Drawing(
-        loops=loops,
+        loops=tuple(straightened(loop, FLAT) for loop in loops),
         unit=unit,
-        note="MSH, triangles as they are" if ready else "MSH, boundary of a plane mesh",
+        note=f"MSH, {'triangles as they are' if ready else 'boundary of a plane mesh'}{gaps}",
         markers=points[markers],
         contact=points[contact[0]] if len(contact) else None,
         mesh=ready,
     )
 
 
-def _extruded_mesh(raw: RawMesh, unit: float) -> Drawing:
+def _extruded_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
     faces = _once(
         [part for count, cells in raw.cells.items() for face in FACES[count] for part in _rows(cells, face)]
     )
@@ -107,7 +116,7 @@ def _extruded_mesh(raw: RawMesh, unit: float) -> Drawing:
     volume = _volume(raw)
     for normal in _main_directions(normals, areas):
         slope, heights = np.abs(normals @ normal), raw.points @ normal
-        low, high = float(heights.min()), float(heights.max())
+        low, high = float(heights[raw.used].min()), float(heights[raw.used].max())
         caps = [
             [
                 number
@@ -122,14 +131,26 @@ def _extruded_mesh(raw: RawMesh, unit: float) -> Drawing:
             continue
         points = raw.points @ axes_across(normal).T
         sides = [side for which in caps[0] for side in _sides(np.array([faces[which]]), len(faces[which]))]
-        pieces = [line(points[first], points[last], "") for first, last in _once(sides)]
+        loops, gaps = close([piece for side in _once(sides) for piece in _pieces(raw, points, side, "")])
         return Drawing(
-            loops=tuple(straightened(loop, FLAT) for loop in closed_loops(pieces)),
+            loops=tuple(straightened(loop, FLAT) for loop in loops),
             unit=unit,
-            note=f"MSH, extruded by {high - low:.6g} mm, at {plane_text(normal, low)}",
+            note=f"MSH, extruded by {high - low:.6g} mm, at {plane_text(normal, low)}{gaps}",
             depth=high - low,
         )
     raise UserError("its body is not extruded; give a mesh of the plane section")
+
+
+def _pieces(raw: RawMesh, points: FloatArray, side: tuple[int, ...], label: str) -> list[Piece]:
+    """A side of an element in the plane: a line, the arc through three nodes, or arcs through more."""
+    first, last = side
+    if (first, last) not in raw.bent:
+        return [line(points[first], points[last], label)]
+    nodes = points[[first, *raw.bent[first, last], last]]
+    if len(nodes) == 3:
+        return [arc_through(nodes[0], nodes[1], nodes[2], label)]
+    curve = BarycentricInterpolator(np.linspace(0, 1, len(nodes)), nodes)
+    return list(arcs_along(lambda parameters: np.asarray(curve(parameters)), 0.0, 1.0, label))
 
 
 def _main_directions(normals: FloatArray, areas: FloatArray) -> list[FloatArray]:
@@ -186,26 +207,42 @@ def _raw(path: Path, unit: float) -> RawMesh:
         tags, coordinates, _ = mesh.getNodes()
         number = np.full(int(tags.max(initial=0)) + 1, -1)
         number[tags.astype(np.int64)] = np.arange(len(tags))
+        points = unit * coordinates.reshape(-1, 3)
         by_dimension: dict[int, dict[int, list[IntArray]]] = {2: {}, 3: {}}
+        bent = dict[tuple[int, int], list[int]]()
         for dimension in (2, 3):
             for kind in mesh.getElementTypes(dimension):
-                if kind not in CORNERS:
-                    name = mesh.getElementProperties(kind)[0]
+                name, _, order, whole, _, corners = mesh.getElementProperties(kind)
+                if corners not in ((3, 4) if dimension == 2 else FACES):
                     raise UserError(f"it holds elements of type {name}, which cannot be read")
                 _, nodes = mesh.getElementsByType(kind)
-                whole = int(mesh.getElementProperties(kind)[3])
-                cells = _numbers(number, nodes.reshape(-1, whole)[:, : CORNERS[kind]])
-                by_dimension[dimension].setdefault(CORNERS[kind], []).append(cells)
+                cells = _numbers(number, nodes.reshape(-1, int(whole))[:, :corners])
+                by_dimension[dimension].setdefault(int(corners), []).append(cells)
+                if order > 1:
+                    sides = mesh.getElementEdgeNodes(kind).reshape(-1, int(order) + 1)
+                    bent |= _bent(points, _numbers(number, sides))
         dimension = 3 if by_dimension[3] else 2
         if not by_dimension[dimension]:
             raise UserError("it holds no triangles, quadrilaterals or solid elements")
         return RawMesh(
-            points=unit * coordinates.reshape(-1, 3),
+            points=points,
+            bent=bent,
             cells={count: np.concatenate(parts) for count, parts in by_dimension[dimension].items()},
             dimension=dimension,
             edges={name: _numbers(number, nodes.reshape(-1, 2)) for name, nodes in _groups(1)},
             nodes={name: _numbers(number, nodes.ravel()) for name, nodes in _groups(0)},
         )
+
+
+def _bent(points: FloatArray, sides: IntArray) -> dict[tuple[int, int], list[int]]:
+    """Inner nodes of the sides (k, order + 1), corners first, that are more than `FLAT` off their chord."""
+    start, end = points[sides[:, 0]], points[sides[:, 1]]
+    shares = np.arange(1, sides.shape[1] - 1) / (sides.shape[1] - 1)
+    off = points[sides[:, 2:]] - (start[:, None] + shares[:, None] * (end - start)[:, None])
+    found = {}
+    for first, last, *inner in sides[np.linalg.norm(off, axis=2).max(axis=1) > FLAT].tolist():
+        found[min(first, last), max(first, last)] = inner if first < last else inner[::-1]
+    return found
 
 
 def _numbers(number: IntArray, tags: IntArray) -> IntArray:
@@ -234,11 +271,17 @@ def _opened(path: Path) -> Iterator[Any]:
     """Gmsh's mesh of a file. Gmsh gets a copy, because it runs a script FILE.opt that lies beside a mesh."""
     with session(), TemporaryDirectory() as folder:
         copy = Path(folder) / "mesh.msh"
-        shutil.copyfile(path, copy)
-        with copy.open("rb") as file:
-            # Gmsh runs any other file as a script, which may start programs.
-            if not file.read(16).startswith((b"$MeshFormat", b"$Comments")):
-                raise UserError("it is no Gmsh mesh: its first line is not $MeshFormat")
+        content = path.read_bytes().removeprefix(b"\xef\xbb\xbf").lstrip()
+        # Gmsh runs any other file as a script, which may start programs.
+        if not content.startswith((b"$MeshFormat", b"$Comments", b"$NOD\n", b"$NOD\r")):
+            raise UserError("it is no Gmsh mesh: its first line is not $MeshFormat or $NOD; save it as .msh")
+        end = b"$ENDELM" if content.startswith(b"$NOD") else b"$EndElements"
+        if end not in content:
+            raise UserError(
+                "it cannot be read as a Gmsh mesh: it ends before "
+                f"{end.decode()}, so that it was cut off; save it again"
+            )
+        copy.write_bytes(content)
         try:
             gmsh.merge(str(copy))
         except Exception as error:  # Gmsh raises no narrower class

@@ -1,28 +1,25 @@
 """Reads the section of a STEP file: the cap of an extruded solid, or the cut of a solid with a plane.
 
-With `geometry.cad` the only module that imports CadQuery.
+With `step_parts` and `geometry.cad` the only module that imports CadQuery.
 """
 
-import re
 from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
 import cadquery as cq
 import numpy as np
-from OCP.IFSelect import IFSelect_ReturnStatus
-from OCP.STEPConstruct import STEPConstruct_ExternRefs
-from OCP.STEPControl import STEPControl_Reader
+from OCP.BRep import BRep_Tool
+from OCP.GeomLProp import GeomLProp_SLProps
 
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import closed_loops
-from geometry.drawing.formats.drawing import UNITS, Drawing
+from geometry.drawing.formats.drawing import UNITS, Drawing, Scale
 from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
 from geometry.drawing.formats.planes import axes_across, plane_of, plane_text
+from geometry.drawing.formats.step_parts import parts_of
 from geometry.errors import UserError
-
-MARKER = re.compile(r"marker[-_ ]?\d+$", re.IGNORECASE)
-"""Names of the parts that are markers."""
 
 PARALLEL = 1e-6
 """Largest sine of the angle of two parallel directions."""
@@ -34,77 +31,64 @@ class Cut(NamedTuple):
     faces: Sequence[cq.Face]
     normal: FloatArray  # of the plane, unit vector (3,)
     offset: float  # of the plane from the origin along the normal, mm
-    depth: float | None  # of the extrusion, mm; None for a solid that is not extruded
+    depth: float  # of the solid along the normal, mm
+    is_extruded: bool = True
 
 
-def read_step(path: Path, units: str | None = None, plane: str | None = None) -> Drawing:
+def read_step(
+    path: Path, units: str | None = None, tolerance: float | None = None, plane: str | None = None
+) -> Drawing:
     """The section of the one solid of a STEP file, with the markers that are parts called `marker-1`, ...
 
     Args:
         path: The file.
         units: Unit in which the file's numbers are read; None means mm.
+        tolerance: Largest gap between two ends that is closed, mm; None means 0.001 mm.
         plane: Plane of the cut, such as `z = 6`; None means across an extruded solid.
     """
-    bodies, markers = _parts(path)
+    parts = parts_of(path)
+    bodies = [part for part in parts if not part.is_marker]
+    markers = [part.solid for part in parts if part.is_marker]
     if len(bodies) != 1:
-        found = ", ".join(f"{name or 'without name'} ({solid.Volume():.4g} mm3)" for name, solid in bodies)
+        found = ", ".join(map(str, bodies[:12])) + (", ..." if len(bodies) > 12 else "")
         raise UserError(
             f"it holds {len(bodies)} solids besides markers{': ' + found if found else ''}; keep "
             "one, and call the others marker-1, marker-2, ... if they are markers"
         )
-    solid = _filled(bodies[0][1], markers)
-    unit = UNITS[units or "mm"]
+    solid = _filled(bodies[0].solid, markers)
+    scale = Scale(UNITS[units], units, "given") if units else Scale(origin="of the file")
+    unit = scale.length
     cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
     axes = axes_across(cut.normal)
     pieces = [
         piece.scaled(unit)
-        for face in cut.faces
+        for face in _united(cut.faces)
         for wire in face.Wires()
         for edge in wire.Edges()
         for piece in _pieces(edge, axes, unit)
     ]
     centres, diameters, heights = _discs(markers, axes, cut.normal)
-    how = f"extruded by {cut.depth * unit:.6g} mm" if cut.depth else "cut"
+    depth = f"{cut.depth * unit:.6g} mm"
+    how = f"extruded by {depth}" if cut.is_extruded else f"cut, {depth} across"
+    closed = closed_loops(pieces, scale=scale, tolerance=tolerance)
     return Drawing(
-        loops=closed_loops(pieces),
+        loops=closed.loops,
         unit=unit,
-        note=f"STEP, {how}, at {plane_text(cut.normal, cut.offset)}",
+        note=f"STEP, {how}, at {plane_text(cut.normal, cut.offset)}{closed.note}",
         markers=centres * unit,
         marker_diameter=float(np.mean(diameters)) * unit if markers else None,
         marker_height=float(np.mean(heights)) * unit if markers else None,
-        depth=cut.depth * unit if cut.depth else None,
+        depth=cut.depth * unit,
     )
 
 
-def _parts(path: Path) -> tuple[list[tuple[str, cq.Solid]], list[cq.Solid]]:
-    """Solids with their names, and those that are markers."""
-    _check_whole(path)
-    try:
-        named = [(name.rsplit("/", 1)[-1], shape) for shape, name, _, _ in cq.Assembly.importStep(str(path))]
-    except ValueError:  # a single part is no assembly
-        try:
-            found = cq.importers.importStep(str(path)).vals()
-            named = [("", shape) for shape in found if isinstance(shape, cq.Shape)]
-        except ValueError as error:
-            raise UserError(f"it cannot be read as STEP: {error}") from None
-    solids = [(name, solid) for name, shape in named for solid in shape.Solids()]
-    if not solids:
-        raise UserError("it holds no solid; export the body as a solid")
-    bodies = [(name, solid) for name, solid in solids if not MARKER.match(name)]
-    return bodies, [solid for name, solid in solids if MARKER.match(name)]
-
-
-def _check_whole(path: Path) -> None:
-    """Refuse a file whose parts are in other files, of any folder, which OpenCASCADE would read, too."""
-    reader = STEPControl_Reader()
-    if reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone:
-        others = STEPConstruct_ExternRefs(reader.WS())
-        others.LoadExternRefs()
-        if others.NbExternRefs():
-            raise UserError(
-                f"it refers to another file, {others.FileName(1)!r}, which is not read; export the "
-                "whole as one file"
-            )
+def _united(faces: Sequence[cq.Face]) -> Sequence[cq.Face]:
+    """Faces of one plane without the edges between them."""
+    if len(faces) < 2:
+        return faces
+    whole = faces[0].fuse(*faces[1:]).clean().Faces()
+    area, before = (sum(face.Area() for face in each) for each in (whole, faces))
+    return whole if 0 < area < before * (1 + 1e-9) else faces
 
 
 def _filled(body: cq.Solid, markers: Sequence[cq.Solid]) -> cq.Solid:
@@ -151,19 +135,25 @@ def _is_extruded(solid: cq.Solid, normal: FloatArray) -> bool:
         if face.geomType() == "PLANE":
             slopes = [abs(float(_array(face.normalAt()) @ normal))]
         else:
-            low_u, high_u, low_v, high_v = face._uvBounds()
-            u, v = (
-                grid.ravel()
-                for grid in np.meshgrid(np.linspace(low_u, high_u, 5), np.linspace(low_v, high_v, 5))
-            )
-            slopes = [abs(float(_array(each) @ normal)) for each in face.normals(u, v)[0]]
-        if not (max(slopes) < PARALLEL or min(slopes) > 1 - PARALLEL):
+            slopes = [abs(float(each @ normal)) for each in _normals(face)]
+        if slopes and not (max(slopes) < PARALLEL or min(slopes) > 1 - PARALLEL):
             return False
     return True
 
 
+def _normals(face: cq.Face) -> Iterator[FloatArray]:
+    """Normals over a face, where they are defined: not at the tip of a cone or of a degenerate patch."""
+    low_u, high_u, low_v, high_v = face._uvBounds()
+    surface = GeomLProp_SLProps(BRep_Tool.Surface_s(face.wrapped), 1, 1e-9)
+    for u, v in product(np.linspace(low_u, high_u, 5), np.linspace(low_v, high_v, 5)):
+        surface.SetParameters(float(u), float(v))
+        if surface.IsNormalDefined():
+            normal = surface.Normal()
+            yield np.array([normal.X(), normal.Y(), normal.Z()])
+
+
 def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
-    """The cut of a solid with a plane; with its depth, where the solid is extruded across the plane."""
+    """The cut of a solid with a plane; its depth is the solid's extent across the plane."""
     low, high = _extent(solid, normal)
     if not low < offset < high:
         raise UserError(
@@ -176,7 +166,7 @@ def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
     middle = np.array([0.5 * (box.xmin + box.xmax), 0.5 * (box.ymin + box.ymax), 0.5 * (box.zmin + box.zmax)])
     shift = middle - normal * (middle @ normal)
     faces = plane.moved(cq.Location(cq.Vector(*shift))).intersect(solid).Faces()
-    return Cut(faces, normal, offset, high - low if _is_extruded(solid, normal) else None)
+    return Cut(faces, normal, offset, high - low, _is_extruded(solid, normal))
 
 
 def _flat_faces(solid: cq.Solid, normal: FloatArray) -> list[cq.Face]:

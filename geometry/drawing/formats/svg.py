@@ -1,8 +1,7 @@
 """Reads the curves of an SVG file. The names of its groups and elements are the labels."""
 
-import re
 from collections.abc import Callable, Iterable, Iterator
-from math import inf
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -12,15 +11,19 @@ import svgelements
 
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import Marks
-from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, label_of
+from geometry.drawing.formats.drawing import LABELS, Drawing, label_of
 from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
+from geometry.drawing.formats.svg_tree import NAMESPACE, drawn, scale_of, tag_of
 from geometry.errors import UserError
 
-LENGTHS = {**UNITS, "": 25.4 / 96, "px": 25.4 / 96, "pt": 25.4 / 72, "pc": 25.4 / 6}
-"""Units of `width` and `height`, mm; a number without one is in pixels."""
+ASSUMED = '(assumed: 96 pixels to an inch; give units, such as "pt" for 72)'
+"""Said of a file whose width and height have no unit."""
+
+UNSEEN = ("hidden", "collapse")
+"""Values of `visibility` of what does not show."""
 
 
-def read_svg(path: Path, units: str | None = None) -> Drawing:
+def read_svg(path: Path, units: str | None = None, tolerance: float | None = None) -> Drawing:
     """The closed curves of an SVG file; x as in the file, y upward.
 
     Lines and circular arcs are exact, other curves become arcs within 1e-3 mm; transformations are applied.
@@ -30,28 +33,26 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     Args:
         path: The file.
         units: Unit of the user space; None means by `width`, `height` and `viewBox`, or pixels without them.
+        tolerance: Largest gap between two ends that is closed, mm; None means 0.001 mm.
     """
+    tree = None
     try:
         root = ET.parse(path).getroot()
-        _check_copies(root)
-        parsed = svgelements.SVG.parse(str(path), reify=False)
+        if (tag := tag_of(root)) != "svg":
+            raise UserError(f"its outermost element is {tag or root.tag}, not svg")
+        scale = scale_of(root, units)
+        tree = drawn(root)
+        parsed = svgelements.SVG.parse(BytesIO(ET.tostring(tree)), reify=False)
+        back = ~svgelements.Matrix(parsed.viewbox_transform or "")
     except (OSError, ET.ParseError, ValueError, UnicodeDecodeError) as error:
-        raise UserError(f"it cannot be read as SVG: {error}") from None
+        raise UserError(f"it cannot be read as SVG: {error or _unsound(tree)}") from None
     except RecursionError:
         raise UserError("it cannot be read as SVG: it is nested too deeply") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError):  # of svgelements, at what is no SVG
-        raise UserError("it cannot be read as SVG: an attribute has no sound value") from None
-    if not isinstance(parsed, svgelements.SVG):
-        raise UserError(f"it cannot be read as SVG: its outermost element is {_tag(root)}, not svg")
-    _check_view_box(parsed)
-    try:
-        back = ~svgelements.Matrix(parsed.viewbox_transform or "")
-    except ZeroDivisionError:
-        raise UserError("its width or height is zero, or no length") from None
-    unit = UNITS[units] if units else _unit(parsed)
+        raise UserError(f"it cannot be read as SVG: {_unsound(tree)}") from None
     marks, pieces = Marks(), list[Piece]()
     for element, label in _shapes(parsed, ""):
-        place = _Transformation(element.transform * back, unit)
+        place = _Transformation(element.transform * back, scale.length)
         if not place.is_finite:
             raise UserError(f"the transformation of {_described(element)} is not finite")
         try:
@@ -59,45 +60,19 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
                 pieces += _pieces(element.segments(transformed=False), label, place)
         except TypeError:  # svgelements reads a coordinate that is no number as None
             raise UserError(f"a coordinate of {_described(element)} is no number") from None
-    return marks.drawing(pieces, note=f"SVG, {unit:.6g} mm in a user unit{' (given)' if units else ''}")
+    said = {"given": " (given)", "assumed": f" {ASSUMED}"}.get(scale.origin, "")
+    return marks.drawing(pieces, scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
 
 
-def _check_copies(root: ET.Element) -> None:
-    """Refuse elements that contain themselves, and copies of copies whose number grows without limit."""
-    by_id = {element.get("id"): element for element in root.iter()}
-    sizes: dict[ET.Element, float] = {}
-
-    def size(element: ET.Element) -> float:
-        if element not in sizes:
-            sizes[element] = inf  # while it is open, that is, if it contains itself
-            # svgelements, too, takes any sign in place of the link's #
-            link = element.get("href", element.get("{http://www.w3.org/1999/xlink}href", ""))[1:]
-            copied = by_id.get(link) if _tag(element) == "use" else None
-            sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
-        return sizes[element]
-
-    if (count := size(root)) > 100_000:  # a copy counts as often as it is made
-        what = "an element contains itself" if count == inf else f"its copies make {count:.0f} elements"
-        raise UserError(f"{what}; draw each curve once")
-
-
-def _tag(element: ET.Element) -> str:
-    """Name of an element without its namespace; empty for a comment."""
-    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
-
-
-def _check_view_box(parsed: Any) -> None:
-    """Raise a `UserError` for a viewBox that is not four numbers, which the parser would pass over."""
-    if (given := parsed.values.get("viewBox")) is None:
-        return
-    try:
-        *_, width, height = numbers = [float(text) for text in re.split(r"[\s,]+", str(given).strip())]
-    except ValueError:
-        numbers, width, height = [], 0.0, 0.0
-    if len(numbers) != 4 or not (0 < width < inf and 0 < height < inf):
-        raise UserError(
-            f"viewBox = {str(given)!r} is not four numbers with width and height, such as 0 0 60 10"
-        )
+def _unsound(tree: ET.Element | None) -> str:
+    """The attribute that svgelements cannot read, in words, as far as it is a path's."""
+    for path in () if tree is None else tree.iter(f"{NAMESPACE}path"):
+        try:
+            svgelements.Path(path.get("d", ""))
+        except Exception:  # of svgelements
+            name = repr(path.get("id")) if path.get("id") else "a path without an id"
+            return f"the attribute d of {name} has no sound value"
+    return "an attribute has no sound value"
 
 
 def _described(element: Any) -> str:
@@ -107,39 +82,12 @@ def _described(element: Any) -> str:
     return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} without an id"
 
 
-def _unit(parsed: Any) -> float:
-    """Length of a user unit, mm; refused if width and height give two different ones or are no lengths."""
-    box = parsed.viewbox
-    units = []
-    for text, extent in (
-        (parsed.values.get("width"), box and box.width),
-        (parsed.values.get("height"), box and box.height),
-    ):
-        found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-z]*)\s*", str(text))
-        if found and found[2] in LENGTHS:
-            try:
-                length = float(found[1])
-            except ValueError:
-                length = 0.0
-            if not 0 < length < inf:
-                raise UserError(f"{text!r} is no width or height; write for instance 60mm")
-            units.append(length * LENGTHS[found[2]] / float(extent) if extent else LENGTHS[""])
-    if not units:
-        return LENGTHS[""]
-    if max(units) > min(units) * 1.001:
-        raise UserError(
-            f"width and height give {units[0]:.6g} and {units[1]:.6g} mm in a user unit; "
-            "make them agree with the viewBox"
-        )
-    return float(units[0])
-
-
 def _shapes(group: Any, label: str) -> Iterator[tuple[Any, str]]:
     for element in group:
         name = _name(element) or label
         if isinstance(element, svgelements.Group | svgelements.Use):
             yield from _shapes(element, name)
-        elif isinstance(element, svgelements.Shape) and element.values.get("visibility") != "hidden":
+        elif isinstance(element, svgelements.Shape) and element.values.get("visibility") not in UNSEEN:
             yield element, name
 
 

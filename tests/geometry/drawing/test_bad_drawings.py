@@ -41,8 +41,8 @@ def refused(path: Path, message: str, **description: object) -> None:
         ([DUMBBELL], {"clamp": [[0, 0], [0, -10]]}, r"the wall at \(.*\) is 0.0\d* mm thin"),
         ([BEAM, rectangle(40, -5, 1e-5, 1e-5)], {}, "is smaller than 0.001 mm; delete"),
         # units
-        ([[(x / 1e5, y / 1e5) for x, y in BEAM]], {}, "metres for millimetres"),
-        ([BEAM], {"units": "m"}, "give units"),
+        ([[(x / 1e5, y / 1e5) for x, y in BEAM]], {}, 'give units = "m" for 1 mm'),
+        ([BEAM], {"units": "m"}, r'measures 1e\+05 mm, not 1 to 2000 mm; give units = "mm" for 100 mm'),
         # the clamp
         ([BEAM], {"clamp": "jaw"}, "nothing is clamped: no piece of the outline is called 'jaw'"),
         ([BEAM], {"clamp": [[0, 0], [0, 0]]}, "has no length"),
@@ -132,7 +132,11 @@ MARKED = '<rect width="50" height="9"/><g id="markers">{}</g>'
         (HEAD, '<path d="M1e12 0h60v10h-60Z"/>', FAR),
         (HEAD, '<rect transform="scale(1e999)" width="60" height="9"/>', "of a rect without an id is not"),
         (HEAD, '<ellipse transform="scale(1e999)" rx="60" ry="9"/>', "of an ellipse without an id is not"),
-        ('width="10E" height="10E"', '<path d="M0 0H9V9Z"/>', "'10E' is no width or height"),
+        (
+            'width="10E" height="10E"',
+            '<path d="M0 0H9V9Z"/>',
+            "width = '10E' is no length of paper; write such as 60mm, or give",
+        ),
         ('width="-10"', '<path d="M0 0H9V9Z"/>', "'-10' is no width or height"),
         *(
             (f'viewBox="{box}"', "", f"'{box}' {BOX}")
@@ -142,10 +146,11 @@ MARKED = '<rect width="50" height="9"/><g id="markers">{}</g>'
         (
             'width="30mm" height="(0m1" viewBox="0 0 30 10"',
             '<path d="M0 0H30L0 10Z"/>',
-            "its width or height is zero, or no length",
-        ),  # zero height
-        ("", '<path t="M0 0H30L0 10Z"/>', "an attribute has no sound value"),  # no data
-        ("", '<path d="V0L0 10Z"/>', "an attribute has no sound value"),  # nowhere to start from
+            r"height = '\(0m1' is no length of paper",
+        ),
+        ("", '<path t="M0 0H30L0 10Z"/>', "there is no line or arc in it"),  # no data
+        ("", '<path id="a" d="V0L0 10Z"/>', "the attribute d of 'a' has no sound"),  # nowhere to start from
+        ("", '<path d="V0L0 10Z"/>', "the attribute d of a path without an id has no sound value"),
         # svgelements takes any sign for the # before a name
         *((HEAD, f'<g id="a"><use href="{sign}a"/><rect/></g>', "element contains itself") for sign in "#'"),
         (HEAD, '<g id="contact"><rect width="20" height="5" rx="0.2"/></g>', "call only the part contact"),
@@ -191,7 +196,9 @@ def test_a_step_file_that_was_cut_off_is_one_line(tmp_path):
     """OpenCASCADE prints about it to the standard output, on which the child process answers."""
     path = tmp_path / "cut.stp"
     path.write_bytes((FINRAY / "Finray_8.stp").read_bytes()[:3000])
-    with pytest.raises(UserError, match=r"cut\.stp: it cannot be read as STEP: STEP File could not"):
+    with pytest.raises(
+        UserError, match=r"cut\.stp: it cannot be read as STEP: it is damaged or cut off; export"
+    ):
         drawn_finger(path, Description(), cache_dir=tmp_path / "cache")
 
 

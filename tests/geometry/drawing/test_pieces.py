@@ -25,7 +25,7 @@ def test_arc_through_three_points_has_their_circle():
 
 
 def test_arcs_stay_near_the_ellipse():
-    loop = closed_loops(list(arcs_along(ellipse, 0, 2 * np.pi, "")))[0]
+    loop = closed_loops(list(arcs_along(ellipse, 0, 2 * np.pi, ""))).loops[0]
     points = np.concatenate([loop.along(k, np.linspace(0, 1, 50)) for k in range(len(loop.points))])
     gaps, _ = cKDTree(ellipse(np.linspace(0, 2 * np.pi, 200_001))).query(points)
     assert 1e-5 < gaps.max() <= DEVIATION  # approximated, and no more than needed
@@ -42,7 +42,7 @@ def test_pieces_in_any_order_and_direction_are_chained():
         line(corners[3] + [0, 4e-4], corners[0], "base"),  # an end within the tolerance
         line(corners[2], corners[3], ""),
     ]
-    first, second = sorted(closed_loops(pieces), key=lambda loop: -abs(loop.area))
+    first, second = sorted(closed_loops(pieces).loops, key=lambda loop: -abs(loop.area))
     assert abs(first.area) == pytest.approx(50, abs=5e-3)
     assert sorted(first.names) == ["", "", "back", "base"]
     assert abs(second.area) == pytest.approx(np.pi)
@@ -51,7 +51,7 @@ def test_pieces_in_any_order_and_direction_are_chained():
 def test_a_line_on_top_of_the_boundary_names_the_part_under_it():
     corners = [[0, 0], [10, 0], [10, 5], [0, 5], [0, 0]]
     pieces = [line(a, b, "outline") for a, b in pairwise(corners)]
-    marked = closed_loops([*pieces, line([7, 5], [4, 5], "contact")], frozenset({"contact"}))[0]
+    marked = closed_loops([*pieces, line([7, 5], [4, 5], "contact")], frozenset({"contact"})).loops[0]
     named = [marked.ends[k].tolist() for k in marked.pieces("contact")]
     assert named == [[[7.0, 5.0], [4.0, 5.0]]]
     assert marked.area == pytest.approx(50)

@@ -58,7 +58,8 @@ def test_a_solid_that_is_not_extruded_is_cut(tmp_path):
     with pytest.raises(UserError, match="not extruded; give the plane"):
         read_drawing(path)
     drawing = read_drawing(path, plane="z = 4")
-    assert drawing.depth is None
+    assert drawing.depth == pytest.approx(20)  # across the plane
+    assert "cut, 20 mm across" in drawing.note
     assert area(drawing) == pytest.approx(np.pi * 81, rel=1e-9)
 
 

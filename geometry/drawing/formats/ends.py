@@ -1,0 +1,169 @@
+"""Finds out which ends of pieces are one, and says where a boundary is open, forks or is drawn twice."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.drawing.formats.drawing import UNITS, WORDS, Scale, place
+from geometry.drawing.formats.pieces import FARTHEST, Piece, is_near
+from geometry.errors import UserError
+
+JOIN = 1e-3
+"""Largest distance of two ends that count as one, mm, where no tolerance is given."""
+
+LARGEST_TOLERANCE = 0.5
+"""Largest tolerance that may be given, mm."""
+
+EQUAL = 1e-8
+"""Distance of ends that differ by rounding only, mm."""
+
+LARGEST = 2000.0
+"""Largest extent of a section, mm."""
+
+USUAL = (10.0, 500.0)
+"""Extents of fingers, mm: a header that gives another one where mm give such a one is doubted."""
+
+
+class Joined(NamedTuple):
+    """Pieces with length, the nodes at their ends, and the gaps that were closed between them."""
+
+    pieces: list[Piece]
+    nodes: IntArray  # (p, 2)
+    places: FloatArray  # of the nodes, (n, 2), mm
+    gaps: FloatArray  # widths of the gaps wider than `JOIN`, mm
+
+
+def joined(pieces: Sequence[Piece], tolerance: float = JOIN) -> Joined:
+    """Pieces whose ends are nodes.
+
+    Equal ends are one node. A loose end is joined with the nearest other loose end within the tolerance, the
+    nearest first, so that short lines stay: no end is joined with more than one other.
+    """
+    ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
+    node = _clusters(ends, cKDTree(ends).query_pairs(EQUAL, output_type="ndarray"))
+    _, first = np.unique(node, return_index=True)
+    places = ends[first]
+    nodes = node.reshape(-1, 2).astype(np.int64)
+    long = nodes[:, 0] != nodes[:, 1]
+    lost = np.setdiff1d(nodes[~long], nodes[long])
+    if len(lost):
+        raise UserError(f"what is drawn at {place(places[lost[0]])} is smaller than {JOIN:g} mm; delete it")
+    kept = [piece for piece, is_long in zip(pieces, long, strict=True) if is_long]
+    links, gaps = _matches(kept, nodes[long], places, tolerance)
+    same = _clusters(places, links)
+    _, first = np.unique(same, return_index=True)
+    return Joined(kept, same[nodes[long]].astype(np.int64), places[first], gaps[gaps > JOIN])
+
+
+def _clusters(points: FloatArray, pairs: IntArray) -> IntArray:
+    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
+def _matches(
+    pieces: Sequence[Piece], nodes: IntArray, places: FloatArray, tolerance: float
+) -> tuple[IntArray, FloatArray]:
+    """Pairs of nodes (k, 2) that are one: loose ends, with their distances, mm, then forks at loose ends."""
+    loose = np.bincount(nodes.ravel(), minlength=len(places)) == 1
+    own = {
+        tuple(sorted(ends))
+        for ends, piece in zip(nodes.tolist(), pieces, strict=True)
+        if abs(piece.bulge) < 1
+    }
+    links, gaps, matched = list[IntArray](), list[float](), np.zeros(len(places), dtype=bool)
+    for pair, gap in _near(places, np.flatnonzero(loose), tolerance):
+        if not matched[pair].any() and tuple(pair.tolist()) not in own:
+            links.append(pair)
+            gaps.append(gap)
+            matched[pair] = True
+    lengths = np.linalg.norm(places[nodes[:, 0]] - places[nodes[:, 1]], axis=1)
+    stray = loose & ~matched & np.isin(np.arange(len(places)), nodes[lengths > 10 * JOIN])
+    links += [pair for pair, _ in _near(places, np.arange(len(places)), JOIN) if stray[pair].any()]
+    return np.array(links, dtype=np.int64).reshape(-1, 2), np.array(gaps)
+
+
+def _near(places: FloatArray, numbers: IntArray, reach: float) -> Iterator[tuple[IntArray, float]]:
+    """Pairs (2,) of nodes of some numbers within a distance, and their distances, mm; the nearest first."""
+    pairs = np.sort(numbers[cKDTree(places[numbers]).query_pairs(reach, output_type="ndarray")], axis=1)
+    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+    for which in np.argsort(apart, kind="stable"):
+        yield pairs[which], float(apart[which])
+
+
+def check_extent(pieces: Sequence[Piece], scale: Scale) -> None:
+    """Raise a `UserError` if there are no pieces, or they are too small, too large or too far away."""
+    if not pieces:
+        raise UserError("there is no line or arc in it; draw the boundary of the section")
+    ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
+    extent = float(np.ptp(ends, axis=0).max()) if np.isfinite(ends).all() else np.inf
+    drawn = extent / scale.length
+    better = [
+        name
+        for low, high in (USUAL, (1.0, LARGEST))
+        for name in ("mm", "in", "cm", "m", "um")
+        if low <= drawn * UNITS[name] <= high
+    ]
+    other = f'; give units = "{better[0]}" for {drawn * UNITS[better[0]]:.4g} mm' if better else "; scale it"
+    said = WORDS.get(scale.name, scale.name)
+    if 1 <= extent <= LARGEST and is_near(ends):
+        doubted = scale.origin == "of the header" and USUAL[0] <= drawn <= USUAL[1]
+        if doubted and scale.length != 1 and not USUAL[0] / 2 <= extent <= USUAL[1]:
+            raise UserError(
+                f"its header says {said}, in which it measures {extent:.4g} mm{other}"
+                + (f', or units = "{scale.name}" if it is so' if scale.name in UNITS else "")
+            )
+        return
+    if 0 < drawn <= FARTHEST and not 1 <= extent <= LARGEST:
+        first = f"its header says {said}: " if scale.origin == "of the header" else ""
+        raise UserError(f"{first}the drawing measures {extent:.4g} mm, not 1 to {LARGEST:g} mm{other}")
+    raise UserError(f"a coordinate is not finite or beyond {FARTHEST:g} mm; draw the section near the origin")
+
+
+def check_twice(found: Joined) -> None:
+    """Raise a `UserError` if a piece is drawn twice."""
+    seen: dict[tuple[int, int, float], int] = {}
+    for number, (piece, (start, end)) in enumerate(zip(found.pieces, found.nodes.tolist(), strict=True)):
+        forward = start < end
+        key = (min(start, end), max(start, end), round(piece.bulge if forward else -piece.bulge, 6) + 0.0)
+        if key in seen:
+            raise UserError(
+                f"the curve from {place(found.places[start])} to {place(found.places[end])} is drawn twice; "
+                "delete one"
+            )
+        seen[key] = number
+
+
+def check_ends(found: Joined, tolerance: float) -> None:
+    """Raise a `UserError` if a boundary forks or is open, with the tolerance that closes small gaps."""
+    numbers, times = np.unique(found.nodes, return_counts=True)
+    if (times > 2).any():
+        where = found.places[numbers[times > 2][0]]
+        raise UserError(
+            f"{times.max()} curves meet at {place(where)}; a boundary has two at every corner and does not "
+            "touch itself"
+        )
+    loose = found.places[numbers[times == 1]]
+    if not len(loose):
+        return
+    apart = np.linalg.norm(loose[:, None] - loose, axis=2) + np.diag(np.full(len(loose), np.inf))
+    gaps = apart.min(axis=1)
+    one = int(gaps.argmin())
+    other = int(apart[one].argmin())
+    remedy = ""
+    if tolerance < gaps.max() <= LARGEST_TOLERANCE:
+        remedy = f"; tolerance = {_above(float(gaps.max())):g} (mm) closes it"
+    raise UserError(
+        f"the boundary is open at {place(loose[one])}: a gap of {gaps[one]:.4g} mm to the next end at "
+        f"{place(loose[other])}; ends join within {tolerance:.4g} mm{remedy}"
+    )
+
+
+def _above(length: float) -> float:
+    """A round number a little above a length."""
+    step = 10.0 ** np.floor(np.log10(length) - 1)
+    return float(np.ceil(1.1 * length / step) * step)

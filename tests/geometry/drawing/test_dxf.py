@@ -1,0 +1,309 @@
+"""DXF files as programs write them: units, blocks, what does not show, and damage."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+from ezdxf.document import Drawing as Document
+
+from geometry import UserError
+from geometry.drawing.checks import body
+from geometry.drawing.formats.dxf_file import HEADER_UNITS
+from geometry.drawing.load import read_drawing
+from tests.geometry.drawing.files import BEAM, rectangle, write_dxf
+
+HOLE = rectangle(20, -7, 10, 4)
+
+
+def document_with(path: Path, units: int = 4) -> tuple[Document, Path]:
+    """A document with the beam, to be saved at the path."""
+    document = ezdxf.new(units=units)
+    document.modelspace().add_lwpolyline(BEAM, close=True)
+    return document, path / "a.dxf"
+
+
+def area(path: Path, **settings: object) -> float:
+    return body(read_drawing(path, **settings).loops).area
+
+
+def refusal(path: Path, **settings: object) -> str:
+    with pytest.raises(UserError) as error:
+        read_drawing(path, **settings)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def lines_text(order: tuple[int, ...] = (10, 20, 11, 21), head: str = "") -> str:
+    """The beam as lines of the format's twelfth release, with the group codes in an order."""
+    text = f"{head}0\nSECTION\n2\nENTITIES\n"
+    for (x, y), (z, w) in zip(BEAM, BEAM[1:] + BEAM[:1], strict=True):
+        values = {10: x, 20: y, 11: z, 21: w}
+        text += "0\nLINE\n8\n0\n" + "".join(f"{code}\n{values[code]}\n" for code in order)
+    return text + "0\nENDSEC\n0\nEOF\n"
+
+
+@pytest.mark.parametrize("number", range(1, 25))
+def test_every_unit_of_the_header_is_converted_or_refused_by_its_name(tmp_path, number):
+    name, length = HEADER_UNITS[number]
+    small = [(60 / length * x / 100, 60 / length * y / 100) for x, y in BEAM]  # 60 mm long
+    path = write_dxf(tmp_path / "a.dxf", [small], units=number)
+    if 1e-3 <= length <= 1e4:
+        drawing = read_drawing(path)
+        assert body(drawing.loops).area == pytest.approx(360, rel=1e-9)
+        assert f"DXF, {name} (of the header)" in drawing.note
+    path = write_dxf(tmp_path / "mm.dxf", [BEAM], units=number)
+    if number == 4:
+        assert area(path) == pytest.approx(1000)
+    else:  # plainly in mm
+        assert 'give units = "mm" for 100 mm' in refusal(path)
+        assert area(path, units="mm") == pytest.approx(1000)
+
+
+@pytest.mark.parametrize(
+    ("size", "number", "said"),
+    [
+        (60, 6, 'header says metres: the drawing measures 6e+04 mm, not 1 to 2000 mm; give units = "mm"'),
+        (
+            60,
+            1,
+            'says inches, in which it measures 1524 mm; give units = "mm" for 60 mm, or units = "in" if it',
+        ),
+        (
+            80,
+            5,
+            'says centimetres, in which it measures 800 mm; give units = "mm" for 80 mm, or units = "cm"',
+        ),
+        (60, 9, 'says mils, in which it measures 1.524 mm; give units = "mm" for 60 mm, or units = "mil"'),
+        (60, 25, 'its header has the unit 25 ($INSUNITS), which is none; give units = "mm"'),
+        (
+            60,
+            17,
+            'header says gigametres: the drawing measures 6e+13 mm, not 1 to 2000 mm; give units = "mm"',
+        ),
+    ],
+)
+def test_a_header_that_contradicts_the_drawing_is_named(tmp_path, size, number, said):
+    path = write_dxf(tmp_path / "a.dxf", [rectangle(0, 0, size, 10)], units=4)
+    text = path.read_text().replace("$INSUNITS\n 70\n4\n", f"$INSUNITS\n 70\n{number}\n")
+    path.write_text(text)
+    assert said in refusal(path)
+    assert area(path, units="mm") == pytest.approx(10 * size)
+
+
+def test_an_ellipse_in_an_absurd_unit_is_refused_for_the_unit(tmp_path):
+    document = ezdxf.new(units=18)
+    document.modelspace().add_ellipse((0, 0), major_axis=(30, 0), ratio=0.5)
+    document.saveas(tmp_path / "a.dxf")
+    assert "astronomical units: the drawing measures" in refusal(tmp_path / "a.dxf")
+    assert area(tmp_path / "a.dxf", units="mm") == pytest.approx(np.pi * 30 * 15, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "head", ["", "999\na comment\n", "0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1009\n0\nENDSEC\n"]
+)
+def test_without_a_unit_in_the_header_mm_are_assumed(tmp_path, head):
+    (tmp_path / "a.dxf").write_text(lines_text(head=head))
+    drawing = read_drawing(tmp_path / "a.dxf")
+    assert drawing.note == "DXF, mm (assumed)"
+    assert body(drawing.loops).area == pytest.approx(1000)
+
+
+@pytest.mark.parametrize("order", [(10, 11, 20, 21), (20, 10, 21, 11), (11, 21, 20, 10)])
+def test_coordinates_in_another_order_are_read(tmp_path, order):
+    (tmp_path / "a.dxf").write_text(lines_text(order))
+    assert area(tmp_path / "a.dxf") == pytest.approx(1000)
+
+
+def test_a_byte_order_mark_is_no_damage(tmp_path):
+    (tmp_path / "a.dxf").write_text("\ufeff" + lines_text(), encoding="utf-8")
+    assert area(tmp_path / "a.dxf") == pytest.approx(1000)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_a_file_that_was_cut_off_is_not_repaired(tmp_path, share):
+    """A repair would leave out the cavities that follow."""
+    path = write_dxf(tmp_path / "a.dxf", [BEAM, HOLE])
+    text = path.read_text()
+    path.write_text(text[: int(share * len(text))])
+    assert "it cannot be read as DXF" in refusal(path)
+    assert "export it again" in refusal(path)
+    (tmp_path / "b.dxf").write_text(lines_text((10, 11, 20, 21))[:-60])
+    assert "export it again" in refusal(tmp_path / "b.dxf")
+
+
+def test_what_is_on_layer_0_of_a_block_is_on_the_layer_of_its_insertion(tmp_path):
+    document, path = document_with(tmp_path)
+    document.blocks.new("dot").add_circle((0, 0), 0.6)
+    outer = document.blocks.new("dots")
+    outer.add_blockref("dot", (0, 0))  # on 0: twice through
+    outer.add_blockref("dot", (10, 0), dxfattribs={"layer": "hole"})
+    document.modelspace().add_blockref("dots", (20, -5), dxfattribs={"layer": "Markers"})
+    clamp = document.blocks.new("clamp")
+    clamp.add_lwpolyline(BEAM[:2])
+    document.modelspace().add_blockref("clamp", (0, 0), dxfattribs={"layer": "base"})
+    document.saveas(path)
+    drawing = read_drawing(path)
+    assert drawing.markers.tolist() == [[20, -5]]
+    section = body(drawing.loops)
+    assert len(section.cavities) == 1
+    assert [section.outline.lengths[k] for k in section.outline.pieces("base")] == [10]
+
+
+@pytest.mark.parametrize(("rows", "columns", "turn"), [(1, 3, 0), (2, 3, 0), (1, 4, 180)])
+def test_rows_and_columns_of_an_insertion_count(tmp_path, rows, columns, turn):
+    document, path = document_with(tmp_path)
+    document.blocks.new("hole").add_circle((0, 0), 1)
+    grid = {"row_count": rows, "column_count": columns, "row_spacing": 4, "column_spacing": 9}
+    document.modelspace().add_blockref("hole", (50, -7 if turn == 0 else -3), {**grid, "rotation": turn})
+    document.saveas(path)
+    assert area(path) == pytest.approx(1000 - rows * columns * np.pi, rel=1e-9)
+
+
+def frozen(document: Document, name: str = "frame") -> None:
+    document.layers.add(name).freeze()
+
+
+def turned_off(document: Document, name: str = "frame") -> None:
+    document.layers.add(name).off()
+
+
+@pytest.mark.parametrize("hide", [frozen, turned_off])
+@pytest.mark.parametrize("inner", ["0", "frame"])
+def test_hidden_insertions_do_not_count(tmp_path, hide, inner):
+    document, path = document_with(tmp_path)
+    hide(document)
+    block = document.blocks.new("sheet")
+    block.add_lwpolyline(rectangle(-50, -50, 200, 100), close=True, dxfattribs={"layer": inner})
+    nested = document.blocks.new("nested")
+    nested.add_blockref("sheet", (0, 0))
+    document.modelspace().add_blockref("nested", (0, 0), dxfattribs={"layer": "frame"})
+    document.saveas(path)
+    assert area(path) == pytest.approx(1000)
+
+
+def test_a_frozen_insertion_hides_all_its_layers_and_one_that_is_off_its_own(tmp_path):
+    for hide, holes in ((frozen, 0), (turned_off, 1)):
+        document, path = document_with(tmp_path)
+        hide(document)
+        block = document.blocks.new("hole")
+        block.add_circle((20, -5), 1, dxfattribs={"layer": "cut"})
+        block.add_circle((40, -5), 1)
+        document.modelspace().add_blockref("hole", (0, 0), dxfattribs={"layer": "frame"})
+        document.saveas(path)
+        assert area(path) == pytest.approx(1000 - holes * np.pi)
+
+
+@pytest.mark.parametrize("where", ["entity", "insertion", "in the block", "polyline"])
+def test_invisible_entities_do_not_count(tmp_path, where):
+    document, path = document_with(tmp_path)
+    space, off = document.modelspace(), {"invisible": 1}
+    block = document.blocks.new("hole")
+    block.add_circle((20, -5), 1, dxfattribs=off if where == "in the block" else {})
+    if where == "entity":
+        space.add_circle((20, -5), 1, dxfattribs=off)
+    elif where == "polyline":
+        space.add_polyline2d(HOLE, close=True, dxfattribs=off)
+    else:
+        space.add_blockref("hole", (0, 0), dxfattribs=off if where == "insertion" else {})
+    document.saveas(path)
+    assert area(path) == pytest.approx(1000)
+
+
+def broken(path: Path, kind: str) -> None:
+    """Save the beam with something that cannot be read."""
+    document, path = document_with(path)
+    space = document.modelspace()
+    if kind == "missing":
+        space.add_blockref("bracket", (0, 0))
+    elif kind == "missing within":
+        document.blocks.new("outer").add_blockref("bracket", (0, 0))
+        space.add_blockref("outer", (0, 0))
+    elif kind == "itself":
+        document.blocks.new("ring").add_blockref("RING", (0, 0))
+        space.add_blockref("ring", (0, 0))
+    elif kind == "each other":
+        document.blocks.new("one").add_blockref("two", (0, 0))
+        document.blocks.new("two").add_blockref("one", (0, 0))
+        space.add_blockref("one", (0, 0))
+    elif kind == "many":
+        document.blocks.new("0-times").add_circle((0, 0), 1)
+        for level in range(20):
+            block = document.blocks.new(f"{level + 1}-times")
+            for _ in range(10):
+                block.add_blockref(f"{level}-times", (0, 0))
+        space.add_blockref("20-times", (0, 0))
+    elif kind == "grid":
+        document.blocks.new("dot").add_circle((0, 0), 1)
+        space.add_blockref("dot", (0, 0), dxfattribs={"row_count": 30000, "column_count": 30000})
+    elif kind in ("knots", "weights"):
+        spline = space.add_open_spline([(8, -4), (9, -5), (10, -4), (11, -5)])
+        spline.knots = [0, 0, 0, 0, 1, 1] if kind == "knots" else spline.knots
+        spline.weights = [1, 1] if kind == "weights" else []
+    elif kind == "unread":
+        space.add_3dface([(0, 0), (1, 0), (1, 1)])
+    document.saveas(path)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("missing", "the block 'bracket' is not in the file; delete its insertion, or bind the external"),
+        ("missing within", "the block 'bracket' is not in the file"),
+        ("itself", "the block 'RING' is within itself; delete that insertion"),
+        ("each other", "the block 'one' is within itself"),
+        ("many", "its blocks make more than 100000 entities, the last "),
+        ("grid", "its blocks make more than 100000 entities, the last 'dot'"),
+        (
+            "knots",
+            "the SPLINE at (8, -4) on layer '0' is damaged: 8 knot values required, got 6; draw it anew",
+        ),
+        ("weights", "the SPLINE at (8, -4) on layer '0' is damaged: "),
+        ("unread", "cannot read the 3DFACE on layer '0'"),
+    ],
+)
+def test_what_cannot_be_read_is_named(tmp_path, kind, said):
+    broken(tmp_path, kind)
+    assert said in refusal(tmp_path / "a.dxf")
+
+
+@pytest.mark.parametrize("kind", ["missing", "knots", "unread", "itself"])
+def test_what_cannot_be_read_does_not_matter_where_it_is_hidden(tmp_path, kind):
+    broken(tmp_path, kind)
+    document = ezdxf.readfile(tmp_path / "a.dxf")
+    document.layers.add("old").freeze()
+    document.modelspace()[-1].dxf.layer = "old"
+    document.saveas(tmp_path / "a.dxf")
+    assert area(tmp_path / "a.dxf") == pytest.approx(1000)
+
+
+def test_markers_drawn_of_arcs_are_circles(tmp_path):
+    document, path = document_with(tmp_path)
+    space, on = document.modelspace(), {"layer": "markers"}
+    space.add_arc((20, -5), 0.8, 0, 180, dxfattribs=on)
+    space.add_arc((20, -5), 0.8, 180, 360, dxfattribs=on)
+    space.add_lwpolyline([(39.2, -5, 0, 0, 1), (40.8, -5, 0, 0, 1)], close=True, dxfattribs=on)
+    space.add_lwpolyline(
+        [(60 + 0.8 * np.cos(t), -5 + 0.8 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 65)[:-1]],
+        close=True,
+        dxfattribs=on,
+    )
+    document.saveas(path)
+    drawing = read_drawing(path)
+    assert drawing.markers == pytest.approx(np.array([[20, -5], [40, -5], [60, -5]]))
+    assert drawing.marker_diameter == pytest.approx(1.6, rel=1e-3)
+    space.add_lwpolyline(rectangle(80, -5, 1, 1), close=True, dxfattribs=on)
+    document.saveas(path)
+    assert "is no circle; draw circles or points" in refusal(path)
+
+
+def test_ezdxf_is_silent(tmp_path):
+    """Its notes about a unit that it does not know went to the standard error."""
+    write_dxf(tmp_path / "a.dxf", [BEAM])
+    code = "import sys, logging; from geometry.drawing.formats.dxf import read_dxf; from pathlib import Path;"
+    code += f"read_dxf(Path({str(tmp_path / 'a.dxf')!r})); logging.getLogger('ezdxf').warning('a note')"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stderr == ""

@@ -1,0 +1,150 @@
+"""SVG files as programs write them: what is drawn, symbols, and sizes."""
+
+import numpy as np
+import pytest
+
+from geometry import UserError
+from geometry.drawing.checks import body
+from geometry.drawing.load import read_drawing
+from tests.geometry.drawing.files import write_svg
+
+BODY = '<rect width="60" height="10"/>'
+HOLE = '<rect id="hole" x="20" y="3" width="10" height="4"/>'
+
+
+def area(path, **settings: object) -> float:
+    return body(read_drawing(path, **settings).loops).area
+
+
+@pytest.mark.parametrize(
+    "undrawn",
+    [
+        *(
+            f'<{tag} id="a">{HOLE}</{tag}>'
+            for tag in ("mask", "symbol", "marker", "clipPath", "pattern", "defs")
+        ),
+        f'<mask id="a"><g><g>{HOLE}</g></g></mask>',
+        f'<g clip-path="url(#a)"><symbol id="b">{HOLE}</symbol></g>',
+        f"<foreignObject>{HOLE}</foreignObject>",
+        f"<metadata>{HOLE}</metadata>",
+        f'<x:page xmlns:x="http://example.org/x">{HOLE}</x:page>',
+        f'<g style="display:none">{HOLE}</g>',
+        f'<g style="visibility:collapse">{HOLE}</g>',
+        f'<style>.off {{display: none}}</style><g class="off">{HOLE}</g>',
+        f"<switch><g/>{HOLE}</switch>",
+        f'<switch><foreignObject requiredExtensions="a"/><g/>{HOLE}</switch>',
+        '<path id="path7" style="fill:none"/><path d=""/><path d="  "/><path d="none"/>',
+        '<rect width="0" height="5"/><circle r="0"/><polygon points=""/>',
+    ],
+)
+def test_what_svg_does_not_draw_is_left_out(tmp_path, undrawn):
+    assert area(write_svg(tmp_path / "a.svg", BODY + undrawn)) == pytest.approx(600)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "bounds"),
+    [
+        (f'<symbol id="s">{HOLE}</symbol><use href="#s" x="5" y="1"/>', (25, 4, 35, 8)),
+        (f'<mask>{HOLE}</mask><use href="#hole" x="5" y="1"/>', (25, 4, 35, 8)),
+        # a symbol fits its viewBox into the size of its use
+        (
+            '<symbol id="s" viewBox="0 0 5 2"><rect width="5" height="2"/></symbol>'
+            '<use href="#s" x="20" y="3" width="10" height="4"/>',
+            (20, 3, 30, 7),
+        ),
+        (
+            '<defs><symbol id="s" viewBox="1 1 5 2" width="10" height="4">'
+            '<rect x="1" y="1" width="5" height="2"/>'
+            '</symbol></defs><g transform="translate(2 0)">'
+            '<use href="#s" transform="scale(0.5)" x="40" y="4"/></g>',
+            (22, 2, 27, 4),
+        ),
+        (
+            '<symbol id="s" viewBox="0 0 5 2" preserveAspectRatio="xMinYMin meet">'
+            '<rect width="5" height="2"/></symbol>'
+            '<use href="#s" x="20" y="1" width="30" height="4"/>',
+            (20, 1, 30, 5),
+        ),
+        (
+            '<symbol id="s"><rect x="2" y="2" width="3" height="3"/></symbol>'
+            '<symbol id="t"><use href="#s" x="10"/>'
+            '</symbol><g id="u"><use href="#t" y="1"/></g><use href="#u" x="20"/>',
+            None,
+        ),
+        # an inner svg likewise
+        (
+            '<svg x="20" y="3" width="10" height="4" viewBox="0 0 5 2"><rect width="5" height="2"/></svg>',
+            (20, 3, 30, 7),
+        ),
+        ('<svg x="20" y="3"><rect width="50%" height="4"/></svg>', (20, 3, 70, 7)),
+        ('<svg x="50%" y="3px"><rect width="5" height="4"/></svg>', (50, 3, 55, 7)),
+    ],
+)
+def test_symbols_and_inner_svgs_are_where_they_are_used(tmp_path, drawn, bounds):
+    path = write_svg(tmp_path / "a.svg", f'<rect width="100" height="60"/>{drawn}')
+    _, *holes = sorted(read_drawing(path).loops, key=lambda loop: -abs(loop.area))
+    if bounds is None:
+        assert [hole.bounds.round(9).tolist() for hole in holes] in (
+            [[[12, -6], [15, -3]], [[32, -6], [35, -3]]],
+            [[[32, -6], [35, -3]], [[12, -6], [15, -3]]],
+        )
+        return
+    (hole,) = holes
+    left, top, right, bottom = bounds
+    assert hole.bounds == pytest.approx(np.array([[left, -bottom], [right, -top]]))
+
+
+def test_a_share_of_an_inner_size_is_refused(tmp_path):
+    inner = '<svg x="20" y="3" width="20" height="5"><rect width="50%" height="4"/></svg>'
+    with pytest.raises(UserError, match="width = '50%' within an inner svg; write a number"):
+        read_drawing(write_svg(tmp_path / "a.svg", BODY + inner))
+
+
+def test_a_use_of_a_symbol_keeps_its_name(tmp_path):
+    path = write_svg(
+        tmp_path / "a.svg",
+        f'{BODY}<symbol id="dot"><circle r="0.8"/></symbol>'
+        '<g id="markers"><use href="#dot" x="20" y="5"/></g>'
+        '<use id="markers" href="#dot" x="40" y="5"/>',
+    )
+    assert read_drawing(path).markers == pytest.approx(np.array([[20, -5], [40, -5]]))
+
+
+@pytest.mark.parametrize("width", ["30em", "20ex", "100%", "12rem", "80vw", "auto", "10E", "3 apples"])
+def test_a_width_that_is_no_length_is_refused_with_the_remedy(tmp_path, width):
+    path = write_svg(tmp_path / "a.svg", BODY, f'width="{width}" height="{width}" viewBox="0 0 80 40"')
+    with pytest.raises(UserError, match=f'width = .{width}. is no length of paper; .* units = "mm"'):
+        read_drawing(path)
+    assert area(path, units="mm") == pytest.approx(600)
+
+
+@pytest.mark.parametrize(
+    ("head", "unit", "said"),
+    [
+        ('viewBox="0 0 226.77 113.39"', 25.4 / 96, True),
+        ('width="80" height="40"', 25.4 / 96, True),
+        ('width="160px" height="80px" viewBox="0 0 80 40"', 25.4 / 48, True),
+        ("", 25.4 / 96, True),
+        ('width="80mm"', 25.4 / 96, True),  # without a viewBox a unit is a pixel, whatever the page
+        ('width="80mm" height="40mm" viewBox="0 0 80 40"', 1.0, False),
+        ('width="8cm" height="4cm" viewBox="0 0 80 40"', 1.0, False),
+        ('width="72pt" height="36pt" viewBox="0 0 72 36"', 25.4 / 72, False),
+        ('width="6pc" height="3pc" viewBox="0 0 72 36"', 25.4 / 72, False),
+    ],
+)
+def test_a_size_that_is_a_guess_says_so(tmp_path, head, unit, said):
+    path = write_svg(tmp_path / "a.svg", '<rect width="60" height="40"/>', head)
+    drawing = read_drawing(path)
+    assert body(drawing.loops).area == pytest.approx(2400 * unit**2)
+    assert ("(assumed: 96 pixels to an inch" in drawing.note) == said
+    assert area(path, units="pt") == pytest.approx(2400 * (25.4 / 72) ** 2)
+
+
+def test_markers_of_curves_are_circles(tmp_path):
+    """Illustrator writes a circle as four curves."""
+    k, r = 0.5522847498 * 0.8, 0.8
+    curve = f"c0 {k} {k - r} {r} {-r} {r}s{-r} {k - r} {-r} {-r}s{r - k} {-r} {r} {-r}s{r} {r - k} {r} {r}z"
+    path = write_svg(tmp_path / "a.svg", f'{BODY}<g id="markers"><path d="M20.8 5{curve}"/></g>')
+    drawing = read_drawing(path)
+    assert drawing.markers == pytest.approx(np.array([[20, -5]]), abs=1e-3)
+    assert drawing.marker_diameter == pytest.approx(1.6, rel=1e-3)
