@@ -199,10 +199,10 @@ class DistributedSpace(Generic[SpaceT]):
         """An integral over the whole body."""
         return float(self.comm.allreduce(dolfinx.fem.assemble_scalar(form), op=MPI.SUM))
 
-    def node_function(self) -> "NodeFunction":
-        """A continuous vector field, linear in every triangle, that forms can be written with; zero."""
-        space = _compiled(lambda: _vector_space(self.domain, 1))
-        nodes = _nodes_of_dofs(LagrangeSpace(self.space.mesh, 1), self.domain, space)
+    def node_function(self, degree: int = 1) -> "NodeFunction":
+        """A continuous vector field of a degree in every triangle, that forms can be written with; zero."""
+        space = _compiled(lambda: _vector_space(self.domain, degree))
+        nodes = _nodes_of_dofs(LagrangeSpace(self.space.mesh, degree), self.domain, space)
         return NodeFunction(dolfinx.fem.Function(space), nodes)
 
     def set_function(self, values: FloatArray) -> None:

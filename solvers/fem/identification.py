@@ -19,7 +19,7 @@ from geometry.observations import Observations
 from geometry.registration import Registration
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_conditions
-from solvers.fem.dolfinx_compat import DistributedSpace
+from solvers.fem.dolfinx_compat import DistributedSpace, NodeFunction
 from solvers.fem.equilibrium import QUADRATURE_DEGREE
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import Factorisation
@@ -69,6 +69,12 @@ class FemBody:
         tangent = ufl.derivative(force, function, ufl.TrialFunction(function.function_space))
         slope = ufl.derivative(force, self._moved.function, self._direction.function)
         self._force, self._tangent, self._wall_slope = map(self._distributed.form, (force, tangent, slope))
+        self._base_motion = self._distributed.node_function(degree)
+        by_base = ufl.derivative(force, function, self._base_motion.function)
+        self._base_slope = self._distributed.form(by_base)
+        at_base = self._clamped.all(axis=1)
+        self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
+        self.feet[:, at_base] = unknowns.feet.motions(space.nodes[at_base])
         self._conditions = self._distributed.clamp(self._clamped)
         self._matrix = self._distributed.assemble_matrix(self._tangent, self._conditions)
         self._factors = Factorisation(self._distributed, self._matrix, self._clamped, positive_definite=False)
@@ -94,19 +100,25 @@ class FemBody:
 
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """By the walls and by the moduli, in both of which it is a form; see `Body`."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """By the walls, the moduli and the base, in all of which it is a form; see `Body`."""
         self._set(state, lame, changes)
-        of_walls = np.zeros((len(changes), *self.shape))
-        for found, nodal in zip(of_walls, self._motion.nodal, strict=True):
-            self._direction.set(nodal)
-            found[:] = self._distributed.assemble_nodal(self._wall_slope)
+        of_walls = self._slopes(self._wall_slope, self._direction, self._motion.nodal)
+        of_feet = self._slopes(self._base_slope, self._base_motion, self.feet)
         of_moduli = np.zeros((2, *self.shape))
         for found, unit in zip(of_moduli, np.eye(2), strict=True):
             self._set_moduli(unit)
             found[:] = self._distributed.assemble_nodal(self._force)
         self._set_moduli(lame[:2])
-        return of_walls, of_moduli
+        return of_walls, of_moduli, of_feet
+
+    def _slopes(self, form: Any, direction: NodeFunction, nodal: FloatArray) -> FloatArray:
+        """Derivatives of F (k, *shape), a form, in directions whose nodal values have the shape (k, n, 2)."""
+        found = np.zeros((len(nodal), *self.shape))
+        for slope, values in zip(found, nodal, strict=True):
+            direction.set(values)
+            slope[:] = self._distributed.assemble_nodal(form)
+        return found
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """From the shape functions; see `Body`."""

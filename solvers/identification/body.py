@@ -4,7 +4,8 @@ A state c is an array of degrees of freedom. The energy of a finger whose walls 
 
     E(c) = ∫ ψ(G) det(I + ∇W) dX        G = ∇u (I + ∇W)⁻¹
 
-over the drawn body, with the motion W of `WallMotion`; u = 0 holds at the base. F is its derivative by c.
+over the drawn body, with the motion W of `WallMotion`. At the base u is zero or, where that has feet, their
+motion. F is the derivative of E by the rest of c.
 """
 
 from collections.abc import Callable
@@ -40,10 +41,18 @@ class Body(Protocol):
         """The force at a state and the tangent, factorised; None if a point is turned inside out."""
         ...
 
+    @property
+    def feet(self) -> FloatArray:
+        """States (f, *shape) that are zero but at the base, which has a unit of each motion of `Feet`."""
+        ...
+
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of F by the k thicknesses, (k, *shape), and by λ and μ, (2, *shape), at fixed state."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Derivatives of F by the k thicknesses, (k, *shape), by λ and μ, (2, *shape), and by the f motions.
+
+        The state is held, but for the base in the last ones, of shape (f, *shape).
+        """
         ...
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:

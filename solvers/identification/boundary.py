@@ -1,4 +1,4 @@
-"""The two ends of the finger: the traction of a contact on the front face, and the clamp at the base.
+"""The two ends of the finger: the traction of a contact on the front face, the clamp and feet at the base.
 
 At the abscissa x the traction's density is the raised cosine 1 + cos(2 π (x - position) / width) within half
 a width, scaled to the integral one: smooth in both parameters, zero at both ends.
@@ -12,10 +12,17 @@ it, a base that stays straight under the force f at the point x shifts by ℓ f 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray
 from geometry.mesh.quadrature import edge_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
+
+LOOSE = 0.1
+"""Standard deviation of how far a foot gives, and of how far its ends move when it turns, mm: about as far as
+a print is off."""
 
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 """Rotation by 90 degrees."""
@@ -125,6 +132,54 @@ class Clamp:
             (np.outer(soft_slopes, f) + soft * f_slopes) / self.length,
             np.asarray((soft_slopes * moment + soft * moment_slopes) / self.inertia),
         )
+
+
+class Feet:
+    """The pieces of a base that has several, such as two walls that are held without one between them.
+
+    Each foot stays straight, and may give along its normal, into the finger, and turn about its middle. The
+    first one is nearest to the front face. A base in one piece has none: it moves with the clamp.
+
+    Args:
+        mesh: Of the finger.
+        held: Whether no foot may move: there are none then.
+
+    Attributes:
+        names: Of the f motions: `foot_1_give`, mm, `foot_1_turn`, rad, `foot_2_give`, ...
+        tolerances: Standard deviations of the motions, shape (f,), as `LOOSE` has them.
+    """
+
+    def __init__(self, mesh: TriangleMesh, *, held: bool = False) -> None:
+        edges = mesh.boundary("base")
+        nodes, local = np.unique(edges, return_inverse=True)
+        local = local.reshape(-1, 2)
+        graph = coo_matrix((np.ones(len(local)), (local[:, 0], local[:, 1])), shape=(len(nodes), len(nodes)))
+        count, label = connected_components(graph, directed=False)
+        self._tree, self._label = cKDTree(mesh.points[nodes]), label
+        front, inside = mesh.points[mesh.boundary("front")].mean(axis=(0, 1)), mesh.points.mean(axis=0)
+        self._feet: list[tuple[int, FloatArray, FloatArray, float]] = []
+        for foot in range(count if count > 1 and not held else 0):
+            ends = mesh.points[edges[label[local[:, 0]] == foot]]
+            lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+            middle = lengths @ ends.mean(axis=1) / lengths.sum()
+            spread = ends.reshape(-1, 2) - middle
+            into = np.linalg.svd(spread)[2][-1]
+            into = into * np.sign((inside - middle) @ into)
+            self._feet.append((foot, middle, into, float(lengths.sum())))
+        self._feet.sort(key=lambda each: float(np.linalg.norm(each[1] - front)))
+        numbers = range(1, len(self._feet) + 1)
+        self.names = tuple(f"foot_{number}_{way}" for number in numbers for way in ("give", "turn"))
+        self.tolerances = np.array([each for *_, b in self._feet for each in (LOOSE, LOOSE / (0.5 * b))])
+
+    def motions(self, points: FloatArray) -> FloatArray:
+        """Displacements (f, n, 2) of points (n, 2) of the base, mm, by a unit of each motion."""
+        foot_of = self._label[self._tree.query(points)[1]]
+        found = np.zeros((len(self.names), len(points), 2))
+        for number, (foot, middle, into, _) in enumerate(self._feet):
+            own = foot_of == foot
+            found[2 * number, own] = into
+            found[2 * number + 1, own] = (points[own] - middle) @ QUARTER.T
+        return found
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

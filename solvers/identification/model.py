@@ -5,6 +5,8 @@ is the place of the contact; with the tangent K there,
 
     K c' = (f · b + m · ∂b/∂x)' - ∂F/∂θ
 
+where the base is held; at its feet c' is their motion, and ∂F/∂θ the force of that alone.
+
 A marker is at a fixed place P of the drawn body; where the walls have moved by W, the material there was
 drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
 `geometry.registration` has what pictures show of that whose frames are unknown.
@@ -135,6 +137,8 @@ class ResponseModel:
         state = np.zeros(self.body.shape)
         if self._last is not None:
             state = self._last.state + np.tensordot(values - self._last.values, self._last.slopes, axes=1)
+        feet = self.body.feet
+        state = np.where(feet.any(axis=0), np.tensordot(hypothesis.feet, feet, axes=1), state)
         traction = self._traction(hypothesis.position, hypothesis.width)
         load = np.tensordot(hypothesis.force, traction[0], axes=1)
         load += np.tensordot(hypothesis.couple, traction[1], axes=1)
@@ -173,17 +177,17 @@ class ResponseModel:
         """The response at the first of two states or, where that turns a point inside out, at the second."""
         force, couple, slope = hypothesis.force, hypothesis.couple, self.unknowns.slopes(values)
         for state in states:
-            by_walls, by_moduli = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
-            if np.isfinite(by_walls).all() and np.isfinite(by_moduli).all():
+            parts = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
+            if all(np.isfinite(part).all() for part in parts):
                 break
         right = np.tensordot(slope.force, traction[0], axes=1)
         right += np.tensordot(slope.couple, traction[1], axes=1)
         for by, moved, turned in zip((slope.position, slope.width), traction[1:3], traction[3:], strict=True):
             change = np.tensordot(force, moved, axes=1) + np.tensordot(couple, turned, axes=1)
             right += np.multiply.outer(by, change)
-        right -= np.tensordot(slope.changes, by_walls, axes=1)
-        right -= np.tensordot(slope.moduli, by_moduli, axes=1)
-        slopes = linearised.solve(right)
+        for by, part in zip((slope.changes, slope.moduli, slope.feet), parts, strict=True):
+            right -= np.tensordot(by, part, axes=1)
+        slopes = linearised.solve(right) + np.tensordot(slope.feet, self.body.feet, axes=1)
         inner = tuple(range(1, slopes.ndim))
         contact, by_position, by_width = np.asarray(np.tensordot(traction[:3], state, axes=state.ndim))
         contact_slopes: FloatArray = np.tensordot(slopes, traction[0], axes=(inner, inner))

@@ -32,7 +32,7 @@ POLISHES, POLISHED = 6, 0.02
 """Steps of first order on a finer mesh at most, and their last size over the standard deviations."""
 
 HELD = 1e-3
-"""Standard deviation of a width that is held, of its logarithm."""
+"""Factor of the standard deviation of a parameter that is held."""
 
 IMPROBABLE = 15.0
 """Logarithm of the ratio of evidences from which on a law is not fitted to the end."""
@@ -74,6 +74,7 @@ class Identifier:
         first = next(iter(self.models.values()))
         self._names = first.unknowns.names
         self.parameters = first.unknowns.parameters(first.flexibility(), settings.prior)
+        self._feet = first.unknowns.feet.names
         self._known: dict[LawName, Fit] = {}
 
     def measurement(self, observations: Observations) -> MarkerData:
@@ -219,7 +220,7 @@ class Identifier:
             steps = QUICK if found else MAX_STEPS
             near = self._known.get(law, found[0] if found else None)
             try:
-                found.append(self._fit(law, measurement, near, rounds=1, steps=steps))
+                found.append(self._fit(law, measurement, near, held=self._loose, rounds=1, steps=steps))
             except NoSolutionError as error:
                 reason = error
         if not found:
@@ -227,20 +228,33 @@ class Identifier:
         return found
 
     def _settled(self, rough: Fit) -> Fit:
-        """The fit of a law; where it does not explain the markers, the best from several contacts."""
+        """The fit of a law; where it does not explain the markers, the best from several contacts.
+
+        The feet are held till then: they would turn far to make up for a contact that is not found yet.
+        """
+        best = self._of_contacts(rough)
+        return self._fit(rough.law, rough.measurement, best) if self._loose else best
+
+    def _of_contacts(self, rough: Fit) -> Fit:
         if rough.estimate.converged:
             return rough
-        best = self._fit(rough.law, rough.measurement, rough)
+        best = self._fit(rough.law, rough.measurement, rough, held=self._loose)
         if best.estimate.inflation == 1 or self._known:
             return best
         for start in self._elsewhere(best.estimate):
             try:
                 if start @ self._is_width:
                     held = self._fit(
-                        rough.law, rough.measurement, None, start, held=True, rounds=1, steps=QUICK
+                        rough.law,
+                        rough.measurement,
+                        None,
+                        start,
+                        held=("width", *self._loose),
+                        rounds=1,
+                        steps=QUICK,
                     )
                     start = np.where(self._is_width, start, held.estimate.z)
-                other = self._fit(rough.law, rough.measurement, None, start)
+                other = self._fit(rough.law, rough.measurement, None, start, held=self._loose)
             except NoSolutionError:
                 continue
             best = max(best, other, key=lambda fit: fit.log_evidence)
@@ -266,11 +280,16 @@ class Identifier:
         """Mask of the contact's width, shape (p,)."""
         return np.array([name == "width" for name in self._names])
 
-    def _holding(self, width: float) -> list[Parameter]:
-        """The parameters with the contact's width held at a standardised value."""
+    @property
+    def _loose(self) -> tuple[str, ...]:
+        """Names of the motions that a first search holds."""
+        return () if self._known else self._feet
+
+    def _holding(self, held: Sequence[str], z: FloatArray) -> list[Parameter]:
+        """The parameters, some of them held at their standardised value among all, shape (p,)."""
         return [
-            replace(each, start=float(each.value(width)), scale=HELD) if each.name == "width" else each
-            for each in self.parameters
+            replace(each, start=float(each.value(at)), scale=HELD * each.scale) if each.name in held else each
+            for each, at in zip(self.parameters, z.tolist(), strict=True)
         ]
 
     def _fit(
@@ -280,13 +299,13 @@ class Identifier:
         near: Fit | None,
         start: FloatArray | None = None,
         *,
-        held: bool = False,
+        held: Sequence[str] = (),
         **limits: int,
     ) -> Fit:
         """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`.
 
         A wide contact that the start has is soon lost, while the frame and the walls are those of a narrow
-        one; `held`, the width stays, and its value in the fit is zero.
+        one. What is `held` stays, and its value in the fit is zero.
         """
         model = self.models[law]
         markers = MarkerModel(model, measurement)
@@ -313,8 +332,8 @@ class Identifier:
             start = self._pressed(model, markers)
         parameters = self.parameters
         if held:
-            parameters = self._holding(float(start @ self._is_width))
-            start = np.where(self._is_width, 0.0, start)
+            parameters = self._holding(held, start)
+            start = np.where(np.isin(self._names, held), 0.0, start)
         # Where one law explains the markers, another one does as well, or nowhere.
         explained_elsewhere = near is not None and near.law != law and near.estimate.converged
         first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()

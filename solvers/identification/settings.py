@@ -19,8 +19,8 @@ class IdentifyingSolver:
     """A solver that identifies contact, walls and law.
 
     Attributes:
-        parameters: Names of the unknowns, with commas between them, of `solvers.identification.unknowns`;
-            empty for all but `young`.
+        parameters: Names of the unknowns, with commas between them, of `sought` and `young`; empty for all of
+            `sought`.
         law: "evidence": the law of finite strain with the largest evidence; "given": the problem's.
         prior: Factor of the parameters' prior standard deviations.
         reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
@@ -36,6 +36,7 @@ class IdentifyingSolver:
     reaction_error: float = 0.02
     marker_radius: float | None = None
     name: ClassVar[str]
+    sought: ClassVar[tuple[str, ...]] = DEFAULT
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -67,4 +68,4 @@ class IdentifyingSolver:
     @property
     def unknowns(self) -> tuple[str, ...]:
         """Names of the unknowns."""
-        return parse_unknowns(self.name, self.parameters) if self.parameters else DEFAULT
+        return parse_unknowns(self.name, self.parameters, self.sought) if self.parameters else self.sought

@@ -26,7 +26,7 @@ from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation
 from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
 from solvers.elasticity import LawName
 from solvers.identification.model import MarkerData, MarkerModel, ResponseModel
-from solvers.identification.unknowns import CONTACT, doubt_of_the_plane, log_prior
+from solvers.identification.unknowns import CONTACT, SHARE, doubt_of_the_plane, log_prior
 
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
@@ -106,7 +106,7 @@ class ForceTracker:
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
         measurement = MarkerData(points, still, still, inside, np.arange(len(points)))
         self._markers = MarkerModel(model, measurement)
-        self._of_finger = ~np.isin(names, CONTACT)
+        self._of_finger = ~np.isin(names, (*CONTACT, SHARE, *model.unknowns.feet.names))
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
         self._known, self.largest, self._learnt = self._drawn, 0.0, 0
         self.log_evidence = 0.0

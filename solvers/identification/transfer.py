@@ -1,8 +1,8 @@
 """The identified finger at another load.
 
 Walls, law and clamp stay. The contact keeps its distance from the drawn place, its width and the direction of
-its force. The stroke is not trusted, but its share is: the contact moves into the finger by the fit's
-displacement times the ratio of the two loads' displacements.
+its force; the feet move in proportion to it. The stroke is not trusted, but its share is: the contact moves
+into the finger by the fit's displacement times the ratio of the two loads' displacements.
 """
 
 from dataclasses import replace
@@ -59,7 +59,8 @@ def _response(model: ResponseModel, start: Response, share: float, shift: float)
     """
     names, into = model.unknowns.names, model.unknowns.directions[0]
     target = share * float(start.contact @ into)
-    force = np.array([name in ("normal_force", "tangential_force") for name in names])
+    loaded = ("normal_force", "tangential_force", *model.unknowns.feet.names)
+    force = np.array([name in loaded for name in names])
     direction, values = np.where(force, start.values, 0.0), np.where(force, 0.0, start.values)
     if "position" in names:
         values[names.index("position")] += shift

@@ -14,14 +14,18 @@ from geometry.registration import PARTS, Homography, Pictures
 from solvers.assimilation.estimation import Parameter
 from solvers.assimilation.pictures import picture_parameters
 from solvers.elasticity import Lame, LawName, lame_derivatives
-from solvers.identification.boundary import FrontTraction
+from solvers.identification.boundary import Feet, FrontTraction
 from solvers.problem import Material, Problem, contact_ends
 
 CONTACT = ("position", "width", "normal_force", "tangential_force", "eccentricity")
+SHARE = "tangential_share"
+"""Tangential over normal force: it takes the place of `tangential_force` where friction bounds it."""
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
-DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson")
+DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson", "feet")
+"""What is found unless other names are given; the table of docs/how-to/force.md describes each. `feet` stands
+for all motions of `solvers.identification.boundary.Feet`."""
 NAMES = (*DEFAULT, "young")
-"""Everything that can be found; the table of docs/how-to/force.md describes each."""
+"""Everything that can be found."""
 
 
 LAW_ODDS: Mapping[LawName, float] = {"neo-hookean": 3.0, "st-venant-kirchhoff": 1.0}
@@ -56,6 +60,7 @@ class Hypothesis:
     lame: Lame  # Lamé constants, MPa
     changes: FloatArray  # Of the walls' thickness, shape (k,), mm
     softness: float  # Compliance of the base over Young's modulus, mm/MPa
+    feet: FloatArray  # Motions of the base's feet, shape (f,), mm and rad
     pictures: Pictures
 
 
@@ -69,6 +74,7 @@ class HypothesisSlopes(NamedTuple):
     moduli: FloatArray
     changes: FloatArray
     softness: FloatArray
+    feet: FloatArray  # Shape (p, f)
     pressed: FloatArray  # By the values of the homographies, shape (p, 6)
     drawn: FloatArray
 
@@ -77,18 +83,23 @@ class Unknowns:
     """The p unknowns of a problem, in order, and the hypothesis that their values describe.
 
     Args:
-        problem: It has the values of everything else; its load only gives the drawn contact, its observations
-            only how well the frames of their pictures are known.
-        names: Some of `NAMES`; a finger without cavities has no walls to be found.
+        problem: It has the values of everything else; its load only gives the drawn contact and the friction,
+            its observations only how well the frames of their pictures are known.
+        names: Some of `DEFAULT`, and `young`; a finger without cavities has no walls to be found, a base in
+            one piece no feet.
     """
 
     def __init__(self, problem: Problem, names: Sequence[str]) -> None:
         self.problem = problem
         self.traction, self.motion = FrontTraction(problem.mesh), WallMotion.of(problem.mesh)
+        self.feet = Feet(problem.mesh, held="feet" not in names)
         seen = problem.observations
         self._centre = np.zeros(2) if seen is None else seen.points.mean(axis=0)
         self._pictures = [] if seen is None else picture_parameters(seen)
-        finger = [name for name in names if name not in WALLS or name in self.motion.names]
+        finger = [name for name in names if name not in (*WALLS, "feet") or name in self.motion.names]
+        if problem.load.friction:
+            finger = [SHARE if name == "tangential_force" else name for name in finger]
+        finger += self.feet.names
         self.names = (*finger, *(parameter.name for parameter in self._pictures))
 
     @property
@@ -115,7 +126,7 @@ class Unknowns:
             flexibility: Displacement of the drawn contact into the finger under a unit force, mm per N/mm.
             prior: Factor of the standard deviations of the priors.
         """
-        front, material = self.traction, self.problem.material
+        front, material, friction = self.traction, self.problem.material, self.problem.load.friction
         middle, width = self.place
         # The force that would press the contact in by half of the front's extent.
         size = 0.5 * front.extent / flexibility
@@ -135,6 +146,10 @@ class Unknowns:
             # A printed wall is within 5 %; of the wall at the base the clamp may hold more or less.
             share = 0.25 if name == "base_thickness" else 0.05
             known.append(Parameter(name, "mm", drawn, share * drawn * prior, 0.5 * drawn, 2 * drawn))
+        if friction:
+            known.append(Parameter(SHARE, "", 0.0, friction * prior, -friction, friction))
+        for name, tolerance in zip(self.feet.names, self.feet.tolerances.tolist(), strict=True):
+            known.append(Parameter(name, "mm" if name.endswith("give") else "rad", 0.0, tolerance * prior))
         by_name = {parameter.name: parameter for parameter in [*known, *self._pictures]}
         return [by_name[name] for name in self.names]
 
@@ -142,15 +157,17 @@ class Unknowns:
         """The finger and the contact of values, shape (p,)."""
         named, material = self._named(values), self.material(values)
         middle, width = self.place
-        sizes = [named.get(name, 0.0) for name in ("normal_force", "tangential_force")]
+        normal = named.get("normal_force", 0.0)
+        sizes = normal, named.get("tangential_force", 0.0) + named.get(SHARE, 0.0) * normal
         return Hypothesis(
             position=named.get("position", middle),
             width=named.get("width", width),
             force=np.array(sizes) @ self.directions,
-            couple=named.get("eccentricity", 0.0) * sizes[0] * self.directions[0],
+            couple=named.get("eccentricity", 0.0) * normal * self.directions[0],
             lame=material.lame,
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
+            feet=np.array([named.get(name, 0.0) for name in self.feet.names]),
             pictures=Pictures(*(self.homography(picture, named) for picture in ("pressed", "drawn"))),
         )
 
@@ -158,21 +175,30 @@ class Unknowns:
         """Derivatives of the hypothesis of values, shape (p,)."""
         named, material = self._named(values), self.material(values)
         parts = {picture: [f"{picture}_{part}" for part in PARTS] for picture in ("pressed", "drawn")}
-        known = (*NAMES, *self.motion.names, *parts["pressed"], *parts["drawn"])
+        known = (
+            *NAMES,
+            SHARE,
+            *self.motion.names,
+            *self.feet.names,
+            *parts["pressed"],
+            *parts["drawn"],
+        )
         by = {name: np.zeros(len(self.names)) for name in known}
         by |= dict(zip(self.names, np.eye(len(self.names)), strict=True))
         young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
         normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
+        along = by["tangential_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
         return HypothesisSlopes(
             position=by["position"],
             width=by["width"],
-            force=np.stack([by["normal_force"], by["tangential_force"]], axis=1) @ self.directions,
+            force=np.stack([by["normal_force"], along], axis=1) @ self.directions,
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
             changes=np.array([by[name] for name in self.motion.names]).reshape(-1, len(self.names)).T,
             softness=by["base_compliance"] / young - compliance / young**2 * by["young"],
+            feet=np.array([by[name] for name in self.feet.names]).reshape(-1, len(self.names)).T,
             pressed=np.stack([by[name] for name in parts["pressed"]], axis=1),
             drawn=np.stack([by[name] for name in parts["drawn"]], axis=1),
         )
@@ -191,16 +217,16 @@ class Unknowns:
         return dict(zip(self.names, map(float, values), strict=True))
 
 
-def parse_unknowns(solver: str, text: str) -> tuple[str, ...]:
-    """The names in a text such as `position,normal_force`.
+def parse_unknowns(solver: str, text: str, sought: Sequence[str]) -> tuple[str, ...]:
+    """The names in a text such as `position,normal_force`, of those that a solver seeks, or `young`.
 
     Raises:
         UserError: If one is not known or is there twice, or there is no force among them.
     """
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     for name in names:
-        if name not in NAMES:
-            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(NAMES)}")
+        if name not in (known := (*sought, "young")):
+            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(known)}")
         if names.count(name) > 1:
             raise UserError(f"{solver}: the parameter {name!r} is there twice")
     if "normal_force" not in names:

@@ -120,10 +120,15 @@ class NetworkBody:
                 found += _back_substituted(factors, given - self._product(factors, tangent, found))
         return np.asarray(found)
 
+    @property
+    def feet(self) -> FloatArray:
+        """None: the network is held at the whole base."""
+        return np.zeros((0, *self.shape))
+
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of F by the k thicknesses, (k, *shape), and by λ and μ, (2, *shape), at fixed state.
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Derivatives of F by the k thicknesses, (k, *shape), and by λ and μ, (2, *shape); see `Body`.
 
         By a thickness with the gradient V = ∇V_k of its motion, M' = -M V M, G' = -G V M, and the volume's
         factor changes by its product with tr(M V).
@@ -143,7 +148,7 @@ class NetworkBody:
                 part, _ = piola_stress_and_tangent(gradient, moduli, self._law)
                 slopes.append(_pulled_back(part, metric))
             found = self._forces(torch.stack(slopes)).numpy()
-        return found[:-2], found[-2:]
+        return found[:-2], found[-2:], self.feet
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Rows (r, 2, *shape) of the sums of weights (r, q) times the displacement at points (q, 2), mm."""

@@ -16,7 +16,7 @@ from solvers.identification.model import ResponseModel
 from solvers.identification.result import Fit, Identified
 from solvers.identification.search import Identifier, carried
 from solvers.identification.settings import IdentifyingSolver
-from solvers.identification.unknowns import LAWS, Unknowns
+from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Problem
@@ -55,8 +55,10 @@ class PinnIdSolver(IdentifyingSolver):
     name: ClassVar[str] = "pinn-id"
     family: ClassVar[Family] = "neural network"
     twin: ClassVar[str] = "fem-id"
+    sought: ClassVar[tuple[str, ...]] = tuple(name for name in DEFAULT if name != "feet")
     laws: ClassVar[tuple[str, ...]] = LAWS
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
+    friction: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not 0 < self.fine <= self.coarse:

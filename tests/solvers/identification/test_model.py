@@ -42,7 +42,7 @@ def test_a_last_step_that_turns_a_point_inside_out_is_not_taken(problem, monkeyp
 
     def torn(state, *rest):
         found = slopes(state, *rest)
-        return found if np.array_equal(state, reached[-1]) else (np.nan * found[0], found[1])
+        return found if np.array_equal(state, reached[-1]) else (np.nan * found[0], *found[1:])
 
     monkeypatch.setattr(again.body, "linearised", remembered)
     monkeypatch.setattr(again.body, "force_slopes", torn)

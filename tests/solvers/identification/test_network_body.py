@@ -107,7 +107,7 @@ def test_factors_from_far_away_are_replaced(body, mesh, state, changes):
 
 
 def test_slopes_by_walls_and_moduli_are_those_of_differences(body, state, changes):
-    walls, moduli = body.force_slopes(state, LAME, changes)
+    walls, moduli, _ = body.force_slopes(state, LAME, changes)
 
     def force(lame, moved):
         return body.linearised(state, lame, moved).force
