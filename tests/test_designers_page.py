@@ -11,7 +11,7 @@ PAGE = DOCS / "designers.md"
 
 
 def test_the_page_has_every_quantity_with_its_unit_and_meaning() -> None:
-    from studies.sweep.quantities import QUANTITIES
+    from solvers.finger_figures import QUANTITIES
 
     rows = table(PAGE, "quantity")
     assert names(rows) == list(QUANTITIES)

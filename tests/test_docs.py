@@ -36,7 +36,7 @@ OWN_SOLVER, TRUST = DOCS / "own-solver.md", DOCS / "explanation" / "trust.md"
 PAGES = sorted([*DOCS.rglob("*.md"), *ROOT.glob("*.md")])
 PLUGIN = ROOT / "tests" / "solvers" / "plugin"
 
-PLACEHOLDERS = ("COMPONENT", "DIFFERENCE", "FIELD", "NAME", "PARAMETER", "REGION", "STAT", "UNIT")
+PLACEHOLDERS = ("COMPONENT", "DIFFERENCE", "FIELD", "FIGURE", "NAME", "PARAMETER", "REGION", "STAT", "UNIT")
 """Words of the tables that stand for any name."""
 
 

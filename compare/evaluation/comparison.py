@@ -85,6 +85,18 @@ class Results:
         rows = {evaluation.solver: self._row(evaluation) for evaluation in self.evaluations}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("solver")
 
+    def figures(self) -> "pd.DataFrame":
+        """What the finger does by each solver: force in N, tip, wrap, stress, compliance, mass.
+
+        A row a solver, a column for each of `solvers.finger_figures.QUANTITIES`, with its unit in the name.
+        Those from a solver that knows its interval have `_low` and `_high` columns of 95 %; NaN elsewhere.
+        """
+        import pandas as pd
+
+        known = {each.solver: each.figures for each in self.evaluations if each.figures is not None}
+        rows = {solver: figures.columns() for solver, figures in known.items()}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("solver")
+
     def _row(self, evaluation: Evaluation) -> dict[str, object]:
         held_out = held_out_errors(evaluation, self.observations)
         given = marker_errors(evaluation, self.observations) if evaluation.in_sample else None

@@ -6,7 +6,7 @@ They are kept as an archive of NumPy arrays: a run is resumed, and a result comp
 import json
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from geometry.arrays import FloatArray
 from geometry.atomic import write_arrays
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.finger_figures import FingerFigures
 from solvers.lagrange import LagrangeSpace
 from solvers.solution import IdentifiedForce, SolidField, Solution
 
@@ -72,6 +73,7 @@ def _magnitude(values: FloatArray) -> FloatArray:
 
 QUADRATURE_DEGREE = 2
 DIFFERENCES, FORCE = TypeAdapter(ReferenceDifferences | None), TypeAdapter(IdentifiedForce | None)
+FIGURES = TypeAdapter(FingerFigures | None)
 IN_SAMPLE = "† was given these markers: its errors there are training errors"
 """Meaning of the mark in `Evaluation.label_at_markers`."""
 
@@ -109,6 +111,7 @@ class Evaluation:
     #: What the measurement's pictures show of the markers' displacement, if the solver found their frames.
     shown: FloatArray | None = None
     identified: IdentifiedForce | None = None  #: The force that was found from the markers.
+    figures: FingerFigures | None = None  #: What the finger does, if it has a depth and the field is finite.
     warnings: Sequence[str] = ()  #: What speaks against what the solver was given, a sentence each.
     solid: bool = False  #: Whether the field is a plane of a body in three dimensions.
     #: Displacement of the nodes at every row of the history, shape (k, n, 2), mm, if the load was followed.
@@ -204,6 +207,7 @@ class Evaluation:
                 arrays[entry.name] = value
             elif entry.name not in ("history", "certificate"):
                 header[entry.name] = dict(value) if isinstance(value, Mapping) else value
+        header["figures"] = self.figures and asdict(self.figures)
         arrays |= {f"history_{name}": column for name, column in self.history.items()}
         write_arrays(path, {"header": np.array(json.dumps(header)), **arrays})
 
@@ -223,6 +227,7 @@ class Evaluation:
             header["history"] = {name.removeprefix(prefix): arrays.pop(name) for name in columns}
             header["uncertainty"] = DIFFERENCES.validate_python(header["uncertainty"])
             header["identified"] = FORCE.validate_python(header["identified"])
+            header["figures"] = FIGURES.validate_python(header["figures"])
             return cls(**header, **arrays)
         except Exception as error:  # a damaged file can make the reader raise anything
             warnings.warn(

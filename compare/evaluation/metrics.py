@@ -14,6 +14,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.registration import nearest_similarity
+from solvers.finger_figures import figures_of
 from solvers.problem import Load
 from solvers.shared_work import shared
 from solvers.solution import Solution
@@ -142,12 +143,14 @@ def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None)
 
 
 def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> Evaluation:
-    """Evaluate a solution, with its uncertainty if its solver estimates its error.
+    """Evaluate a solution, with its figures, and its uncertainty if its solver estimates its error.
 
     The uncertainty is the difference of the estimate's improved field from the solution. Under prescribed
     displacements, the energy of the error is the error of the energy.
     """
     own, error = Evaluation.of(solution, mesh, markers), solution.error
+    if solution.problem.finger is not None and own.finite:
+        own = replace(own, figures=figures_of(solution))
     if error is None:
         return own
     energy = solution.energy * (1 - error.energy_norm**2)

@@ -29,6 +29,7 @@ from compare.evaluation.metrics import (
 from geometry.atomic import write_text
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from solvers.finger_figures import FingerFigures
 
 SCHEMA = 1
 """Keys may be added to a schema; a key that is renamed or removed makes a new one."""
@@ -77,6 +78,7 @@ def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
         "stats": dict(evaluation.stats),
         "force": evaluation.identified
         and {name: part and part._asdict() for name, part in evaluation.identified._asdict().items()},
+        "figures": evaluation.figures and _figures(evaluation.figures),
         "certificate": evaluation.certificate and evaluation.certificate.numbers(),
         "markers": {
             "in_sample": evaluation.in_sample,
@@ -93,6 +95,11 @@ def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
         "to_truth": None if truth is None else _by_component(truth_differences(evaluation, truth)._asdict()),
         "force_to_truth_rel": None if truth is None else force_error(evaluation, truth),
     }
+
+
+def _figures(figures: FingerFigures) -> dict[str, Any]:
+    places = {name: list(place) for name, place in figures.places.items()}
+    return {"values": figures.columns(), "places": places}
 
 
 def _without_rigid_motion(evaluation: Evaluation, observations: Observations) -> dict[str, float] | None:

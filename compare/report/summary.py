@@ -40,10 +40,14 @@ def answers(
         label[name]: {**own, "twin": label.get(own.get("twin"))} for name, own in metrics["solvers"].items()
     }
     metrics = {**metrics, "solvers": solvers, "reference": label[metrics["reference"]]}
+    figures = _figures(metrics)
+    about_solvers = any(own.get("family") == "neural network" for own in solvers.values())
     found = [
         _warnings(metrics),
+        None if about_solvers else figures,
         _trust(metrics),
         _markers(metrics),
+        figures if about_solvers else None,
         _convergence(metrics, unsupported or {}, failed or {}),
     ]
     return [answer for answer in found if answer is not None]
@@ -54,6 +58,62 @@ def _warnings(metrics: Metrics) -> RunAnswer | None:
     said = [f"{text.rstrip('. ')}." for text in metrics.get("warnings", ())]
     count = "One warning" if len(said) == 1 else f"{len(said)} warnings"
     return RunAnswer("What speaks against these numbers?", f"{count}:", said) if said else None
+
+
+FIGURES = (
+    ("force_N", "grip force", "N"),
+    ("force_50_N", "force at half of the stroke", "N"),
+    ("tip_u_mm", "tip, along the finger", "mm"),
+    ("tip_v_mm", "tip, toward the indenter", "mm"),
+    ("wrap_deg", "wrap of the front face", "deg"),
+    ("compliance_across_mm_per_N", "compliance across, at rest", "mm/N"),
+    ("compliance_along_mm_per_N", "compliance along, at rest", "mm/N"),
+    ("von_mises_MPa", "largest von Mises stress *", "MPa"),
+    ("principal_strain", "largest principal strain *", ""),
+    ("strain_energy_mJ", "strain energy", "mJ"),
+    ("mass_g", "mass", "g"),
+    ("thinnest_wall_mm", "thinnest wall", "mm"),
+)
+"""Key in the metrics, words and unit of each figure that is shown."""
+
+
+def _figures(metrics: Metrics) -> RunAnswer | None:
+    """What the finger does: newtons, tip, wrap and stress by every solver."""
+    known = {name: own["figures"] for name, own in metrics["solvers"].items() if own.get("figures")}
+    if not known:
+        return None
+    measured = metrics["measurements"]["source"] == "measured"
+    found_force = [name for name in known if measured and metrics["solvers"][name].get("force")]
+    name = next(iter([*found_force, *(each for each in known if each == metrics["reference"]), *known]))
+    values = known[name]["values"]
+    low, high = (values.get(f"force_{end}_N") for end in ("low", "high"))
+    interval = "" if low is None else f" (95 % interval {number(low, 3)} to {number(high, 3)} N)"
+    moved = hypot(values["tip_u_mm"], values["tip_v_mm"])
+    verdict = (
+        f"By {name} it grips with {number(values['force_N'], 3)} N{interval}, its tip moves by "
+        f"{number(moved, 3)} mm, and the largest strain away from corners is "
+        f"{percent(values['principal_strain'], 2)}."
+    )
+    rows = []
+    for key, words, unit in FIGURES:
+        cells = [_figure(each, key) for each in known.values()]
+        if any(cell != NONE for cell in cells):
+            rows.append([f"{words}, {unit}" if unit else words, *cells])
+    caption = "* At nodes that are a wall thickness away from re-entrant corners, base and contact."
+    return RunAnswer(
+        "What does the finger do?", verdict, [], TextTable("", ["", *known], rows, caption, left=[""])
+    )
+
+
+def _figure(known: Metrics, key: str) -> str:
+    """A figure with its interval, if there is one."""
+    value = known["values"].get(key)
+    if value is None or not isfinite(value):
+        return NONE
+    said = percent(value, 2) if key == "principal_strain" else number(value, 3)
+    name, _, unit = key.rpartition("_")
+    low, high = (known["values"].get(f"{name}_{end}_{unit}") for end in ("low", "high"))
+    return said if low is None else f"{said} ({number(low, 3)} to {number(high, 3)})"
 
 
 def _trust(metrics: Metrics) -> RunAnswer | None:

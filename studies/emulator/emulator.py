@@ -12,9 +12,10 @@ from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.section import finger_section
 from geometry.section.section import Section
+from solvers.finger_figures import QUANTITIES, heading
+from solvers.finger_figures.measures import narrowest_gap, thinnest_wall
 from studies.emulator.gaussian_process import GaussianProcess
 from studies.emulator.inputs import Inputs, Numbers
-from studies.sweep.quantities import QUANTITIES, heading, narrowest_gap, thinnest_wall
 from studies.sweep.study import Study, Value, title
 from studies.sweep.sweep import Sweep
 
@@ -41,7 +42,7 @@ class Predictions:
     """Predicted quantities of n fingers.
 
     Attributes:
-        names: Of the q quantities, in the order of `studies.sweep.quantities.QUANTITIES`.
+        names: Of the q quantities, in the order of `solvers.finger_figures.QUANTITIES`.
         values: Predictions, shape (n, q), in the quantities' units.
         low: Lower ends of the 95 % intervals, shape (n, q); the value itself where it is exact.
         high: Upper ends, shape (n, q).

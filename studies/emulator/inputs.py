@@ -12,9 +12,9 @@ from geometry.errors import UserError
 from geometry.finger.parameters import SYMBOLS, Parameters
 from geometry.finger.section import cavity_ends, rib_feet, rib_pitch
 from geometry.finger.validation import broken_rule
+from solvers.finger_figures import QUANTITIES
 from solvers.problem import Load, Material
 from studies.emulator.frame import BeamFrame
-from studies.sweep.quantities import QUANTITIES
 from studies.sweep.study import PHYSICS, WHOLE, Range, Study, Value, physics_of, unit_of
 
 WIDE = 1.8

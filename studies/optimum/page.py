@@ -13,6 +13,7 @@ from geometry.cache import finger_mesh
 from geometry.drawing.drawn_finger import finger_from
 from geometry.errors import UserError
 from geometry.finger.design import Design
+from solvers.finger_figures import QUANTITIES, heading
 from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
@@ -21,7 +22,6 @@ from studies.optimum.pictures import draw_front, draw_front_fingers, draw_growth
 from studies.optimum.question import Question
 from studies.optimum.search import Optimum
 from studies.sweep.job import StudyJob, Task
-from studies.sweep.quantities import QUANTITIES, heading
 from studies.sweep.study import physics_of, title
 
 PAGE = "front.html"

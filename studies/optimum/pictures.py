@@ -9,9 +9,9 @@ from compare.figures.style import HALO, axes_at, write_heading
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
+from solvers.finger_figures import QUANTITIES
 from solvers.solution import Solution
 from studies.optimum.search import Optimum, is_allowed
-from studies.sweep.quantities import QUANTITIES
 
 BLUE = "#0072b2"
 

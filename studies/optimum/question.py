@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from geometry.errors import UserError
 from geometry.finger.parameters import CheckedModel, bounded
 from geometry.text_files import read_toml
-from studies.sweep.quantities import QUANTITIES
+from solvers.finger_figures import QUANTITIES
 from studies.sweep.study import Study
 
 Sense = Literal["least", "largest"]

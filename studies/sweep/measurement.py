@@ -13,11 +13,12 @@ from geometry.drawing.drawn_finger import finger_from
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.validation import broken_rule
+from solvers.finger_figures import FRACTIONS
 from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solver import Solver, TrainedSolver, TrainingContext, TrainingDiverged
 from studies.sweep.job import Task
-from studies.sweep.quantities import FRACTIONS, quantities
+from studies.sweep.quantities import quantities
 from studies.sweep.study import physics_of
 
 Ending = Literal["done", "not converged", "refused", "failed"]

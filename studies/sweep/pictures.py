@@ -12,8 +12,8 @@ from geometry.arrays import FloatArray
 from geometry.drawing.drawn_finger import finger_from
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.finger.picture import draw_section
+from solvers.finger_figures import QUANTITIES
 from studies.sweep.job import StudyJob
-from studies.sweep.quantities import QUANTITIES
 from studies.sweep.sensitivity import TRUSTED, Sensitivity
 from studies.sweep.study import Study, unit_of
 from studies.sweep.sweep import Sweep

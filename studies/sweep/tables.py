@@ -9,7 +9,7 @@ import pandas as pd
 
 from compare.runtime.tables import TextTable, plain
 from geometry.atomic import write_bytes, write_text
-from studies.sweep.quantities import QUANTITIES, heading
+from solvers.finger_figures import QUANTITIES, heading
 from studies.sweep.study import title
 from studies.sweep.sweep import Sweep
 

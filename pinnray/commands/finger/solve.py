@@ -11,6 +11,7 @@ from pinnray.options.shared import (
     OutputPath,
     PhysicsOptions,
     SolverOptions,
+    comma_list,
     existing_table,
 )
 
@@ -23,14 +24,16 @@ def solve(
     *,
     adapt: Adapt = None,
     measurements: Path | None = None,
+    strokes: str | None = None,
     out: OutputPath = Path("out/solution.vtu"),
 ) -> int:
-    """Solve one finger with one solver and write its fields.
+    """Solve one finger with one solver, write its fields and say what the finger does.
 
     Args:
         solver: Name of a solver; `pinnray solvers` lists them.
         adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
         measurements: CSV file of marker displacements, for an assimilating solver.
+        strokes: Strokes at which to print the force, mm, separated by commas; default: the full one.
         out: VTU file of the fields.
     """
     from compare.evaluation.certification import with_certificates
@@ -39,12 +42,14 @@ def solve(
     from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
     from compare.figures.charts import draw_force_displacement
     from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached
+    from compare.report.figures_table import figures_lines
     from compare.report.output_files import write_vtu
     from compare.runtime.stages import Stages
     from solvers.problem import Problem
     from solvers.solver import Traits, solved, with_law
     from vision.measurements import read_measurements
 
+    at_strokes = [_stroke(text) for text in comma_list(strokes or "")]
     chosen, settings = finger.read(options.preset)
     material, load = physics.read(options.preset)
     if out.suffix != ".vtu":
@@ -82,6 +87,8 @@ def solve(
         with stages.stage("certificate"):
             certified = with_certificates([evaluated(solution, triangles)], problem)
             (evaluation,), remarks = with_body_checks(certified, triangles)
+        figures = evaluation.figures
+        grip = [(stroke, figures.force_at(stroke)) for stroke in at_strokes] if figures else []
         write_vtu(out, triangles, evaluation)
         written = [out]
         if curves := force_curves([evaluation], load):
@@ -93,6 +100,15 @@ def solve(
     print(f"{evaluation.label}: {evaluation.message}")
     u, v = solution.reaction
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
+    if figures:
+        print("\n".join(figures_lines(figures, grip)))
     for path in written:
         print(path)
     return 0 if evaluation.converged and tolerance_reached(adaptation) else NOT_CONVERGED
+
+
+def _stroke(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UserError(f"--strokes {text}: give lengths in mm, such as 2,5,10") from None

@@ -115,7 +115,7 @@ def read_finger(emulator: "Emulator", settings: dict[str, str], where: str) -> "
 def print_table(emulator: "Emulator", found: "Predictions") -> None:
     """Print the quantities of one finger."""
     from compare.runtime.tables import terminal_table
-    from studies.sweep.quantities import QUANTITIES
+    from solvers.finger_figures import QUANTITIES
 
     headings = ["quantity", "unit", "value", "95 % interval", "meaning"]
     rows = []

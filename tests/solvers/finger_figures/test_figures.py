@@ -12,18 +12,17 @@ from geometry.finger.section import rib_pitch
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Physics, Problem
-from solvers.registry import make_solver
-from solvers.solution import Solution, Status
-from studies.sweep.quantities import (
-    QUANTITIES,
-    forces,
+from solvers.finger_figures import QUANTITIES, FingerFigures, figures_of
+from solvers.finger_figures.measures import (
+    force_curve,
     largest_away_from_corners,
     narrowest_gap,
-    quantities,
     thinnest_wall,
     wrap_angle,
 )
+from solvers.problem import Load, Material, Physics, Problem
+from solvers.registry import make_solver
+from solvers.solution import Solution, Status
 
 FINGER = Design()
 PROBLEM = Problem(finger_mesh(FINGER, settings=MeshSettings(size=1.0)), finger=FINGER)
@@ -66,7 +65,7 @@ def test_wrap_is_positive_where_the_tip_stays_and_the_contact_moves_in() -> None
 
 def test_the_largest_stress_of_a_uniform_strain_is_that_strains() -> None:
     strained = affine([[0.01, 0.0], [0.0, -0.002]])
-    stress, strain = largest_away_from_corners(strained)
+    stress, strain = (each.value for each in largest_away_from_corners(strained))
     state = strained.state(PROBLEM.mesh.at_centroids())
     assert stress == pytest.approx(state.von_mises[0], rel=1e-12)
     assert strain == pytest.approx(0.01, rel=1e-12)
@@ -76,7 +75,7 @@ def test_the_largest_stress_depends_little_on_the_mesh() -> None:
     found = [
         largest_away_from_corners(
             FemSolver(estimate=False).solve(Problem(finger_mesh(FINGER, settings=MeshSettings(size=size))))
-        )[0]
+        )[0].value
         for size in (0.5, 0.25)
     ]
     # A measured 1 % apart; the largest value at centroids, corners included, doubles.
@@ -84,7 +83,7 @@ def test_the_largest_stress_depends_little_on_the_mesh() -> None:
 
 
 def test_compliance_across_is_displacement_over_force_of_a_load_that_leaves_u_free() -> None:
-    _, found = quantities(FINGER, PROBLEM, FemSolver(), density=1.2)
+    found = figures_of(FemSolver(estimate=False).solve(PROBLEM)).values()
     sliding = FemSolver(estimate=False).solve(replace(PROBLEM, load=Load(displacement=(None, -10.0))))
     force = -sliding.reaction[1] * FINGER.depth
     assert found["compliance_across"] == pytest.approx(10 / force, rel=1e-9)
@@ -93,7 +92,8 @@ def test_compliance_across_is_displacement_over_force_of_a_load_that_leaves_u_fr
 
 
 def test_the_quantities_of_the_default_finger() -> None:
-    solution, found = quantities(FINGER, PROBLEM, FemSolver(), density=1.2)
+    solution = FemSolver(estimate=False).solve(PROBLEM)
+    found = figures_of(solution).values()
     assert list(found) == list(QUANTITIES)
     assert found["force"] == pytest.approx(-solution.reaction[1] * FINGER.depth)
     assert found["force_25"] == pytest.approx(found["force"] / 4)
@@ -103,7 +103,8 @@ def test_the_quantities_of_the_default_finger() -> None:
 
 def test_force_acts_along_the_travel() -> None:
     oblique = replace(PROBLEM, load=Load(displacement=(3.0, -4.0)))
-    assert forces(affine([[0, 0], [0, 0]], oblique), 20.0)["force"] == pytest.approx(20 * (0.18 + 1.6))
+    (travel, force) = force_curve(affine([[0, 0], [0, 0]], oblique), 20.0)[-1]
+    assert (travel, force) == pytest.approx((5.0, 20 * (0.18 + 1.6)))
 
 
 def test_a_recorded_path_gives_the_force_on_the_way() -> None:
@@ -113,11 +114,36 @@ def test_a_recorded_path_gives_the_force_on_the_way() -> None:
         "reaction_x": np.zeros(2),
         "reaction_y": np.array([-0.4, -2.0]),
     }
-    found = forces(replace(affine([[0, 0], [0, 0]], nonlinear), history=history), 10.0)
-    assert [found[name] for name in ("force_25", "force_50", "force_75", "force")] == pytest.approx(
-        [2, 4, 12, 20]
+    recorded = replace(affine([[0, 0], [0, 0]], nonlinear), history=history)
+    np.testing.assert_allclose(force_curve(recorded, 10.0), [(0, 0), (5, 4), (10, 20)])
+    found = figures_of(recorded, rest={})
+    depth = FINGER.depth / 10
+    assert [found.force_25, found.force_50, found.force_75, found.force] == pytest.approx(
+        [2 * depth, 4 * depth, 12 * depth, 20 * depth]
     )
-    assert np.isnan(forces(affine([[0, 0], [0, 0]], nonlinear), 10.0)["force_50"])
+    assert found.force_at(6.0) == pytest.approx(depth * (4 + 16 / 5))
+    with pytest.raises(ValueError, match="known from 0 to 10 mm, not at 11 mm"):
+        found.force_at(11.0)
+    alone = figures_of(affine([[0, 0], [0, 0]], nonlinear), rest={})
+    assert np.isnan(alone.force_50)
+    with pytest.raises(ValueError, match="known at 10 mm only"):
+        alone.force_at(5.0)
+
+
+def test_figures_are_said_in_newtons_with_the_place_of_the_largest_stress() -> None:
+    found = figures_of(FemSolver(estimate=False).solve(PROBLEM))
+    rows = {name: (value, remark) for name, value, remark in found.rows() if name}
+    assert rows["grip force"] == (f"{found.force:.4g} N", f"at 10 mm, {found.force / FINGER.depth:.4g} N/mm")
+    assert "largest at (" in rows["von Mises stress"][1]
+    x, y = found.places["von_mises"]
+    away = largest_away_from_corners(FemSolver(estimate=False).solve(PROBLEM))[0]
+    assert (x, y) == pytest.approx(tuple(away.place))
+    assert "compliance across" not in {name for name, *_ in FingerFigures(force=1.0, depth=2.0).rows()}
+
+
+def test_a_plane_body_has_no_figures() -> None:
+    with pytest.raises(ValueError, match="a finger with a depth"):
+        figures_of(FemSolver(estimate=False).solve(replace(PROBLEM, finger=None)))
 
 
 def test_walls_and_gaps_of_a_finger_with_known_ones() -> None:
@@ -130,9 +156,11 @@ def test_walls_and_gaps_of_a_finger_with_known_ones() -> None:
 @pytest.mark.slow
 def test_a_cylinder_at_finite_strain_has_every_quantity() -> None:
     pressed = replace(PROBLEM, load=Physics(load="cylinder").parts[1])
-    solution, found = quantities(FINGER, pressed, make_solver("fem-nonlinear"), density=1.2)
+    pressed = replace(pressed, material=Material(law="neo-hookean"))
+    solution = make_solver("fem-nonlinear").solve(pressed)
     assert solution.status.converged
-    assert np.isfinite(list(found.values())).all()
+    found = figures_of(solution)
+    assert np.isfinite(list(found.values().values())).all()
     # Force grows faster than the stroke, and the tip comes toward the indenter (docs/examples/rib_sweep.py).
-    assert found["force_50"] < 0.5 * found["force"]
-    assert found["tip_v"] > 0
+    assert found.force_50 < 0.5 * found.force
+    assert found.tip_v > 0

@@ -12,10 +12,11 @@ import pytest
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from pinnray.cli import main
+from solvers.finger_figures import QUANTITIES, Quantity
+from solvers.finger_figures.measures import narrowest_gap, thinnest_wall
 from studies.emulator import emulator as module
 from studies.emulator.emulator import Emulator
 from studies.emulator.store import FILE, emulator_of
-from studies.sweep.quantities import QUANTITIES, Quantity, narrowest_gap, thinnest_wall
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
 from studies.sweep.study import Study, Value

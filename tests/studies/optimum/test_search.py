@@ -11,12 +11,12 @@ from compare.runtime.stages import Stages
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
 from pinnray.cli import main
+from solvers.finger_figures import QUANTITIES
 from studies.optimum.page import front_grid, front_sentences, spread
 from studies.optimum.question import Limit, Question
 from studies.optimum.search import Optimum, search_front
 from studies.sweep.job import StudyJob, Task
 from studies.sweep.measurement import Measurement
-from studies.sweep.quantities import QUANTITIES
 from studies.sweep.store import Journal
 from studies.sweep.study import Range
 

@@ -1,0 +1,21 @@
+"""What a finger does under its load, in its designer's units: force, tip, wrap, stress, compliance, mass."""
+
+from solvers.finger_figures.figures import (
+    FRACTIONS,
+    QUANTITIES,
+    FingerFigures,
+    Quantity,
+    figures_at_rest,
+    figures_of,
+    heading,
+)
+
+__all__ = [
+    "FRACTIONS",
+    "QUANTITIES",
+    "FingerFigures",
+    "Quantity",
+    "figures_at_rest",
+    "figures_of",
+    "heading",
+]

@@ -1,0 +1,293 @@
+"""Figures by which a designer judges a finger: their names, units and meanings, said once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from geometry.errors import UserError
+from geometry.finger.finger import Finger
+from solvers.finger_figures.measures import (
+    Extreme,
+    force_curve,
+    front_ends,
+    largest_away_from_corners,
+    narrowest_gap,
+    thinnest_wall,
+    wrap_angle,
+)
+from solvers.problem import Load, Material, Problem
+from solvers.shared_work import shared
+from solvers.solution import Solution
+
+if TYPE_CHECKING:
+    from solvers.fem.linear import FactorisedProblem
+
+DENSITY = 1.2
+"""Of a printed polyurethane, g/cm^3."""
+NORMAL = 1.96
+"""Half of a 95 % interval over the standard deviation."""
+
+Interval = tuple[float, float]
+Place = tuple[float, float]
+
+
+class Quantity(NamedTuple):
+    """A number that describes a finger under its load."""
+
+    unit: str  #: Empty for a ratio
+    meaning: str  #: A clause for tables and captions
+
+
+def _figure(unit: str, meaning: str) -> Any:
+    return field(default=float("nan"), metadata={"quantity": Quantity(unit, meaning)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class FingerFigures:
+    """What a finger does under its load. Numbers are NaN where the solver does not give them.
+
+    Attributes:
+        intervals: 95 % intervals by the names of the figures, where the solver knows them.
+        places: Drawn points of the largest stress and strain, mm, by the names of these figures.
+        curve: Travel of the indenter, mm, and its force along it, N, from rest on; one pair where the way to
+            the end is not known.
+        depth: Of the finger, mm.
+        strain_energy: Elastic energy of the whole finger, mJ.
+    """
+
+    force: float = _figure(
+        "N", "force of the indenter at the full stroke, along the travel, for the whole depth"
+    )
+    force_25: float = _figure("N", "the same at 25 % of the stroke")
+    force_50: float = _figure("N", "the same at 50 % of the stroke")
+    force_75: float = _figure("N", "the same at 75 % of the stroke")
+    tip_u: float = _figure("mm", "displacement of the front's tip along the finger")
+    tip_v: float = _figure("mm", "displacement of the front's tip across it, positive toward the indenter")
+    wrap: float = _figure("deg", "wrap angle: how far the front face folds around the indenter")
+    compliance_along: float = _figure(
+        "mm/N", "displacement of the contact along the finger per force, at rest"
+    )
+    compliance_across: float = _figure("mm/N", "displacement of the contact across it per force, at rest")
+    von_mises: float = _figure(
+        "MPa", "largest von Mises stress, a wall thickness away from corners and contact"
+    )
+    principal_strain: float = _figure("", "largest principal strain there")
+    area: float = _figure("mm2", "area of the section")
+    mass: float = _figure("g", "mass of the body")
+    thinnest_wall: float = _figure("mm", "thinnest wall or rib")
+    narrowest_gap: float = _figure("mm", "narrowest clear width of a cavity")
+    strain_energy: float = float("nan")
+    depth: float = float("nan")
+    intervals: Mapping[str, Interval] = field(default_factory=dict)
+    places: Mapping[str, Place] = field(default_factory=dict)
+    curve: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def force_per_depth(self) -> float:
+        """Force of the indenter along its travel, N/mm."""
+        return self.force / self.depth
+
+    @property
+    def stroke(self) -> float:
+        """Travel of the indenter, mm."""
+        return self.curve[-1][0] if self.curve else float("nan")
+
+    @property
+    def tip(self) -> float:
+        """How far the tip moves, mm."""
+        return float(np.hypot(self.tip_u, self.tip_v))
+
+    @property
+    def tip_direction(self) -> float:
+        """Direction in which the tip moves, degrees counter-clockwise from the finger's axis."""
+        return float(np.degrees(np.arctan2(self.tip_v, self.tip_u)))
+
+    def force_at(self, stroke: float) -> float:
+        """Force of the indenter, N, after a travel, mm; between computed equilibria it is interpolated.
+
+        Raises:
+            UserError: If the travel is longer than the load's, or the way to the end is not known.
+        """
+        travels, forces = np.array(self.curve).T
+        if not 0 <= stroke <= travels[-1] * (1 + 1e-9):
+            raise UserError(f"the force is known from 0 to {travels[-1]:.4g} mm, not at {stroke:g} mm")
+        if len(travels) == 1 and not np.isclose(stroke, travels[-1]):
+            raise UserError(
+                f"the force is known at {travels[-1]:.4g} mm only; fem and fem-nonlinear know the way there"
+            )
+        return float(np.interp(stroke, travels, forces))
+
+    def values(self) -> dict[str, float]:
+        """The numbers by the names of `QUANTITIES`."""
+        return {name: getattr(self, name) for name in QUANTITIES}
+
+    def columns(self) -> dict[str, float]:
+        """The numbers by name and unit, such as `force_N`, with ends of intervals, as `force_low_N`."""
+        found = {}
+        for name, value in self.values().items():
+            unit = heading(name).removeprefix(name)
+            found[f"{name}{unit}"] = value
+            for end, bound in zip(("low", "high"), self.intervals.get(name, ()), strict=False):
+                found[f"{name}_{end}{unit}"] = bound
+        return found | {"strain_energy_mJ": self.strain_energy}
+
+    def rows(self) -> list[tuple[str, str, str]]:
+        """What, how much with its unit and interval, and a remark: a row for each figure that is known."""
+        rows = [
+            (
+                "grip force",
+                self._said("force", "N"),
+                f"at {self.stroke:g} mm, {self.force_per_depth:.4g} N/mm",
+            ),
+            (
+                "tip displacement",
+                f"{self.tip:.4g} mm",
+                f"{self.tip_u:+.3g} mm along, {self.tip_v:+.3g} mm across (positive toward the indenter)",
+            ),
+            ("wrap", f"{self.wrap:.3g} deg", "fold of the front face around the indenter"),
+            ("compliance across", f"{self.compliance_across:.4g} mm/N", "of the contact, at rest"),
+            ("compliance along", f"{self.compliance_along:.4g} mm/N", "of the contact, at rest"),
+            ("von Mises stress", self._said("von_mises", "MPa"), self._where("von_mises")),
+            ("principal strain", f"{self.principal_strain:.2%}", self._where("principal_strain")),
+            ("strain energy", f"{self.strain_energy:.4g} mJ", ""),
+            ("mass", f"{self.mass:.3g} g", f"{self.area:.4g} mm2 of section, {self.depth:g} mm deep"),
+            ("smallest wall", f"{self.thinnest_wall:.3g} mm", f"narrowest gap {self.narrowest_gap:.3g} mm"),
+        ]
+        return [row for row in rows if not row[1].startswith("nan")]
+
+    def _said(self, name: str, unit: str) -> str:
+        value = f"{getattr(self, name):.4g}"
+        if (interval := self.intervals.get(name)) is not None:
+            value += f" ({interval[0]:.4g} to {interval[1]:.4g})"
+        return f"{value} {unit}"
+
+    def _where(self, name: str) -> str:
+        if (place := self.places.get(name)) is None:
+            return ""
+        return f"largest at ({place[0]:.3g}, {place[1]:.3g}) mm, away from corners and contact"
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    each.name: each.metadata["quantity"] for each in fields(FingerFigures) if "quantity" in each.metadata
+}
+"""Every quantity of a table, in its order."""
+FRACTIONS = {"force_25": 0.25, "force_50": 0.5, "force_75": 0.75}
+"""Points of the force-stroke curve, as fractions of the stroke."""
+
+
+def heading(name: str, quantity: Quantity | None = None) -> str:
+    """Column heading of a quantity: its name with the unit, such as `force_N`."""
+    unit = (quantity or QUANTITIES[name]).unit.replace("/", "_per_")
+    return f"{name}_{unit}" if unit else name
+
+
+def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> FingerFigures:
+    """The figures of a solution.
+
+    Args:
+        solution: Of a finger with a depth.
+        rest: What `figures_at_rest` gives for its problem; it is computed if None.
+
+    Raises:
+        UserError: If the problem is of a body without a depth.
+    """
+    problem, depth = solution.problem, _finger(solution.problem).depth
+    curve = force_curve(solution, depth)
+    length, force = curve[-1]
+    ways = {
+        name: float(np.interp(share * length, *curve.T)) if len(curve) > 1 else float("nan")
+        for name, share in FRACTIONS.items()
+    }
+    tip_u, tip_v = solution.displacement(front_ends(problem)[1:])[0]
+    stress, strain = largest_away_from_corners(solution)
+    return FingerFigures(
+        force=float(force),
+        **ways,
+        tip_u=float(tip_u),
+        tip_v=float(tip_v),
+        wrap=wrap_angle(solution),
+        von_mises=stress.value,
+        principal_strain=strain.value,
+        **(figures_at_rest(problem) if rest is None else rest),
+        strain_energy=float(solution.energy) * depth,
+        depth=depth,
+        intervals=_intervals(solution, depth, stress),
+        places={
+            name: (float(each.place[0]), float(each.place[1]))
+            for name, each in (("von_mises", stress), ("principal_strain", strain))
+            if np.isfinite(each.value)
+        },
+        curve=tuple((float(travel), float(size)) for travel, size in curve),
+    )
+
+
+def figures_at_rest(
+    problem: Problem, *, density: float = DENSITY, prepared: "FactorisedProblem | None" = None
+) -> dict[str, float]:
+    """The figures that do not depend on the load, by name: compliances, mass, area, walls and gaps.
+
+    Solvers of one problem share them inside `SharedWork.used`.
+
+    Args:
+        problem: Its finger, its elastic constants and the place of its contact.
+        density: Of the material, g/cm^3.
+        prepared: The linear problem, factorised, where it is at hand.
+    """
+    finger, position = _finger(problem), problem.load.position
+    linear = problem.material.model_copy(update={"law": "linear"})
+
+    def computed() -> dict[str, float]:
+        along, across = _compliances(prepared or _prepared(problem, linear), position, finger.depth)
+        return {
+            "compliance_along": along,
+            "compliance_across": across,
+            "area": finger.section.area,
+            "mass": finger.section.area * finger.depth * density / 1000,
+            "thinnest_wall": thinnest_wall(finger.section),
+            "narrowest_gap": narrowest_gap(finger.section),
+        }
+
+    depends_on = problem.mesh.digest, finger.digest, repr(linear), position, density
+    return shared(("figures at rest", *depends_on), computed)
+
+
+def _prepared(problem: Problem, linear: Material) -> "FactorisedProblem":
+    from solvers.fem.linear import FemSolver
+
+    still = replace(problem, material=linear, load=Load(position=problem.load.position), observations=None)
+    return FemSolver(estimate=False).prepare(still)
+
+
+def _finger(problem: Problem) -> Finger:
+    if problem.finger is None:
+        raise UserError("figures are of a finger with a depth; this problem is of a plane body")
+    return problem.finger
+
+
+def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, Interval]:
+    """The 95 % intervals of force and stress that a solver knows."""
+    found: dict[str, Interval] = {}
+    if solution.identified is not None:
+        _, low, high = solution.identified.size
+        found["force"] = depth * low, depth * high
+    known = solution.uncertainty
+    if known is not None and known.von_mises is not None and np.isfinite(stress.value):
+        half = NORMAL * float(known.von_mises(solution.problem.mesh.locate(stress.place[None]))[0])
+        found["von_mises"] = max(stress.value - half, 0.0), stress.value + half
+    return found
+
+
+def _compliances(prepared: "FactorisedProblem", position: float | None, depth: float) -> tuple[float, float]:
+    """Displacement of the contact per force on the whole depth, along and across the finger, mm/N.
+
+    The force acts in one direction, and the contact is free in the other.
+    """
+    units = (
+        Load(displacement=(1.0, 0.0), position=position),
+        Load(displacement=(0.0, 1.0), position=position),
+    )
+    stiffness = depth * np.array([prepared.solve(unit).reaction for unit in units])
+    compliance = np.linalg.inv(stiffness)
+    return float(compliance[0, 0]), float(compliance[1, 1])

@@ -1,0 +1,120 @@
+"""The measures of a loaded finger: force over stroke, wrap angle, extremes away from corners, thin places."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geometry.arrays import FloatArray
+from geometry.mesh.boundary import mean_thickness, singular_points
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.section.section import Section
+from geometry.section.thickness import cavity_widths, wall_thickness
+from solvers.problem import Problem, contact_ends, contact_nodes, front_points
+from solvers.solution import SolidField, Solution, State
+
+RAY_SPACING = 0.5
+"""Distance of the points from which wall thickness and gaps are measured, mm."""
+
+
+class Extreme(NamedTuple):
+    """A largest value and the node where it is, shape (2,), mm; both NaN if no node counts."""
+
+    value: float
+    place: FloatArray
+
+
+def force_curve(solution: Solution, depth: float) -> FloatArray:
+    """Travel of the indenter, mm, and its force along it for the whole depth, N, from rest on: shape (k, 2).
+
+    The linear law has a straight line, and a solver that follows the load a point for each equilibrium. Of
+    any other only the end is known, and nothing of its way: that is the one row.
+    """
+    load = solution.problem.load
+    travel = np.array([value or 0.0 for value in load.displacement])
+    length = float(np.linalg.norm(travel))
+    ahead = depth * travel / length
+    last, history = float(solution.reaction @ ahead), solution.history
+    if {"load_fraction", "reaction_x", "reaction_y"} <= history.keys():
+        path = np.stack([history["reaction_x"], history["reaction_y"]], axis=1) @ ahead
+        return np.array([(0.0, 0.0), *zip(length * history["load_fraction"], path, strict=True)])
+    straight = solution.problem.material.law == "linear" and solution.problem.observations is None
+    return np.array([(0.0, 0.0), (length, last)] if straight else [(length, last)])
+
+
+def wrap_angle(solution: Solution) -> float:
+    """By how many degrees the front face folds around the indenter.
+
+    The front's end at the base, the contact's middle and the front's end at the tip are joined by two chords.
+    The wrap angle is what the load adds to the turn from the first chord to the second: positive if the tip
+    comes around the indenter, negative if it gives way more than the chord before the contact does. A finger
+    that moves as a rigid body has none.
+    """
+    before = kink_points(solution.problem)
+    after = before + solution.displacement(before)
+    return turn(after) - turn(before)
+
+
+def largest_away_from_corners(solution: Solution) -> tuple[Extreme, Extreme]:
+    """The largest von Mises stress, MPa, and principal strain at nodes away from singular points.
+
+    At sharp corners both grow without bound as elements shrink. Nodes nearer than the body's mean wall
+    thickness to a re-entrant corner, an end of the base or the contact do not count. The displacement
+    gradient at a node is the mean over its triangles, weighted by their areas, so that the numbers depend
+    little on where the mesher puts its nodes.
+    """
+    problem = solution.problem
+    mesh = problem.mesh
+    singular = np.concatenate([singular_points(mesh), mesh.points[contact_nodes(problem)]])
+    far = cKDTree(singular).query(mesh.points)[0] > mean_thickness(mesh)
+    if not far.any():
+        nowhere = Extreme(np.nan, np.full(2, np.nan))
+        return nowhere, nowhere
+    state, places = State.from_gradient(_nodal_gradient(solution)[far], problem), mesh.points[far]
+    principal = np.linalg.eigvalsh(state.strain)[:, -1]
+    stress, strain = (
+        Extreme(float(values.max()), places[values.argmax()]) for values in (state.von_mises, principal)
+    )
+    return stress, strain
+
+
+def thinnest_wall(section: Section) -> float:
+    """Thickness of the thinnest wall or rib, mm; see `geometry.section.thickness`."""
+    return float(wall_thickness(section, RAY_SPACING)[1].min(initial=np.inf))
+
+
+def narrowest_gap(section: Section) -> float:
+    """Smallest clear width of a cavity, mm, by the same rays across the cavity; infinite without cavities."""
+    return float(cavity_widths(section, RAY_SPACING)[1].min(initial=np.inf))
+
+
+def front_ends(problem: Problem) -> FloatArray:
+    """The front's ends at base and tip, shape (2, 2), mm."""
+    nodes = problem.mesh.points[np.unique(problem.mesh.boundary("front"))]
+    return nodes[[nodes[:, 0].argmin(), nodes[:, 0].argmax()]]
+
+
+def kink_points(problem: Problem) -> FloatArray:
+    """The front's end at the base, the contact's middle and the front's end at the tip, shape (3, 2), mm."""
+    base, tip = front_ends(problem)
+    middle = front_points(problem.mesh, np.array([0.5 * sum(contact_ends(problem))]))
+    return np.concatenate([[base], middle, [tip]])
+
+
+def turn(points: FloatArray) -> float:
+    """Angle from the chord between the first two of three points to that between the last two, degrees."""
+    (x0, y0), (x1, y1) = np.diff(points, axis=0)
+    return float(np.degrees(np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)))
+
+
+def _nodal_gradient(solution: Solution) -> FloatArray:
+    """The displacement gradient at the mesh's nodes, mean over their triangles, (n, 2, 2) or (n, 3, 3)."""
+    mesh: TriangleMesh = solution.problem.mesh
+    corners = mesh.at_barycentric(np.eye(3))
+    field = solution.field
+    found = field.solid_gradient(corners) if isinstance(field, SolidField) else field.gradient(corners)
+    nodes, weights = mesh.triangles.ravel(), np.repeat(mesh.areas, 3)
+    count, shape = len(mesh.points), found.shape[1:]
+    sums = [np.bincount(nodes, weights * column, count) for column in found.reshape(len(found), -1).T]
+    means = np.stack(sums, axis=1) / np.bincount(nodes, weights, count)[:, None]
+    return np.asarray(means.reshape(-1, *shape))
