@@ -35,7 +35,7 @@ def calibration_table(calibration: Calibration) -> Table:
     table.add_row("rms error of the fit", f"{calibration.rms:.3f}", "", "px")
     table.add_row("rms error held out", f"{calibration.held_out_rms:.3f}", "", "px")
     table.add_row("coverage of the image", f"{100 * calibration.coverage:.0f}", "", "%")
-    table.add_row("photographs with the board", f"{seen} of {seen + len(calibration.boardless)}", "", "")
+    table.add_row("photographs with the board", f"{seen} of {seen + len(calibration.left_out)}", "", "")
     return table
 
 

@@ -23,17 +23,17 @@ MAX_SUGGESTIONS = 8
 
 def find_views(
     images: Iterable[tuple[str, GreyImage]], board: Board
-) -> tuple[dict[str, FloatArray], tuple[int, int], tuple[str, ...]]:
+) -> tuple[dict[str, FloatArray], tuple[int, int], dict[str, str]]:
     """Find a board in photographs; only one is in memory at a time.
 
     Returns:
-        The views by the name of the photograph, (width, height) of all, and names of those without the board.
+        The views by the name of the photograph, (width, height) of all, and why others are left out, by name.
 
     Raises:
         UserError: If the sizes differ, or most photographs show a board of another size.
     """
     views: dict[str, FloatArray] = {}
-    boardless: list[str] = []
+    left_out: dict[str, str] = {}
     others = Counter[str]()
     sizes: dict[tuple[int, int], list[str]] = {}
     for name, image in images:
@@ -43,22 +43,31 @@ def find_views(
             continue  # the rest only tells which size is the usual one
         corners = board.find(image)
         if corners is not None:
-            views[name] = corners
+            if board.determines_pose(np.isfinite(corners[:, 0])):
+                views[name] = corners
+            else:
+                left_out[name] = unusable(corners)
             continue
-        boardless.append(name)
-        undecided = len(views) < FEWEST_VIEWS and len(boardless) <= MAX_SUGGESTIONS
+        left_out[name] = f"no board of {board} was found"
+        undecided = len(views) < FEWEST_VIEWS and len(left_out) <= MAX_SUGGESTIONS
         if undecided and (other := board.suggest(image)):
             others[other] += 1
     if len(sizes) > 1:
         raise UserError(_other_sizes(sizes))
     other, votes = others.most_common(1)[0] if others else ("", 0)
-    searched = min(len(boardless), MAX_SUGGESTIONS)
+    searched = min(len(left_out), MAX_SUGGESTIONS)
     if len(views) < FEWEST_VIEWS and votes > max(1, len(views), searched / 2):
         raise UserError(
-            f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
+            f"{len(views)} of {len(views) + len(left_out)} photographs show the board of {board}; "
             f"{votes} seem to show {other}"
         )
-    return views, next(iter(sizes), (0, 0)), tuple(boardless)
+    return views, next(iter(sizes), (0, 0)), left_out
+
+
+def unusable(corners: FloatArray) -> str:
+    """Why corners, shape (n, 2), NaN where one is not seen, do not determine the board's pose."""
+    count = int(np.isfinite(corners[:, 0]).sum())
+    return f"the {count} corners that are seen are too few or lie on a line"
 
 
 def _other_sizes(sizes: Mapping[tuple[int, int], Sequence[str]]) -> str:

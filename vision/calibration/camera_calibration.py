@@ -9,16 +9,24 @@ Units: pixels, mm.
 import math
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.board_views import FEWEST_VIEWS, coverage, find_views
+from vision.calibration.board_views import FEWEST_VIEWS, MAX_NAMED, coverage, find_views, unusable
 from vision.calibration.camera import Camera
 from vision.calibration.chessboard import Board
-from vision.calibration.lens_fit import LENS_CHOICES, LensChoice, fit_lens, held_out_rms, rms
+from vision.calibration.lens_fit import (
+    LENS_CHOICES,
+    LensChoice,
+    UnusableViewsError,
+    fit_lens,
+    held_out_rms,
+    rms,
+)
 from vision.frames.frame import GreyImage
 
 LEAST_COVERAGE = 0.6
@@ -38,7 +46,7 @@ class Calibration:
         residuals: Observed minus predicted by the fit, likewise.
         held_out_rms: Root mean square reprojection error in photographs left out of the fit, pixels.
         coverage: Share of the image area that was inside a board at least once.
-        boardless: Names of the photographs in which no board was found.
+        left_out: Reasons why photographs were not used, by name.
     """
 
     camera: Camera
@@ -47,7 +55,7 @@ class Calibration:
     residuals: Mapping[str, FloatArray]
     held_out_rms: float
     coverage: float
-    boardless: tuple[str, ...] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def rms(self) -> float:
@@ -74,8 +82,8 @@ def calibrate_camera(
         UserError: If the sizes differ, fewer than 4 photographs show the board, or they do not determine the
             camera.
     """
-    views, size, boardless = find_views(images, board)
-    return calibrate_views(views, board, size, lens=lens, boardless=boardless)
+    views, size, left_out = find_views(images, board)
+    return calibrate_views(views, board, size, lens=lens, left_out=left_out)
 
 
 def calibrate_views(
@@ -84,31 +92,39 @@ def calibrate_views(
     size: tuple[int, int],
     *,
     lens: LensChoice = LENS_CHOICES[0],
-    boardless: tuple[str, ...] = (),
+    left_out: Mapping[str, str] = MappingProxyType({}),
 ) -> Calibration:
     """Calibrate a camera from the corners of a board in images of `size`, (width, height).
+
+    Views that do not determine the board's pose are left out, and so are those that are no image of it.
 
     Args:
         views: By name, in the order of `board.corners`, shape (n, 2), pixels; NaN where one was not seen.
         board: In the images.
         size: Of the images, pixels.
         lens: Model to fit.
-        boardless: Names of photographs without a board.
+        left_out: Reasons why other photographs are not used, by name.
 
     Raises:
         UserError: If there are fewer than 4 views, or they do not determine the camera.
     """
-    if len(views) < FEWEST_VIEWS:
-        raise UserError(
-            f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
-            + (
-                f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
-                if views
-                else "count them"
-            )
+    weak = {
+        name: unusable(view)
+        for name, view in views.items()
+        if not board.determines_pose(np.isfinite(view[:, 0]))
+    }
+    views, left_out = _without(views, left_out, weak)
+    _check_enough(views, left_out, board)
+    try:
+        fitted = fit_lens(list(views.values()), board, size, lens)
+    except UnusableViewsError as error:
+        names = [list(views)[number] for number in error.numbers]
+        views, left_out = _without(
+            views, left_out, dict.fromkeys(names, "its corners are no image of the board")
         )
+        _check_enough(views, left_out, board)
+        fitted = fit_lens(list(views.values()), board, size, lens)
     corners = list(views.values())
-    fitted = fit_lens(corners, board, size, lens)
     calibration = Calibration(
         camera=fitted.camera,
         board=board,
@@ -116,10 +132,33 @@ def calibrate_views(
         residuals=dict(zip(views, fitted.residuals, strict=True)),
         held_out_rms=held_out_rms(corners, board, fitted.camera, lens),
         coverage=coverage(corners, size),
-        boardless=boardless,
+        left_out=left_out,
     )
     _warn(calibration)
     return calibration
+
+
+def _without(
+    views: Mapping[str, FloatArray], left_out: Mapping[str, str], reasons: Mapping[str, str]
+) -> tuple[dict[str, FloatArray], dict[str, str]]:
+    """Views without some, and these among those that are left out."""
+    return {name: view for name, view in views.items() if name not in reasons}, {**left_out, **reasons}
+
+
+def _check_enough(views: Mapping[str, FloatArray], left_out: Mapping[str, str], board: Board) -> None:
+    if len(views) >= FEWEST_VIEWS:
+        return
+    missing = f"no board of {board} was found"
+    others = [f"{name}: {reason}" for name, reason in left_out.items() if reason != missing]
+    raise UserError(
+        f"{len(views)} of {len(views) + len(left_out)} photographs show the board of {board}; "
+        + (
+            f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
+            if views or others
+            else "count them"
+        )
+        + "".join(f"; {other}" for other in others[:MAX_NAMED])
+    )
 
 
 def better_lens(

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from itertools import product
 
 import cv2
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from vision.calibration.chessboard import Board
+from vision.calibration.dot_grid import DotGrid
 from vision.frames.frame import GreyImage
 
 MARKER_FREE = 0.6
@@ -62,9 +64,9 @@ class CharucoBoard(Board):
         return f"{self.columns + 1}x{self.rows + 1} squares with markers {self.dictionary}"
 
     def find(self, image: GreyImage) -> FloatArray | None:
-        """Find `corners` in an image, shape (n, 2), pixels, NaN where one is not seen; None if too few are.
+        """Find `corners` in an image, shape (n, 2), pixels, NaN where one is not seen; None if all are.
 
-        Boards of the layout before OpenCV 4.6 are found, too.
+        Boards of the layout before OpenCV 4.6, and those that are printed white on black, are found, too.
 
         Source: S. Garrido-Jurado et al., "Automatic generation and detection of highly reliable fiducial
         markers under occlusion", Pattern Recognition 47, 2014, as in OpenCV,
@@ -73,9 +75,9 @@ class CharucoBoard(Board):
         """
         settings = cv2.aruco.CharucoParameters()
         settings.tryRefineMarkers = True  # looks for missing markers where the others say they are
-        for legacy in (False, True):
-            board = self._opencv(legacy=legacy)
-            pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board, settings).detectBoard(image)
+        for negative, legacy in product((False, True), repeat=2):
+            board, shown = self._opencv(legacy=legacy), cv2.bitwise_not(image) if negative else image
+            pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board, settings).detectBoard(shown)
             if numbers is not None and len(numbers):
                 break
         else:
@@ -103,7 +105,10 @@ class CharucoBoard(Board):
 
 
 def _markers_seen(image: GreyImage, dictionary: str) -> int:
-    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(DICTIONARIES[dictionary]))
+    settings = cv2.aruco.DetectorParameters()
+    settings.detectInvertedMarker = True
+    markers = cv2.aruco.getPredefinedDictionary(DICTIONARIES[dictionary])
+    detector = cv2.aruco.ArucoDetector(markers, settings)
     _, numbers, _ = detector.detectMarkers(image)
     return 0 if numbers is None else len(numbers)
 
@@ -111,20 +116,26 @@ def _markers_seen(image: GreyImage, dictionary: str) -> int:
 def parse_board(
     text: str, square: float, *, marker: float | None = None, dictionary: str = "5X5_100"
 ) -> Board:
-    """Parse 9x6, a chessboard by inner corners, or charuco:8x6, a ChArUco board by squares; sides in mm.
+    """Parse the name of a board; sides in mm.
+
+    9x6 is a chessboard by inner corners, charuco:8x6 a ChArUco board by squares, circles:7x6 a grid of dots,
+    and acircles:4x11 one with every other row shifted.
 
     Raises:
         UserError: If the text names no possible board.
     """
-    if not (found := re.fullmatch(r"(charuco:)?(\d{1,3})x(\d{1,3})", text.strip(), re.IGNORECASE)):
+    if not (found := re.fullmatch(r"(?:(charuco|a?circles):)?(\d{1,3})x(\d{1,3})", text.strip(), re.I)):
         raise UserError(
-            f"cannot read the board {text!r}; give its inner corners, such as 9x6, or the squares of a "
-            "ChArUco board, such as charuco:8x6"
+            f"cannot read the board {text!r}; give its inner corners, such as 9x6, the squares of a ChArUco "
+            "board, such as charuco:8x6, or the dots of a grid, such as circles:7x6 or acircles:4x11"
         )
-    columns, rows = int(found[2]), int(found[3])
-    if not found[1]:
+    kind, columns, rows = (found[1] or "").lower(), int(found[2]), int(found[3])
+    if kind != "charuco":
         if marker is not None:
-            raise UserError(f"the chessboard {text} has no markers; for a ChArUco board give charuco:{text}")
+            size = text.split(":")[-1]
+            raise UserError(f"the board {text} has no markers; for a ChArUco board give charuco:{size}")
+        if kind:
+            return DotGrid(columns, rows, square, asymmetric=kind == "acircles")
         return Board(columns, rows, square)
     if marker is None:
         raise UserError(f"the board {text} has markers; give their side in mm")

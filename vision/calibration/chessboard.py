@@ -23,8 +23,11 @@ SEARCHES = ((1, 0), (2, 0), (1, cv2.CALIB_CB_EXHAUSTIVE))
 
 The smaller image sharpens a blurred board; the exhaustive search finds boards that a fisheye bends.
 """
-FEWEST_CORNERS = 4
-"""In either half of the corners: enough to determine a pose."""
+LEAST_RANK = 0.01
+"""Eighth singular value of a homography's equations over the first, below which points do not determine it.
+
+It is 0 for three of four points on a line, 0.36 for a square, and 0.03 for two rows of 30.
+"""
 
 
 @dataclass(frozen=True)
@@ -85,8 +88,6 @@ class Board:
         else:
             return None
         refined = self.refine(image, guesses, EDGE * self.square)
-        if refined is None:
-            return None
         seen = np.isfinite(refined[:, 0]).reshape(self.rows, self.columns)
         # OpenCV adds rows to smaller boards; its exhaustive search also has false corners in true rows.
         whole = seen.all() if flags else seen.any(axis=0).all() and seen.any(axis=1).all()
@@ -103,39 +104,44 @@ class Board:
         scale = np.divide(image.shape[::-1], small.shape[::-1])
         return np.asarray((np.reshape(corners, (-1, 2)).astype(np.float64) + 0.5) * scale - 0.5)
 
-    def refine(self, image: GreyImage, corners: FloatArray, reach: float) -> FloatArray | None:
+    def refine(self, image: GreyImage, corners: FloatArray, reach: float) -> FloatArray:
         """Refine corners to hundredths of a pixel, shape (n, 2) with NaN where one is not seen.
+
+        Corners that do not determine a pose stay as they are.
 
         Args:
             image: Of the board.
             corners: Guesses, shape (n, 2), pixels.
             reach: Radius around a corner in which the board shows only its two edges, mm.
-
-        Returns:
-            None if the corners that are seen do not determine a pose.
         """
         seen = np.isfinite(corners[:, 0])
-        if not self._determines_pose(seen):
-            return None
+        if not self.determines_pose(seen):
+            return corners
         homography, _ = cv2.findHomography(self.corners[seen, :2], corners[seen])
-        edges = _homography_jacobian(np.asarray(homography, np.float64), self.corners[seen, :2])
+        edges = homography_jacobian(np.asarray(homography, np.float64), self.corners[seen, :2])
         lengths = np.linalg.norm(edges, axis=2)
         narrowest = np.abs(np.linalg.det(edges)) / lengths.max(axis=1)
         radii = np.clip(reach * narrowest, *RADII)
         refined = np.full_like(corners, np.nan)
         refined[seen] = refine_corners(image, corners[seen], edges, radii)
-        return refined if self._determines_pose(np.isfinite(refined[:, 0])) else None
+        return refined
 
-    def _determines_pose(self, seen: BoolArray) -> bool:
-        """True if each half of the seen corners determines a pose."""
-        for half in self.halves:
-            points = self.corners[half & seen, :2]
-            if len(points) < FEWEST_CORNERS:
-                return False
-            spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-            if spread[1] < 0.1 * spread[0]:
-                return False
-        return True
+    def determines_pose(self, seen: BoolArray) -> bool:
+        """True if the seen corners, shape (n,), determine a homography: four of them, no three on a line.
+
+        Source: R. Hartley, A. Zisserman, "Multiple View Geometry", 2nd ed., 2003, section 4.1.3, for points
+        that stay where they are.
+        """
+        points = self.corners[seen, :2]
+        if len(points) < 4:
+            return False
+        points = points - points.mean(axis=0)
+        points /= np.sqrt((points**2).mean())
+        whole = np.column_stack([points, np.ones(len(points))])
+        none = np.zeros_like(whole)
+        equations = [[whole, none, -points[:, :1] * whole], [none, whole, -points[:, 1:] * whole]]
+        values = np.linalg.svd(np.block(equations), compute_uv=False)
+        return bool(values[7] >= LEAST_RANK * values[0])
 
     def suggest(self, image: GreyImage) -> str | None:
         """Suggest a size for the board in an image; None if there is none with all of its corners.
@@ -149,7 +155,7 @@ class Board:
         rows, columns = cells.shape
         other = Board(columns, rows, self.square)
         refined = other.refine(small, np.reshape(corners, (-1, 2)).astype(np.float64), EDGE * self.square)
-        if refined is None or not np.isfinite(refined).all():  # OpenCV adds rows to smaller boards
+        if not np.isfinite(refined).all():  # OpenCV adds rows to smaller boards
             return None
         return f"{max(rows, columns)}x{min(rows, columns)}"
 
@@ -162,7 +168,7 @@ def _smaller(image: GreyImage, shrink: float) -> GreyImage:
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
-def _homography_jacobian(homography: FloatArray, points: FloatArray) -> FloatArray:
+def homography_jacobian(homography: FloatArray, points: FloatArray) -> FloatArray:
     """Derivative of a homography by x and y, in rows, shape (n, 2, 2), at points, shape (n, 2)."""
     places = np.column_stack([points, np.ones(len(points))]) @ homography.T
     pixels = places[:, :2] / places[:, 2:]

@@ -24,6 +24,14 @@ UNDETERMINED = (
 )
 
 
+class UnusableViewsError(UserError):
+    """Some views are no image of the board; `numbers` are theirs."""
+
+    def __init__(self, numbers: Sequence[int]) -> None:
+        super().__init__("the corners of a view are no image of the board")
+        self.numbers = tuple(numbers)
+
+
 class LensChoice(NamedTuple):
     """Lens model to fit: a name in `LENSES`, and whether k3 of "brown" is fitted; otherwise it is 0."""
 
@@ -43,6 +51,7 @@ def fit_lens(
     """Fit camera and poses to views in images of `size`, (width, height), without a first guess.
 
     Raises:
+        UnusableViewsError: If some views are no image of the board, whatever the focal length.
         UserError: If the views do not determine the camera.
     """
     fit = _adjusted(_first_camera(views, board, size, lens.model), views, board, lens)
@@ -62,7 +71,11 @@ def fit_lens(
 def held_out_rms(views: Sequence[FloatArray], board: Board, camera: Camera, lens: LensChoice) -> float:
     """Root mean square reprojection error, pixels, by 5-fold cross-validation over the views.
 
-    In a view outside the training set, each half of the corners gives the pose that predicts the other half.
+    In a view outside the training set, each half of the corners gives the pose that predicts the other half,
+    if it determines one.
+
+    Raises:
+        UserError: If the views do not determine the camera, or no half determines a pose.
     """
     folds, distances = min(5, len(views)), []
     for fold in range(folds):
@@ -71,11 +84,20 @@ def held_out_rms(views: Sequence[FloatArray], board: Board, camera: Camera, lens
         _check_determined(fit)
         tested, none = np.asarray(views[fold::folds]), np.zeros(len(camera.intrinsic_names), dtype=bool)
         for half in board.halves:
-            known = np.where(half[:, None], tested, np.nan)
+            able = [board.determines_pose(half & np.isfinite(view[:, 0])) for view in tested]
+            if not any(able):
+                continue
+            shown = tested[able]
+            known = np.where(half[:, None], shown, np.nan)
             poses = adjust(fit.camera, _first_poses(fit.camera, known, board), known, board, free=none).poses
-            view, corner = np.nonzero(np.isfinite(tested[:, :, 0]) & ~half)
+            view, corner = np.nonzero(np.isfinite(shown[:, :, 0]) & ~half)
             predicted = fit.camera.project(poses.to_camera(board.corners[corner], view))
-            distances.append(predicted - tested[view, corner])
+            distances.append(predicted - shown[view, corner])
+    if not sum(map(len, distances)):
+        raise UserError(
+            "no photograph shows enough corners to test the camera with, some eight that are not on a line; "
+            "show more of the board"
+        )
     return rms(distances)
 
 
@@ -107,21 +129,33 @@ def _first_camera(views: Sequence[FloatArray], board: Board, size: tuple[int, in
     """The best camera without distortion whose principal point is in the middle.
 
     Raises:
-        UserError: If no focal length gives poses for all views.
+        UnusableViewsError: If no focal length gives poses for all views; it names those without one at the
+            focal length that gives most.
     """
-    best, least = None, np.inf
-    view, corner = np.nonzero(np.isfinite(np.asarray(views)[:, :, 0]))
+    best, least = None, (len(views), np.inf)
+    failed: list[int] = []
     for widths in 2.0 ** np.arange(-2.5, 4.5, 0.5):  # angles of view from 140 to 4 degrees; fisheye: beyond
         focal, (x, y) = float(size[0] * widths), ((side - 1) / 2 for side in size)
         camera = Camera(*size, focal, focal, x, y, (0.0,) * len(LENSES[model]), model)
-        with suppress(UserError):
-            placed = _first_poses(camera, views, board).to_camera(board.corners[corner], view)
-            cost = float(np.sum((camera.project(placed) - np.asarray(views)[view, corner]) ** 2))
-            if cost < least:
-                best, least = camera, cost
+        costs = [_misfit(camera, view, board) for view in views]
+        lost = [number for number, cost in enumerate(costs) if not np.isfinite(cost)]
+        if (total := (len(lost), float(np.sum(np.delete(costs, lost))))) < least:
+            best, least, failed = camera, total, lost
     if best is None:
         raise UserError(UNDETERMINED)
+    if failed:
+        raise UnusableViewsError(failed)
     return best
+
+
+def _misfit(camera: Camera, view: FloatArray, board: Board) -> float:
+    """Sum of squared reprojection errors of a view's first guess, pixels²; infinite if there is none."""
+    seen = np.isfinite(view[:, 0])
+    try:
+        placed = _first_poses(camera, [view], board).to_camera(board.corners[seen], np.zeros(seen.sum(), int))
+        return float(np.sum((camera.project(placed) - view[seen]) ** 2))
+    except UserError:
+        return np.inf
 
 
 def _first_poses(camera: Camera, views: Sequence[FloatArray] | FloatArray, board: Board) -> Poses:

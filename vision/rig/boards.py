@@ -11,6 +11,7 @@ from geometry.errors import UserError
 from vision.calibration.camera import Camera, Pose
 from vision.calibration.charuco import DICTIONARIES, CharucoBoard
 from vision.calibration.chessboard import Board
+from vision.calibration.dot_grid import DotGrid
 from vision.rig.shapes import Scene, Shape, rectangle
 
 PAPER, INK, WALL = (0.90, 0.91, 0.90), (0.06, 0.06, 0.06), (0.35, 0.38, 0.40)
@@ -26,7 +27,13 @@ TRIES = 150
 
 
 def board_scene(board: Board) -> Scene:
-    """A board on a wall, in the frame of its corners."""
+    """A board on a wall, in the frame of its corners.
+
+    Raises:
+        UserError: If it is a grid of dots, which is only read.
+    """
+    if isinstance(board, DotGrid):
+        raise UserError(f"a board of {board} is not drawn; take a chessboard or a ChArUco board")
     low = -(1 + MARGIN) * np.full(2, board.square)
     high = (np.array([board.columns, board.rows]) + MARGIN) * board.square
     places = np.indices((board.columns + 1, board.rows + 1)).reshape(2, -1).T - 1

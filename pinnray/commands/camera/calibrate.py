@@ -24,13 +24,13 @@ def calibrate(
     without: Repeated = (),
     out: OutputPath = Path("out/camera.json"),
 ) -> int:
-    """Calibrate a camera from photographs of a chessboard or ChArUco board.
+    """Calibrate a camera from photographs of a chessboard, a ChArUco board or a grid of dots.
 
     Args:
         images: Photographs of the board, all of one size: pictures, folders, or a video.
-        board: Inner corners of a chessboard along either side, such as 9x6, or squares of a ChArUco board,
-            such as charuco:8x6.
-        square: Side of a square, mm.
+        board: Inner corners of a chessboard along either side, such as 9x6; squares of a ChArUco board, such
+            as charuco:8x6; dots of a grid, circles:7x6, or acircles:4x11 with every other row shifted.
+        square: Side of a square or distance between dots, mm; of shifted rows, distance between rows.
         marker: Side of a marker of a ChArUco board, mm.
         dictionary: ArUco dictionary of a ChArUco board.
         model: Lens model: brown up to about 100 degrees of view, fisheye beyond.
@@ -57,8 +57,9 @@ def calibrate(
     picture = out.with_suffix(".png")
     photograph = next(image for name, image in photographs(images, without=without) if name == worst)
     draw_calibration(calibration, worst, photograph).save(picture)
-    if calibration.boardless:
-        say(f"warning: no board of {chosen} was found in {', '.join(calibration.boardless)}")
+    for reason in dict.fromkeys(calibration.left_out.values()):
+        names = [name for name, said in calibration.left_out.items() if said == reason]
+        say(f"warning: left out {', '.join(names)}: {reason}")
     if better := better_lens(calibration, lens):
         say(f"warning: with {better[0]} the error held out would be {better[1]:.3f} px")
     console = Console()

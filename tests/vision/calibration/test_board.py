@@ -95,7 +95,7 @@ def test_an_impossible_board_is_refused(size, square, message):
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        ("9x6", {"marker": 15}, "the chessboard 9x6 has no markers; .* give charuco:9x6"),
+        ("9x6", {"marker": 15}, "the board 9x6 has no markers; .* give charuco:9x6"),
         ("charuco:8x6", {}, "has markers; give their side in mm"),
         ("charuco:3x6", {"marker": 15}, "a board of 2x5 inner corners"),
         ("charuco:8x6", {"marker": 20}, "a marker of 20 mm in a square of 20 mm"),

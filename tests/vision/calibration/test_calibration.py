@@ -115,7 +115,7 @@ def test_a_board_that_is_first_taken_to_be_tilted_the_other_way_does_not_spoil_t
     def mirrored(*given):
         poses = first_guess(*given)
         rotations = poses.rotations.as_rotvec()
-        rotations[9, :2] *= -1
+        rotations[9:10, :2] *= -1
         return poses._replace(rotations=Rotation.from_rotvec(rotations))
 
     right = lens_fit.fit_lens(seen, board, (640, 480), LensChoice())
@@ -151,7 +151,99 @@ def test_too_few_views_are_refused():
     with pytest.raises(
         UserError, match=r"3 of 5 photographs show the board of 9x6 inner corners; at least 4"
     ):
-        calibrate_views(views(3, noise=NOISE), BOARD, SIZE, boardless=("a", "b"))
+        calibrate_views(
+            views(3, noise=NOISE),
+            BOARD,
+            SIZE,
+            left_out=dict.fromkeys("ab", "no board of 9x6 inner corners was found"),
+        )
+
+
+GRID = BOARD.corners[:, :2] / BOARD.square
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        # eight, of which three of the four in one half lie on a line
+        lambda x, y: (y <= 2) & (x <= 2) & ((x != 2) | (y != 0)),
+        lambda x, y: (x <= 1) & (y <= 1),  # four
+        lambda x, y: (x <= 4) & (y <= 1),  # two rows
+        lambda x, y: ((y == 3) & (x > 0)) | ((y == 1) & (x > 6)),  # a row and two others
+    ],
+)
+def test_a_view_of_few_corners_is_used(kept):
+    """OpenCV's calibrateCamera takes such views, too."""
+    seen = views(8, noise=NOISE)
+    seen["view 3"] = np.where(kept(*GRID.T)[:, None], seen["view 3"], np.nan)
+    found = calibrate_views(seen, BOARD, SIZE)
+    assert found.left_out == {}
+    assert found.camera.fx == pytest.approx(CAMERA.fx, rel=0.003)
+    assert found.view_errors["view 3"] < 3 * NOISE
+    assert found.held_out_rms < 2 * NOISE
+
+
+@pytest.mark.parametrize(
+    ("kept", "count"),
+    [
+        (lambda x, y: (x == 0) & (y < 3), 3),
+        (lambda x, y: y == 2, 9),  # one row
+        (lambda x, y: (y == 2) | ((x == 1) & (y == 4)), 10),  # and one corner beside it
+        (lambda x, y: x < 0, 0),
+    ],
+)
+def test_a_view_that_determines_no_pose_is_left_out_with_the_reason(kept, count):
+    seen = views(8, noise=NOISE)
+    seen["view 3"] = np.where(kept(*GRID.T)[:, None], seen["view 3"], np.nan)
+    found = calibrate_views(seen, BOARD, SIZE, left_out={"a": "dark"})
+    reason = f"the {count} corners that are seen are too few or lie on a line"
+    assert found.left_out == {"a": "dark", "view 3": reason}
+    assert "view 3" not in found.views
+    assert found.camera.fx == pytest.approx(CAMERA.fx, rel=0.003)
+
+
+def test_a_view_that_is_no_image_of_a_board_is_left_out_with_the_reason():
+    seen = views(8, noise=NOISE) | {"false": np.full_like(GRID, 200.0)}  # all at one pixel
+    found = calibrate_views(seen, BOARD, SIZE)
+    assert found.left_out == {"false": "its corners are no image of the board"}
+    assert found.camera.fx == pytest.approx(CAMERA.fx, rel=0.003)
+
+
+def test_a_photograph_of_few_corners_is_named():
+    seen = views(6, noise=NOISE)
+    seen["view 2"] = np.where((GRID[:, 1] == 0)[:, None], seen["view 2"], np.nan)
+    corners = iter(seen.values())
+
+    class Known(Board):
+        def find(self, image: np.ndarray) -> np.ndarray:
+            return next(corners)
+
+    images = [(name, np.zeros(SIZE[::-1], np.uint8)) for name in seen]
+    found = calibrate_camera(images, Known(9, 6, 25.0))
+    assert found.left_out == {"view 2": "the 9 corners that are seen are too few or lie on a line"}
+
+
+def test_too_few_views_that_remain_are_refused_with_the_reasons():
+    seen = {f"{name}.png": view for name, view in views(5, noise=NOISE).items()}
+    for name in ("view 1.png", "view 4.png"):
+        seen[name] = np.where((GRID[:, 1] == 0)[:, None], seen[name], np.nan)
+    said = (
+        r"3 of 5 photographs show .*; at least 4 must, .*; view 1\.png: the 9 corners .*; view 4\.png: the 9"
+    )
+    with pytest.raises(UserError, match=said):
+        calibrate_views(seen, BOARD, SIZE)
+
+
+def test_a_camera_that_cannot_be_tested_is_refused():
+    """A pose from either half needs four corners there."""
+    few = {
+        name: np.where((GRID.max(axis=1) <= 1)[:, None], view, np.nan)
+        for name, view in views(12, noise=0).items()
+    }
+    with pytest.raises(
+        UserError, match=r"enough corners to test the camera with|do not determine the camera"
+    ):
+        calibrate_views(few, BOARD, SIZE)
 
 
 def test_boards_that_are_never_tilted_do_not_determine_the_camera():
@@ -282,7 +374,7 @@ def test_bad_input_is_one_line(arguments, message, folder, tmp_path, monkeypatch
 @pytest.mark.skipif(not PHOTOGRAPHS, reason="no photographs in /usr/share/doc/opencv-doc (Debian)")
 def test_the_photographs_of_opencv_give_their_known_camera(model):
     found = calibrate_camera(photographs(PHOTOGRAPHS), BOARD, lens=LensChoice(model))
-    assert found.boardless == ()
+    assert found.left_out == {}
     assert 530 < found.camera.fx < 540
     assert abs(found.camera.fy - found.camera.fx) < 3
     assert found.rms < 0.2  # 0.23 without the fit of `vision.calibration.corner_refinement`

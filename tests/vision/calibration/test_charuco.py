@@ -58,6 +58,26 @@ def test_boards_of_the_layout_before_opencv_4_6_are_found():
     np.testing.assert_allclose(found, expected, rtol=0, atol=0.01)
 
 
+@pytest.mark.parametrize("angles", TILTS)
+def test_a_board_printed_white_on_black_is_found(angles):
+    image, exact = photographed(CHARUCO, pose(angles))
+    found = CHARUCO.find(255 - image)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=0.06)
+    assert CharucoBoard(7, 5, 20.0, 15.0, "4X4_50").suggest(255 - image) == "markers 5X5"
+
+
+@pytest.mark.parametrize(("covered", "usable"), [(110, True), (50, False)])
+def test_a_hand_may_hide_most_of_the_board(covered, usable):
+    """Some corners are found either way; whether they determine a pose is told from whether there are any."""
+    image, exact = photographed(CHARUCO, pose(TILTS[0]))
+    hidden = image.copy()
+    hidden[:, int(exact[:, 0].min()) + covered :] = 150
+    found = CHARUCO.find(hidden)
+    seen = np.isfinite(found[:, 0])
+    assert 0 < seen.sum() <= 14
+    assert CHARUCO.determines_pose(seen) == usable
+
+
 @pytest.mark.parametrize(
     "other",
     [

@@ -27,7 +27,7 @@ def test_the_camera_is_recovered_within_its_standard_deviations(board):
         for number, pose in enumerate(poses)
     }
     found = calibrate_camera(images.items(), board)
-    assert found.boardless == ()
+    assert found.left_out == {}
     off = (found.camera.intrinsics - CAMERA.intrinsics)[:8]
     deviations = np.array(found.camera.standard_deviations)[:8]
     assert (np.abs(off) < 3.5 * deviations).all()
