@@ -17,6 +17,7 @@ from vision.tracking.data_association import (
     with_predictions,
 )
 from vision.tracking.scene import FilmedScene
+from vision.tracking.unplaced_markers import why_unplaced
 
 FEWEST = 3
 """Number of markers that must be identified in the first frame."""
@@ -84,7 +85,7 @@ class FrameTracker:
         if count < least:
             raise UserError(
                 f"{count} of {len(names)} markers are where the design has them, and {least} must be; "
-                "show the finger before it is pressed, and give its design, workspace and markers' colour"
+                + why_unplaced(scene, self.plane, detections)
             )
         self._lost = 1  # frames since the last search
         self.first = self._accepted(detections, names, image)

@@ -38,7 +38,8 @@ class FilmedScene:
         workspace: The fiducials around it.
         camera: The calibrated camera; None if it is not known.
         colour: Of the markers; the fiducials are dark.
-        method: "precise", or "hough" for the paper's pipeline, whose map from pixels to mm is linear.
+        method: "precise", or "hough" for the paper's pipeline, whose map from pixels to mm is linear; a
+            camera then only accounts for the height of the markers above the fiducials.
         markers_only: Whether the markers alone may give the plane if the fiducials cannot be identified.
     """
 
@@ -53,12 +54,16 @@ class FilmedScene:
         """The markers' plane from the fiducials, shape (f, ...), nan where one was not detected."""
         seen = np.isfinite(fiducials.radii)
         points, centres, covariances = self.workspace.points[seen], *fiducials.where(seen)[:2]
+        height = self.workspace.marker_plane
         if self.method == "hough":
+            if self.camera is not None and height:  # where the camera would see the fiducials at that height
+                raised = self._fiducial_plane(points, centres, covariances, height=height)
+                centres = raised.pixels(points)
             return similarity_plane(points, centres, covariances)
         radius = self.workspace.fiducial_diameter / 2
         plane = self._fiducial_plane(points, centres, covariances)
         centres = centres - plane.beside(points, radius)
-        return self._fiducial_plane(points, centres, covariances, height=self.workspace.marker_plane)
+        return self._fiducial_plane(points, centres, covariances, height=height)
 
     def plane_from_markers(self, markers: DiscDetections) -> MarkerPlane:
         """The plane without fiducials, from the markers at rest, shape (m, ...), nan for hidden ones."""

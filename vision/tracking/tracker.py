@@ -15,6 +15,7 @@ from vision.tracking.frame_tracker import FrameDetections, FrameTracker
 from vision.tracking.rest_detection import RestIntervals, find_rest_intervals
 from vision.tracking.scene import FilmedScene
 from vision.tracking.trajectories import Tracking
+from vision.tracking.unplaced_markers import zoom_clause
 
 FAR = 0.5
 """Root mean square distance of the markers at rest from the design's, mm, that is worth a warning, ..."""
@@ -175,7 +176,11 @@ def _warnings(
     if scene.camera is None and scene.method == "precise":
         yield f"no camera: its lens is not undone; the fiducials are {residual:.3f} mm (rms) off their places"
         if scene.workspace.marker_plane:
-            yield "no camera: the height of the markers above the fiducials is not accounted for"
+            yield (
+                f"no camera: that the markers are {scene.workspace.marker_plane:g} mm nearer to it than the "
+                "fiducials is not accounted for: displacements are too large by this share of the camera's "
+                "distance; give --camera, or lay the fiducials at the markers' height"
+            )
     elif scene.camera is not None and scene.camera.covariance is None:
         yield "the camera file has no covariance, so the standard deviations leave the camera's errors out"
     if (hidden := int(np.isnan(after.radii).sum())) > 0:
@@ -187,13 +192,13 @@ def _warnings(
             f"rest, {known}"
         )
     if tracking.visible.any():
-        yield from _rest_warnings(tracking)
+        yield from _rest_warnings(scene, tracking)
     if not tracking.visible.all():
         names = ", ".join(str(number + 1) for number in np.nonzero(~tracking.visible)[0])
         yield f"not seen at rest both before and after, so reported missing: marker {names}"
 
 
-def _rest_warnings(tracking: Tracking) -> Iterator[str]:
+def _rest_warnings(scene: FilmedScene, tracking: Tracking) -> Iterator[str]:
     """Warnings on the markers at rest beside the design's."""
     found = tracking.alignment
     far = float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1)))) if found is None else found.before
@@ -207,8 +212,9 @@ def _rest_warnings(tracking: Tracking) -> Iterator[str]:
         size = "larger" if larger > 0 else "smaller"
         yield (
             f"lengths between the markers at rest are {abs(larger):.2%} {size} in the film than in the "
-            "drawing, and were scaled to it: see at what scale the fiducials were printed, and how high the "
-            f"markers are above them; {found.after:.2g} mm (rms) remain"
+            "drawing, and were scaled to it: see at what scale the fiducials were printed, how high the "
+            f"markers are above them{zoom_clause(scene, tracking.plane, larger)}; {found.after:.2g} mm (rms) "
+            "remain"
         )
     if found.after > UNLIKE:
         yield (

@@ -139,7 +139,9 @@ def test_the_height_of_the_markers_needs_a_camera(listed: ListedDiscs) -> None:
     high = Workspace(fiducials=SPACE.fiducials, marker_plane=0.5)
     pictures = pressed(listed)
     tracking = track(film(pictures), replace(SCENE, camera=None, workspace=high))
-    assert "the height of the markers above the fiducials is not accounted for" in tracking.warnings[1]
+    assert (
+        "that the markers are 0.5 mm nearer to it than the fiducials is not accounted" in tracking.warnings[1]
+    )
     known = replace(CAMERA, covariance=tuple(map(tuple, (1e-6 * np.eye(9)).tolist())))
     (said,) = track(film(pictures), replace(SCENE, camera=known, workspace=high)).warnings
     assert (
