@@ -108,6 +108,10 @@ class Evaluation:
     twin: str | None = None  #: Name of the finite-element solver that fits the markers in the same way.
     #: Displacement of each marker as the solver predicts it without that marker, shape (m, 2), mm.
     left_out: FloatArray | None = None
+    #: Standard deviation of the displacement at the nodes, shape (n, 2), mm, if the solver estimates it.
+    node_deviation: FloatArray | None = None
+    #: Standard deviation of the von Mises stress at the triangles' centroids, shape (t,), MPa, likewise.
+    von_mises_deviation: FloatArray | None = None
     #: What the measurement's pictures show of the markers' displacement, if the solver found their frames.
     shown: FloatArray | None = None
     identified: IdentifiedForce | None = None  #: The force that was found from the markers.
@@ -134,6 +138,7 @@ class Evaluation:
         state, displacement = solution.state(inside), solution.displacement(nodes)
         markers = np.asarray(mesh.markers if markers is None else markers, dtype=np.float64)
         at_markers = solution.displacement_in_space(markers)
+        known, other = solution.uncertainty, solution.problem.mesh
         return cls(
             solver=solution.solver,
             law=solution.problem.material.law,
@@ -160,6 +165,10 @@ class Evaluation:
             energy_density=state.energy_density,
             in_sample=solution.problem.observations is not None,
             left_out=solution.left_out,
+            node_deviation=known.displacement(mesh.locate_on(other, mesh.points)) if known else None,
+            von_mises_deviation=known.von_mises(mesh.locate_on(other, mesh.at_centroids().points))
+            if known and known.von_mises
+            else None,
             shown=solution.shown(markers, at_markers) if solution.pictures else None,
             solid=isinstance(solution.field, SolidField),
             path=np.stack([state.displacement(nodes)[: len(mesh.points)] for state in solution.states])

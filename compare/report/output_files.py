@@ -149,16 +149,23 @@ SYMMETRIC = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     """Write one solver's fields on the shared mesh, atomically.
 
-    At the nodes: `displacement_mm` (u, v, 0).
+    At the nodes: `displacement_mm` (u, v, 0), and where the solver estimates it, its standard deviation
+    `displacement_deviation_mm`.
 
     In the triangles, each the area-weighted mean over the triangle: `strain_xx`, `strain_yy`, `strain_xy`
     (the tensor's component, half the engineering shear), `stress_MPa` (Cauchy; six components named XX to XZ,
-    of which YZ and XZ are zero), `stress_zz_MPa`, `von_mises_MPa`, `energy_density_MPa`.
+    of which YZ and XZ are zero), `stress_zz_MPa`, `von_mises_MPa`, `energy_density_MPa`. At
+    their centroids, where the solver estimates it, `von_mises_deviation_MPa`, a standard deviation.
 
     For the whole: `solver`, `converged` (1 or 0), `status`, `energy_N_mm_per_mm`, `reaction_N_per_mm`.
     """
     grid = _grid(mesh)
     grid.point_data["displacement_mm"] = np.pad(evaluation.node_displacement, ((0, 0), (0, 1)))
+    if evaluation.node_deviation is not None:
+        deviation = np.pad(evaluation.node_deviation, ((0, 0), (0, 1)))
+        grid.point_data["displacement_deviation_mm"] = deviation
+    if evaluation.von_mises_deviation is not None:
+        grid.cell_data["von_mises_deviation_MPa"] = evaluation.von_mises_deviation
     strain = evaluation.per_triangle(evaluation.strain)
     for name, (row, column) in COMPONENTS.items():
         grid.cell_data[f"strain_{name}"] = strain[:, row, column]

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
@@ -96,20 +97,23 @@ class IdentifiedField(Snapshot):
 
     members: Sequence[Member]  # The most probable law first
 
-    def standard_deviation(self, location: LocatedPoints) -> FloatArray:
-        """Standard deviation of `displacement_in_space`, shape (n, 2), mm."""
+    def standard_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
+        """Standard deviation of `displacement_in_space` at points (n, 2), mm: shape (n, 2), mm."""
+        location = self._located(points)
         return self._deviation(lambda them: [each.displacement_in_space(location) for each in them])
 
-    def shown_deviation(self, location: LocatedPoints) -> FloatArray:
-        """Standard deviation of what the pictures show of the displacement, shape (n, 2), mm."""
+    def shown_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
+        """Standard deviation of what pictures show of the displacement at points (n, 2), mm: (n, 2), mm."""
+        location = self._located(points)
         return self._deviation(
             lambda them: [
                 each.pictures.shown(location.points, each.displacement_in_space(location)) for each in them
             ]
         )
 
-    def von_mises_deviation(self, location: LocatedPoints) -> FloatArray:
-        """Standard deviation of the von Mises stress, shape (n,), MPa."""
+    def von_mises_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
+        """Standard deviation of the von Mises stress at points (n, 2), mm: shape (n,), MPa."""
+        location = self._located(points)
         found = self._deviation(lambda them: von_mises_stresses(them, location))
         if not (share := doubt_of_the_plane(self.problem)):
             return found
@@ -117,6 +121,9 @@ class IdentifiedField(Snapshot):
         (all_over,) = von_mises_stresses([self], mesh.at_centroids())
         # Over a section bending differs from that of the plane also where the plane has little stress.
         return np.hypot(found, share * np.hypot(own, np.sqrt(np.average(all_over**2, weights=mesh.areas))))
+
+    def _located(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
+        return points if isinstance(points, LocatedPoints) else self.problem.mesh.locate(points)
 
     def _deviation(self, quantities: Callable[[Sequence[Snapshot]], list[FloatArray]]) -> FloatArray:
         """Standard deviation of a quantity, a function of snapshots of one body."""

@@ -6,7 +6,7 @@ import pytest
 from compare.evaluation.evaluation import Evaluation
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
-from solvers.solution import Solution, Status
+from solvers.solution import Solution, Status, Uncertainty
 from tests.meshes import permuted
 
 
@@ -44,6 +44,35 @@ def test_everything_comes_back_from_disk(pinn, tmp_path):
             np.testing.assert_array_equal(after, before, err_msg=entry.name)
         else:
             assert after == before, entry.name
+
+
+@pytest.mark.parametrize("stress", [True, False])
+def test_deviations_are_those_that_the_solver_estimates(mesh, stress, tmp_path):
+    field = LagrangeField(LagrangeSpace(mesh, 1), np.zeros((len(mesh.points), 2)))
+    known = Uncertainty(
+        lambda where: 0.1 * where.points, (lambda where: where.points[:, 0]) if stress else None
+    )
+    problem = Problem(mesh)
+    solution = Solution(
+        "a",
+        problem,
+        field,
+        energy=0.0,
+        reaction=np.zeros(2),
+        status=Status(True, "b"),
+        stats={},
+        uncertainty=known,
+    )
+    found = Evaluation.of(solution, mesh)
+    np.testing.assert_allclose(found.node_deviation, 0.1 * mesh.points, atol=1e-12)
+    if stress:
+        np.testing.assert_allclose(found.von_mises_deviation, mesh.points[mesh.triangles, 0].mean(axis=1))
+    else:
+        assert found.von_mises_deviation is None
+    found.save(tmp_path / "a.npz", "key")
+    np.testing.assert_array_equal(
+        Evaluation.load(tmp_path / "a.npz", "key").node_deviation, found.node_deviation
+    )
 
 
 def test_another_key_is_another_result(pinn, tmp_path):

@@ -40,6 +40,26 @@ def test_displacements_are_vectors_with_z_zero(grid: pyvista.UnstructuredGrid, s
     assert not grid.point_data["displacement_mm"][:, 2].any()
 
 
+def test_deviations_are_written_where_the_solver_estimates_them(
+    sheared: Evaluation, mesh: TriangleMesh, tmp_path: Path
+) -> None:
+    nodes, cells = np.arange(2.0 * len(mesh.points)).reshape(-1, 2), np.arange(1.0 * len(mesh.triangles))
+    for found, names in (
+        (sheared, set()),
+        (replace(sheared, node_deviation=nodes), {"displacement_deviation_mm"}),
+        (
+            replace(sheared, node_deviation=nodes, von_mises_deviation=cells),
+            {"displacement_deviation_mm", "von_mises_deviation_MPa"},
+        ),
+    ):
+        write_vtu(tmp_path / "fem.vtu", mesh, found)
+        grid = pyvista.read(tmp_path / "fem.vtu")
+        every = {*grid.point_data.keys(), *grid.cell_data.keys()}
+        assert {name for name in every if "deviation" in name} == names
+    np.testing.assert_array_equal(grid.point_data["displacement_deviation_mm"][:, :2], nodes)
+    np.testing.assert_array_equal(grid.cell_data["von_mises_deviation_MPa"], cells)
+
+
 def test_tensor_components_are_where_their_names_say(grid: pyvista.UnstructuredGrid) -> None:
     array = grid.GetCellData().GetArray("stress_MPa")
     names = [array.GetComponentName(number) for number in range(6)]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
+from geometry.errors import OutsideBodyError, UserError
 from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
 from geometry.registration import FIXED, HAND_HELD, Homography, Registration
@@ -61,6 +61,18 @@ def test_the_frame_of_the_pressed_picture_is_found(problem, known):
     assert not fixed.status.converged
     assert "THE PRESSED PICTURE IS NOT IN THE FRAME OF THAT AT REST" in fixed.status.warnings[0]
     assert fixed.stats["pressed_turn"] == pytest.approx(found.stats["pressed_turn"], abs=0.1)
+
+
+def test_deviations_are_given_at_points_too(identified):
+    """Where a user has places, not triangles of the mesh."""
+    solution = identified[2]
+    field, mesh = solution.field, solution.problem.mesh
+    there = mesh.at_centroids()
+    for deviation in (field.standard_deviation, field.shown_deviation, field.von_mises_deviation):
+        np.testing.assert_allclose(deviation(there.points[:5]), deviation(there)[:5], rtol=1e-6)
+        assert len(deviation([(20.0, -1.0)])) == 1
+    with pytest.raises(OutsideBodyError):
+        field.von_mises_deviation([(20.0, 5.0)])
 
 
 def test_a_finger_with_a_depth_is_in_no_plane_state(identified):
