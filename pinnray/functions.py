@@ -189,6 +189,7 @@ def track(
     workspace: str | Path | None = None,
     colour: str = "dark",
     method: Literal["precise", "hough"] = "precise",
+    fps: float | None = None,
     out: str | Path | None = None,
 ) -> Observations:
     """Measure the markers of a finger in a film that shows it at rest, pressed, and held.
@@ -200,6 +201,7 @@ def track(
         workspace: JSON file of the fiducials; those around the design if None.
         colour: Of the markers, as `pinnray pick` prints it.
         method: Detection of the discs; `hough` is the paper's pipeline.
+        fps: Frames a second of pictures, which do not say it; 30 if None.
         out: Folder for observations, tracks and pictures; nothing is kept if None.
 
     Raises:
@@ -215,6 +217,7 @@ def track(
         workspace=None if workspace is None else Path(workspace),
         colour=colour,
         method=method,
+        fps=fps,
     )
     with TemporaryDirectory() if out is None else nullcontext(out) as folder:
         Path(folder).mkdir(parents=True, exist_ok=True)

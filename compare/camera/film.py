@@ -21,6 +21,7 @@ class Film:
         workspace: JSON file of the fiducials; those around the design if None.
         colour: Colour of the markers, as printed by `pinnray pick`.
         method: Detector of the discs; "hough" is the paper's pipeline.
+        fps: Frames a second of pictures or a pipe, which do not say it.
     """
 
     source: str
@@ -28,6 +29,7 @@ class Film:
     workspace: Path | None = None
     colour: str = "dark"
     method: Literal["precise", "hough"] = "precise"
+    fps: float | None = None
 
     def scene(self, design: Finger) -> "FilmedScene":
         """The filmed scene of a finger.
@@ -55,4 +57,5 @@ class Film:
         hashes = {
             f"{name}_sha256": file_digest(path) for name, path in files.items() if path and path.is_file()
         }
-        return {"source": self.source, "colour": self.colour, "method": self.method, **hashes}
+        settings = {"colour": self.colour, "method": self.method, "fps": self.fps}
+        return {"source": self.source, **settings, **hashes}

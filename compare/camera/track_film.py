@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.observations import Observations
 from solvers.solver import Progress
-from vision.frames.frame import RIG_MARK, Frame, Frames, Image
+from vision.frames.frame import DEFAULT_RATE, RIG_MARK, Frame, Frames, Image
 from vision.frames.pictures import write_picture
 from vision.frames.sources import open_frames
 from vision.frames.video import video_writer
@@ -29,6 +30,13 @@ from vision.tracking.annotation import annotated
 from vision.tracking.frame_tracker import FrameDetections
 from vision.tracking.tracker import track
 from vision.tracking.trajectories import Tracking
+
+BEFORE_AND_AFTER = 2
+"""Number of pictures whose times nobody asks for."""
+UNTIMED = (
+    f"times are counted at an assumed {DEFAULT_RATE:g} frames a second, which pictures and pipes do not say: "
+    "give --fps"
+)
 
 
 def track_film(
@@ -58,7 +66,11 @@ def track_film(
     """
     scene = film.scene(design)
     kept: dict[str, tuple[Image, FrameDetections]] = {}
-    with open_frames(film.source) as frames, ExitStack() as stack:
+    with open_frames(film.source, rate=film.fps) as frames, ExitStack() as stack:
+        if film.fps and frames.count is not None and frames.rate != film.fps:
+            raise UserError(
+                f"--fps {film.fps:g}: {frames.name} says {frames.rate:g} frames a second itself; leave it out"
+            )
         if record is not None:
             stack.enter_context(recorded(frames, record))
         write = None
@@ -86,6 +98,8 @@ def track_film(
             report(min(share, 1.0), f"frame {frame.number + 1}, {status}")
 
         tracking = track(frames, scene, see)
+        if not frames.timed and len(tracking.times) > BEFORE_AND_AFTER:
+            tracking = replace(tracking, warnings=(*tracking.warnings, UNTIMED))
     observations = tracking.observations(_sentence(film, tracking))
     for name, end in (("initial", tracking.rest.initial), ("final", tracking.rest.final)):
         image, detections = kept[name]

@@ -41,12 +41,14 @@ class FilmOptions:
         workspace: JSON file of the fiducials; default: those around the design.
         colour: Colour of the markers, as printed by `pinnray pick`.
         method: Disc detector; hough is the paper's pipeline.
+        fps: Frames a second of pictures or a pipe, which do not say it; default: 30, with a warning.
     """
 
     camera: Path | None = None
     workspace: Path | None = None
     colour: str = "dark"
     method: Literal["precise", "hough"] = "precise"
+    fps: float | None = None
 
     def film(self, source: str) -> Film:
         """The film from `source`.
@@ -60,6 +62,7 @@ class FilmOptions:
             workspace=existing(self.workspace),
             colour=self.colour,
             method=self.method,
+            fps=self.fps,
         )
 
 

@@ -59,6 +59,7 @@ class Frames:
         count: Number of frames by the source; None for a camera or a pipe. It can be wrong for a video with
             a variable rate.
         lossy: True for a video whose codec changes images: alike in frames that repeat each other.
+        timed: False if neither the source nor the user says the rate: `DEFAULT_RATE` is assumed.
         simulated: True if the first frame carries `RIG_MARK`: no camera was involved.
 
     Raises:
@@ -66,9 +67,16 @@ class Frames:
     """
 
     def __init__(
-        self, name: str, images: ImageStream, *, rate: float, count: int | None = None, lossy: bool = False
+        self,
+        name: str,
+        images: ImageStream,
+        *,
+        rate: float,
+        count: int | None = None,
+        lossy: bool = False,
+        timed: bool = True,
     ) -> None:
-        self.name, self.rate, self.count, self.lossy = name, rate, count, lossy
+        self.name, self.rate, self.count, self.lossy, self.timed = name, rate, count, lossy, timed
         self._images = images
         first = next(images, None)
         if first is None:

@@ -59,7 +59,7 @@ def open_frames(
         if sys.stdin.isatty():
             raise UserError("nothing is piped to standard input; '-' reads JPEG or PNG pictures from there")
         name, read = "standard input", partial(os.read, sys.stdin.fileno())
-        return Frames(name, images_of_pipe(read, name, usual), rate=usual)
+        return Frames(name, images_of_pipe(read, name, usual), rate=usual, timed=rate is not None)
     camera = re.fullmatch(r"(?:/dev/video)?(\d+)", str(source))
     if camera and (isinstance(source, int) or not (path.is_file() or path.is_dir())):
         return camera_frames(int(camera[1]), size=size, rate=rate)
@@ -70,7 +70,9 @@ def open_frames(
     paths = picture_paths(str(source))
     single = len(paths) == 1
     number = len(pages(content_of(paths[0]), f"the picture {paths[0]}")) if single else len(paths)
-    return Frames(str(source), images_of_files(paths, usual), rate=usual, count=number)
+    return Frames(
+        str(source), images_of_files(paths, usual), rate=usual, count=number, timed=rate is not None
+    )
 
 
 def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = None) -> Frames:

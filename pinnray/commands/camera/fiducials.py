@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from compare.runtime.exits import say
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
@@ -10,7 +11,7 @@ def fiducials(
     *,
     marker_plane: float = 0.0,
     board: str = "9x6",
-    square: float = 20.0,
+    square: float = 8.0,
     marker: float | None = None,
     dictionary: str = "5X5_100",
     out: OutputPath = Path("out/print"),
@@ -20,7 +21,7 @@ def fiducials(
     fiducials.svg and board.svg are in true scale; fiducials.json is for --workspace. Examples:
 
     - pinnray fiducials --design slender --marker-plane 20
-    - pinnray fiducials --board charuco:8x6 --square 25 --marker 18
+    - pinnray fiducials --board charuco:8x6 --square 9 --marker 7
 
     Args:
         marker_plane: Height of the markers above the sheet, mm.
@@ -32,12 +33,20 @@ def fiducials(
     """
     from geometry.atomic import write_json, write_text
     from vision.calibration.charuco import parse_board
-    from vision.rig.boards import board_svg
+    from vision.rig.boards import board_svg, largest_square
     from vision.tracking.workspace import Workspace, default_workspace, workspace_svg
 
     design, _ = finger.read()
-    sheet = board_svg(parse_board(board, square, marker=marker, dictionary=dictionary))
+    chosen = parse_board(board, square, marker=marker, dictionary=dictionary)
+    sheet = board_svg(chosen)
     workspace = Workspace(**{**default_workspace(design).model_dump(), "marker_plane": marker_plane})
+    fitting = largest_square(chosen, workspace)
+    if square > fitting:
+        say(
+            f"warning: a board of {square:g} mm squares is larger than the picture where the camera sees the "
+            "fiducials, and the film's focus holds for that distance only: give --square "
+            f"{fitting:g} or less"
+        )
     write_text(out / "fiducials.svg", workspace_svg(workspace, design))
     write_json(out / "fiducials.json", workspace.model_dump(mode="json"))
     write_text(out / "board.svg", sheet)

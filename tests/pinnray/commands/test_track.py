@@ -50,6 +50,35 @@ def test_what_is_tracked_in_a_film_of_the_rig_is_simulated(film, tracked):
     assert json.loads((tracked / "track.json").read_text(encoding="utf-8"))["simulated"] is True
 
 
+@pytest.fixture
+def pictures(film, tmp_path):
+    """The film as a folder of pictures, which say no times."""
+    folder = tmp_path / "shots"
+    folder.mkdir()
+    with open_frames(film / "video.mkv") as frames:
+        for frame in frames:
+            write_picture(folder / f"{frame.number}.png", frame.image)
+    return folder
+
+
+@pytest.mark.parametrize(("fps", "warned"), [(None, True), (10.0, False)])
+def test_the_times_of_pictures_are_those_that_are_given(film, pictures, tmp_path, capsys, fps, warned):
+    given = [] if fps is None else ["--fps", str(fps)]
+    line = ["track", str(pictures), "--camera", str(film / "camera.json"), *given]
+    assert main([*line, "--without-video", "--out", str(tmp_path / "out")]) == 0
+    said = "times are counted at an assumed 30 frames a second"
+    assert (said in capsys.readouterr().err) == warned
+    with (tmp_path / "out" / "tracks.csv").open(encoding="utf-8") as file:
+        times = {float(row["time_s"]) for row in csv.DictReader(file)}
+    assert sorted(times) == pytest.approx([number / (fps or 30.0) for number in range(6)])
+
+
+def test_a_film_that_says_its_times_takes_no_others(film, tmp_path, capsys):
+    line = ["track", str(film / "video.mkv"), "--fps", "240", "--out", str(tmp_path / "out")]
+    assert main(line) == BAD_INPUT
+    assert "video.mkv says 30 frames a second itself; leave it out" in capsys.readouterr().err
+
+
 def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatch, capsys):
     with open_frames(film / "video.mkv") as frames:
         pictures = [cv2.imencode(".png", frame.image)[1].tobytes() for frame in frames]
