@@ -35,7 +35,7 @@ BEFORE_AND_AFTER = 2
 """Number of pictures whose times nobody asks for."""
 UNTIMED = (
     f"times are counted at an assumed {DEFAULT_RATE:g} frames a second, which pictures and pipes do not say: "
-    "give --fps"
+    "give the fps"
 )
 
 
@@ -69,7 +69,7 @@ def track_film(
     with open_frames(film.source, rate=film.fps) as frames, ExitStack() as stack:
         if film.fps and frames.count is not None and frames.rate != film.fps:
             raise UserError(
-                f"--fps {film.fps:g}: {frames.name} says {frames.rate:g} frames a second itself; leave it out"
+                f"fps {film.fps:g}: {frames.name} says {frames.rate:g} frames a second itself; leave it out"
             )
         if record is not None:
             stack.enter_context(recorded(frames, record))

@@ -7,6 +7,7 @@ faces beside them. Between the boundaries the motion is harmonic.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_matrix, diags
@@ -67,6 +68,10 @@ class WallMotion:
 
     def gradients(self) -> FloatArray:
         """Gradients dV_i/dX_j of the motions per mm of change in every triangle, shape (k, t, 2, 2), 1/mm."""
+        return self._gradients
+
+    @cached_property
+    def _gradients(self) -> FloatArray:
         corners = self.nodal[:, self.mesh.triangles]
         return np.asarray(np.einsum("ktci,tcj->ktij", corners, _barycentric_gradients(self.mesh)))
 

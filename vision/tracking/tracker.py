@@ -179,7 +179,7 @@ def _warnings(
             yield (
                 f"no camera: that the markers are {scene.workspace.marker_plane:g} mm nearer to it than the "
                 "fiducials is not accounted for: displacements are too large by this share of the camera's "
-                "distance; give --camera, or lay the fiducials at the markers' height"
+                "distance; give the camera's file, or lay the fiducials at the markers' height"
             )
     elif scene.camera is not None and scene.camera.covariance is None:
         yield "the camera file has no covariance, so the standard deviations leave the camera's errors out"

@@ -30,14 +30,14 @@ def why_unplaced(scene: FilmedScene, plane: MarkerPlane, discs: DiscDetections) 
     if height and scene.camera is None:
         return (
             f"the workspace has them {height:g} mm nearer to the camera than the fiducials, which only a "
-            f"calibrated camera accounts for: give --camera, or lay the fiducials at the markers' height and "
+            f"calibrated camera accounts for: give its file, or lay the fiducials at the markers' height and "
             "set marker_plane to 0"
         )
     scale = _scale(scene, plane, discs)
     if scale is None:
         return (
             "show the finger before it is pressed, and give its design, workspace and markers' colour; if "
-            "markers are nearer to the camera than the fiducials, give --camera and a --workspace with their "
+            "markers are nearer to the camera than the fiducials, give the camera and a workspace with their "
             "marker_plane"
         )
     if abs(scale - 1) < NOTABLE:
@@ -49,11 +49,11 @@ def why_unplaced(scene: FilmedScene, plane: MarkerPlane, discs: DiscDetections) 
     about = "" if far is None else f" by about {height + (far - height) * (1 - 1 / scale):.0f} mm"
     side = "nearer to the camera" if scale > 1 else "farther from the camera"
     assumed = f"{height:g} mm above" if height else "in the plane of"
-    camera = "" if scene.camera else "--camera and "
+    camera = "" if scene.camera else "the camera's file and "
     return (
         f"discs lie as the markers do, but {scale:.2f} times as far apart: they seem to be {side} than the "
-        f"fiducials{about}, not {assumed} them; give {camera}a --workspace with that marker_plane (pinnray "
-        "fiducials --marker-plane makes one), or see at what scale the fiducials are printed"
+        f"fiducials{about}, not {assumed} them; give {camera}a workspace with that marker_plane, which "
+        "pinnray fiducials makes, or see at what scale the fiducials are printed"
         + zoom_clause(scene, plane, scale - 1)
     )
 

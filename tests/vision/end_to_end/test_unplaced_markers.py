@@ -50,7 +50,7 @@ def sheet(height: float) -> FilmedScene:
 @pytest.mark.parametrize("method", ["precise", "hough"])
 def test_a_sheet_below_the_markers_needs_a_camera(listed: ListedDiscs, height, method) -> None:
     said = (
-        rf"0 of 7 markers .*; the workspace has them {height:g} mm nearer to the camera .*: give --camera, or"
+        rf"0 of 7 markers .*; the workspace has them {height:g} mm nearer to the camera .*: give its file, or"
     )
     with pytest.raises(UserError, match=said):
         track(at_height(listed, height), replace(sheet(height), camera=None, method=method))
@@ -58,13 +58,15 @@ def test_a_sheet_below_the_markers_needs_a_camera(listed: ListedDiscs, height, m
 
 @pytest.mark.parametrize("height", [12.0, 20.0, -15.0])
 def test_a_forgotten_sheet_is_guessed_with_its_height(listed: ListedDiscs, height) -> None:
-    with pytest.raises(UserError, match=r"give a --workspace with that marker_plane") as error:
+    with pytest.raises(UserError, match=r"give a workspace with that marker_plane") as error:
         track(at_height(listed, height), SCENE)
     side = "nearer to" if height > 0 else "farther from"
     assert f"they seem to be {side} the camera than the fiducials by about {height:.0f} mm" in str(
         error.value
     )
-    with pytest.raises(UserError, match=r"times as far apart: .* give --camera and a --workspace with that"):
+    with pytest.raises(
+        UserError, match=r"times as far apart: .* give the camera's file and a workspace with"
+    ):
         track(at_height(listed, height), replace(SCENE, camera=None))
 
 
@@ -81,7 +83,7 @@ def test_markers_beside_their_places_are_no_question_of_the_plane(listed: Listed
 
 def test_without_markers_colour_and_plane_are_named(listed: ListedDiscs) -> None:
     with pytest.raises(
-        UserError, match=r"markers' colour; if markers are nearer to the camera .* give --camera"
+        UserError, match=r"markers' colour; if markers are nearer to the camera .* give the camera"
     ):
         track(at_height(listed, 0.0), replace(SCENE, colour=replace(RED, low=(0.0, 0.0, 0.0))))
 
