@@ -14,6 +14,7 @@ from pinnray.commands.comparison.crossval import crossval
 from pinnray.commands.comparison.report import report
 from pinnray.commands.comparison.solvers import solvers
 from pinnray.commands.finger.design import design
+from pinnray.commands.finger.material import material
 from pinnray.commands.finger.mesh import mesh
 from pinnray.commands.finger.solve import solve
 from pinnray.commands.launch import EXIT_CODES
@@ -33,7 +34,7 @@ pinnray = App(
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = (
-    *(compare, report, design, mesh, solve, sweep, predict, optimise),
+    *(compare, report, design, mesh, material, solve, sweep, predict, optimise),
     *(gridsearch, crossval, solvers),
     *(fiducials, calibrate, pick, points, rig, track),
 )

@@ -1,0 +1,14 @@
+"""Materials of printed and cast fingers: presets with their sources, and moduli from a tensile test."""
+
+from solvers.materials.presets import MATERIALS, MaterialPreset, preset
+from solvers.materials.tensile_test import TensileFit, TensileTest, fitted, read_tensile_test
+
+__all__ = [
+    "MATERIALS",
+    "MaterialPreset",
+    "TensileFit",
+    "TensileTest",
+    "fitted",
+    "preset",
+    "read_tensile_test",
+]

@@ -1,0 +1,69 @@
+"""Common printing filaments, resins and silicones of soft fingers.
+
+The values are typical ones of the makers' data sheets. A printed part differs: raster, infill and age easily
+change its modulus by a third, so that the tensile test of a printed strip is better (`tensile_test`).
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from geometry.errors import UserError
+from solvers.problem import Material
+
+STRETCH = 2.0 - 2.0**-2
+"""λ - λ⁻² at the strain of 100 %, of an incompressible neo-Hookean bar in tension."""
+
+
+class MaterialPreset(NamedTuple):
+    """An elastic material with what else a designer needs."""
+
+    material: Material  #: With the law of finite strain that suits it
+    density: float  #: g/cm^3
+    strain_at_break: float  #: Nominal strain
+    source: str
+
+
+def _filament(young: float, density: float, strain_at_break: float, source: str) -> MaterialPreset:
+    """A thermoplastic elastomer whose sheet gives the tensile modulus, MPa."""
+    return MaterialPreset(
+        Material(young=young, poisson=0.45, law="neo-hookean"), density, strain_at_break, source
+    )
+
+
+def _silicone(stress: float, density: float, strain_at_break: float, source: str) -> MaterialPreset:
+    """A rubber whose sheet gives the nominal stress at 100 % strain, MPa: E = 3 σ / (λ - λ⁻²)."""
+    young = round(3 * stress / STRETCH, 4)
+    return MaterialPreset(
+        Material(young=young, poisson=0.49, law="neo-hookean"), density, strain_at_break, source
+    )
+
+
+SMOOTH_ON = "Smooth-On, technical bulletin, 100 % modulus (ASTM D412)"
+MATERIALS: Mapping[str, MaterialPreset] = {
+    "tpu-85a": _filament(12.0, 1.19, 6.6, "NinjaTek, NinjaFlex 85A, technical specifications (ASTM D638)"),
+    "tpu-95a": _filament(26.0, 1.22, 5.8, "NinjaTek, Cheetah 95A, technical specifications (ASTM D638)"),
+    "ecoflex-00-30": _silicone(0.0690, 1.07, 9.0, f"{SMOOTH_ON}, Ecoflex 00-30, 10 psi"),
+    "ecoflex-00-50": _silicone(0.0827, 1.07, 9.8, f"{SMOOTH_ON}, Ecoflex 00-50, 12 psi"),
+    "dragon-skin-10": _silicone(0.1517, 1.07, 10.0, f"{SMOOTH_ON}, Dragon Skin 10, 22 psi"),
+    "dragon-skin-20": _silicone(0.3378, 1.08, 6.2, f"{SMOOTH_ON}, Dragon Skin 20, 49 psi"),
+    "dragon-skin-30": _silicone(0.5929, 1.08, 3.64, f"{SMOOTH_ON}, Dragon Skin 30, 86 psi"),
+    "sylgard-184": MaterialPreset(
+        Material(young=1.8, poisson=0.49, law="neo-hookean"),
+        1.03,
+        1.0,
+        "I. D. Johnston et al., J. Micromech. Microeng. 24 (2014) 035017: 1.32 to 2.97 MPa, cured at 25 to "
+        "200 degrees; density and strain of Dow's data sheet",
+    ),
+}
+"""The presets by name; Poisson's ratios are assumed, 0.45 of filaments and 0.49 of silicones."""
+
+
+def preset(name: str) -> MaterialPreset:
+    """The preset of a name.
+
+    Raises:
+        UserError: If there is none; it names those there are.
+    """
+    if name not in MATERIALS:
+        raise UserError(f"there is no material {name!r}; there are {', '.join(MATERIALS)}")
+    return MATERIALS[name]

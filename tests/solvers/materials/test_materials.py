@@ -1,0 +1,88 @@
+"""Presets, and moduli from tensile tests whose answer is known."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from solvers.materials import MATERIALS, TensileTest, fitted, preset, read_tensile_test
+from solvers.materials.tensile_test import nominal_stress
+
+STRAIN = np.linspace(0.02, 0.8, 40)
+
+
+def test_a_neo_hookean_bar_that_keeps_its_volume_has_the_stress_of_the_textbook():
+    """σ = E/3 (λ - λ⁻²) for an incompressible one (Treloar 1975, chapter 5); ν = 0.4999 is near it."""
+    stretch = 1 + STRAIN
+    found = nominal_stress("neo-hookean", STRAIN, 0.4999)
+    np.testing.assert_allclose(found, (stretch - stretch**-2) / 3, rtol=2e-3)
+
+
+def test_a_bar_of_st_venant_and_kirchhoff_has_the_stress_of_the_textbook():
+    """Without transverse stress its second Piola-Kirchhoff stress is E times the Green-Lagrange strain."""
+    stretch = 1 + STRAIN
+    found = nominal_stress("st-venant-kirchhoff", STRAIN, 0.3)
+    np.testing.assert_allclose(found, stretch * (stretch**2 - 1) / 2, rtol=1e-9)
+    assert np.isnan(nominal_stress("st-venant-kirchhoff", np.array([0.9]), 0.45)).all()
+    assert "st-venant-kirchhoff" not in {each.material.law for each in fitted(TensileTest(STRAIN, STRAIN))}
+
+
+@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
+def test_the_law_and_the_modulus_of_a_test_are_found_again(law):
+    strain = 0.6 * STRAIN
+    noise = 1 + 0.01 * np.random.default_rng(0).normal(size=len(strain))
+    test = TensileTest(strain, 2.5 * nominal_stress(law, strain, 0.45) * noise)
+    best, *others = fitted(test)
+    assert best.material.law == law
+    assert best.material.young == pytest.approx(2.5, rel=0.01)
+    assert best.misfit < 0.02 < min(fit.misfit for fit in others)
+
+
+def test_a_silicone_has_the_stress_of_its_sheet_at_twice_its_length():
+    """Dragon Skin 30: 86 psi at a strain of 100 %; its Poisson's ratio of 0.49 costs 2 %."""
+    material = preset("dragon-skin-30").material
+    stress = material.young * nominal_stress("neo-hookean", np.array([1.0]), material.poisson)[0]
+    assert stress == pytest.approx(86 * 0.006895, rel=0.03)
+    for known in MATERIALS.values():
+        assert known.material.law == "neo-hookean"
+        assert 0.9 < known.density < 1.4
+        assert known.source
+    with pytest.raises(UserError, match="no material 'tpu'; there are tpu-85a"):
+        preset("tpu")
+
+
+def test_a_test_is_read_with_the_units_of_its_columns(tmp_path):
+    file = tmp_path / "strip.csv"
+    file.write_text("# of a strip\nstrain_percent;stress_kPa\n0;0\n10;50\n20;100\n50;220\n")
+    test = read_tensile_test(file)
+    np.testing.assert_allclose(test.strain, [0.1, 0.2, 0.5])
+    np.testing.assert_allclose(test.stress, [0.05, 0.1, 0.22])
+    assert test.secant(0.2) == pytest.approx(0.5)
+    assert np.isnan(test.secant(0.9))
+    assert len(test.up_to(0.5).strain) == 3
+    with pytest.raises(UserError, match=r"2 points have strains up to 0\.3"):
+        test.up_to(0.3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "force,stress_MPa\n1,2\n",
+            "a column strain or strain_percent or strain_% is needed",
+        ),
+        ("strain,stress_MPa\n0.1,1\n0.2,x\n0.3,2\n", "stress_MPa of row 2 is 'x', which is no number"),
+        ("strain,stress_MPa\n0,0\n0.2,1\n", "three points or more"),
+        ("", "is no table of a tensile test"),
+    ],
+)
+def test_what_is_no_tensile_test_is_refused_in_one_line(tmp_path, text, said):
+    file = tmp_path / "strip.csv"
+    file.write_text(text)
+    with pytest.raises(UserError, match=said) as refused:
+        read_tensile_test(file)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_stress_that_falls_is_no_test():
+    with pytest.raises(UserError, match="falls where the strain grows"):
+        fitted(TensileTest(STRAIN, -STRAIN))
