@@ -52,6 +52,7 @@ SOLVER = {
     "reaction": list,
     "stats": dict,
     "force": (dict, type(None)),
+    "figures": {"values": dict, "places": dict},
     "certificate": CERTIFICATE,
     "markers": {"in_sample": bool, "ae_u": list, "ae_v": list, **ERRORS},
     "held_out": {"ae_u": list, "ae_v": list, **ERRORS},
