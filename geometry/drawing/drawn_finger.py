@@ -244,6 +244,7 @@ def description_lines(finger: Finger) -> str:
     }
     file = drawn.file if drawn else finger.name
     lines = [f"# {file}: where it is clamped, touched and marked, in the file's coordinates."]
+    lines += [f"# It was read as {' '.join(drawn.note.split())}."] if drawn else []
     lines += [f"{key} = {json.dumps(value)}" for key, value in (drawn.reading if drawn else {}).items()]
     for key, value in where.items():
         source = sources.get(key)

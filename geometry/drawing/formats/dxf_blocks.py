@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
+import numpy as np
 from ezdxf.lldxf.const import DXFError
 
 from geometry.drawing.formats.drawing import place
@@ -106,7 +107,8 @@ def sound(entity: Any, layer: str) -> Iterator[None]:
     except (UserError, MemoryError):
         raise
     except Exception as error:  # a damaged entity can make ezdxf raise anything
-        reason = (str(error) or type(error).__name__).splitlines()[0].rstrip(".")
+        told = isinstance(error, DXFError | ValueError) and str(error)
+        reason = str(error).splitlines()[0].rstrip(".") if told else "a value is missing or wrong"
         raise UserError(
             f"the {entity.dxftype()}{_where(entity)} on layer {layer!r} is damaged: {reason}; draw it anew, "
             "or freeze that layer"
@@ -132,8 +134,9 @@ def _where(entity: Any) -> str:
     """Place of an entity in words, as far as it says."""
     for name in ("start", "center", "location", "insert"):
         if entity.dxf.hasattr(name):
-            return f" at {place(entity.dxf.get(name)[:2])}"
+            point = entity.dxf.get(name)
+            return f" at {place(np.array([point[0], point[1]]))}"
     for name in ("control_points", "fit_points"):
         for point in list(getattr(entity, name, ()))[:1]:
-            return f" at {place(point[:2])}"
+            return f" at {place(np.array([point[0], point[1]]))}"
     return ""

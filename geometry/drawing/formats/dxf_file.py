@@ -52,13 +52,19 @@ def document_of(path: Path) -> tuple[Any, str]:
     try:
         return ezdxf.filemanagement.readfile(path), ""
     except (OSError, DXFError, UnicodeDecodeError) as error:
-        reason = str(error).splitlines()[0].removeprefix("DXFStructureError: ").replace(str(path), path.name)
+        reason = (
+            " ".join(str(error).split()).removeprefix("DXFStructureError: ").replace(str(path), path.name)
+        )
     except Exception:  # a damaged file can make ezdxf raise anything
         reason = "it is damaged"
-    refused = UserError(f"it cannot be read as DXF: {reason.rstrip('.')}; export it again")
     content = path.read_bytes().removeprefix(b"\xef\xbb\xbf").lstrip()
-    if not content.rstrip().endswith(b"EOF") or b"SECTION" not in content:
-        raise refused  # cut off: a repair would leave out what is missing
+    is_text = b"SECTION" in content and not content.startswith(b"AutoCAD Binary DXF")
+    whole = content.rstrip().endswith(b"EOF")  # else a repair would leave out what is missing
+    if is_text and not whole:
+        reason = "it ends before EOF, so that it was cut off"
+    refused = UserError(f"it cannot be read as DXF: {reason.rstrip('.')}; export it again")
+    if not (is_text and whole):
+        raise refused
     try:
         document, auditor = recover.read(io.BytesIO(content))
     except Exception:

@@ -155,7 +155,7 @@ def _normals(face: cq.Face) -> Iterator[FloatArray]:
 def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
     """The cut of a solid with a plane; its depth is the solid's extent across the plane."""
     low, high = _extent(solid, normal)
-    if not low < offset < high:
+    if not low - 1e-6 <= offset <= high + 1e-6:  # an end face is in a plane that may be meant
         raise UserError(
             f"the plane {plane_text(normal, offset)} misses the solid, which reaches from {low:.6g} to "
             f"{high:.6g} mm along that direction"
@@ -166,6 +166,10 @@ def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
     middle = np.array([0.5 * (box.xmin + box.xmax), 0.5 * (box.ymin + box.ymax), 0.5 * (box.zmin + box.zmax)])
     shift = middle - normal * (middle @ normal)
     faces = plane.moved(cq.Location(cq.Vector(*shift))).intersect(solid).Faces()
+    if not faces:
+        raise UserError(
+            f"the plane {plane_text(normal, offset)} only touches the solid; move it into the solid"
+        )
     return Cut(faces, normal, offset, high - low, _is_extruded(solid, normal))
 
 

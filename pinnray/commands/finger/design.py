@@ -27,6 +27,7 @@ def design(
         formats: File formats, separated by commas: step, stl, dxf, svg.
     """
     from compare.figures.design_drawing import draw_design
+    from compare.runtime.exits import say
     from geometry.atomic import write_text
     from geometry.cache import cad_files
     from geometry.drawing.drawn_finger import DrawnFinger, description_lines
@@ -45,6 +46,8 @@ def design(
             raise UserError(f"--out {out}: this would overwrite {given}, which is read; name another folder")
     paths = cad_files(chosen, out, formats=comma_list(formats))
     write_text(lines, description_lines(chosen))
+    if isinstance(chosen, DrawnFinger):
+        say(f"note: {chosen.file} was read as {chosen.note}")
     drawn = draw_design(chosen) if isinstance(chosen, Design) else chosen.plot()
     picture = drawn.save(out / PICTURE)
     for path in [*paths, lines, picture]:

@@ -11,6 +11,7 @@ from ezdxf.document import Drawing as Document
 
 from geometry import UserError
 from geometry.drawing.checks import body
+from geometry.drawing.formats.dxf_blocks import sound
 from geometry.drawing.formats.dxf_file import HEADER_UNITS
 from geometry.drawing.load import read_drawing
 from tests.geometry.drawing.files import BEAM, rectangle, write_dxf
@@ -117,6 +118,18 @@ def test_coordinates_in_another_order_are_read(tmp_path, order):
     assert area(tmp_path / "a.dxf") == pytest.approx(1000)
 
 
+@pytest.mark.parametrize(
+    "lost",
+    ["0\nINSERT\n8\n0\n2\nFRAME\n10\n0\n20\n0\n", "0\nELLIPSE\n8\n0\n10\n5\n20\n-5\n11\n0\n21\n0\n40\n0.5\n"],
+)
+def test_a_repair_that_would_leave_something_out_is_refused(tmp_path, lost):
+    text = lines_text((10, 11, 20, 21))
+    (tmp_path / "a.dxf").write_text(text)
+    assert read_drawing(tmp_path / "a.dxf").note == "DXF, mm (assumed), repaired"
+    (tmp_path / "a.dxf").write_text(text.replace("0\nLINE", f"{lost}0\nLINE", 1))
+    assert "it cannot be read as DXF: " in refusal(tmp_path / "a.dxf")
+
+
 def test_a_byte_order_mark_is_no_damage(tmp_path):
     (tmp_path / "a.dxf").write_text("\ufeff" + lines_text(), encoding="utf-8")
     assert area(tmp_path / "a.dxf") == pytest.approx(1000)
@@ -128,10 +141,9 @@ def test_a_file_that_was_cut_off_is_not_repaired(tmp_path, share):
     path = write_dxf(tmp_path / "a.dxf", [BEAM, HOLE])
     text = path.read_text()
     path.write_text(text[: int(share * len(text))])
-    assert "it cannot be read as DXF" in refusal(path)
-    assert "export it again" in refusal(path)
+    assert "it cannot be read as DXF: it ends before EOF, so that it was cut off; export it" in refusal(path)
     (tmp_path / "b.dxf").write_text(lines_text((10, 11, 20, 21))[:-60])
-    assert "export it again" in refusal(tmp_path / "b.dxf")
+    assert "so that it was cut off; export it again" in refusal(tmp_path / "b.dxf")
 
 
 def test_what_is_on_layer_0_of_a_block_is_on_the_layer_of_its_insertion(tmp_path):
@@ -278,6 +290,17 @@ def test_what_cannot_be_read_does_not_matter_where_it_is_hidden(tmp_path, kind):
     document.modelspace()[-1].dxf.layer = "old"
     document.saveas(tmp_path / "a.dxf")
     assert area(tmp_path / "a.dxf") == pytest.approx(1000)
+
+
+def test_a_damaged_entity_is_named_with_its_place():
+    entity = ezdxf.new().modelspace().add_circle((3, 4), 1)
+    for error, said in (
+        (ValueError("no radius.\nmore"), "no radius"),
+        (TypeError("x"), "a value is missing"),
+    ):
+        place = r"the CIRCLE at \(3, 4\) on layer '0' is damaged: "
+        with pytest.raises(UserError, match=place + said), sound(entity, "0"):
+            raise error
 
 
 def test_markers_drawn_of_arcs_are_circles(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from geometry import UserError
 from geometry.drawing.checks import body
 from geometry.drawing.description import Description
+from geometry.drawing.drawn_finger import description_lines
 from geometry.drawing.formats.chain import closed_loops
 from geometry.drawing.formats.pieces import line
 from geometry.drawing.load import finger_from_file, read_drawing
@@ -74,6 +75,7 @@ def test_a_gap_is_named_with_the_tolerance_that_closes_it(tmp_path, gap, units, 
     finger = finger_from_file(path, Description(tolerance=tolerance))
     assert f"4 gaps of up to {gap:g} mm closed" in finger.note
     assert finger.reading == {"tolerance": tolerance}
+    assert f"# It was read as {finger.note}.\n" in description_lines(finger)
     assert finger.section.area == pytest.approx(1000, rel=2 * gap / 10)
 
 

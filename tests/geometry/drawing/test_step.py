@@ -147,6 +147,17 @@ def test_a_plane_in_the_face_of_a_step_gives_one_section(tmp_path, step, plane):
     assert area(path, plane=plane) == pytest.approx(1200)
 
 
+@pytest.mark.parametrize(("plane", "expected"), [("z = 12", 1200), ("z = 0", 1200), ("y = 20", 720)])
+def test_a_plane_in_an_end_face_is_that_face(tmp_path, plane, expected):
+    assert area(saved(tmp_path, BODY), plane=plane) == pytest.approx(expected)
+
+
+def test_a_plane_that_only_touches_is_refused(tmp_path):
+    path = saved(tmp_path, cq.Solid.makeCylinder(10, 30, dir=cq.Vector(1, 0, 0)))
+    with pytest.raises(UserError, match="the plane z = 10 only touches the solid; move it into"):
+        read_drawing(path, plane="z = 10")
+
+
 def degenerate(kind: str) -> cq.Shape:
     """A block with a dimple whose tip has no normal."""
     block = cq.Workplane("XY").box(60, 20, 12, centered=False)

@@ -42,6 +42,13 @@ def test_a_description_beside_the_drawing_counts_and_the_command_line_wins(tmp_p
     assert (finger.depth, finger.contact_abscissa) == (7.0, 45.0)
 
 
+def test_design_says_that_a_size_is_a_guess(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = drawing(tmp_path, size="100")
+    assert main(["design", "--section", str(file), "--formats", "svg", "--out", str(tmp_path / "out")]) == 0
+    assert "note: beam.svg was read as SVG, 0.264583 mm in a user unit (assumed" in capsys.readouterr().err
+    assert "(assumed" in (tmp_path / "out" / "beam.toml").read_text()
+
+
 def test_solve_works_on_a_drawing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--solver", "fem", "--mesh-size", "1", "--out", str(tmp_path / "u.vtu")]
     assert main(["solve", "--section", str(drawing(tmp_path)), *options]) == 0
