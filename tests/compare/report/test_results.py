@@ -12,6 +12,7 @@ import pytest
 from compare.evaluation.certification import with_certificates
 from compare.evaluation.metrics import marker_errors, reference_differences
 from compare.report.output_files import metrics
+from compare.report.summary import answers
 from geometry.finger.design import Design
 from solvers.problem import Load, Material, Problem
 
@@ -52,7 +53,7 @@ SOLVER = {
     "reaction": list,
     "stats": dict,
     "force": (dict, type(None)),
-    "figures": {"values": dict, "places": dict},
+    "figures": (dict, type(None)),
     "certificate": CERTIFICATE,
     "markers": {"in_sample": bool, "ae_u": list, "ae_v": list, **ERRORS},
     "held_out": {"ae_u": list, "ae_v": list, **ERRORS},
@@ -190,3 +191,32 @@ def test_without_dolfinx_no_result_is_certified_and_a_warning_says_so(estimated,
     with pytest.warns(UserWarning, match="no result is certified: solver 'fem' cannot be loaded"):
         (plain,) = with_certificates([estimated], Problem(mesh))
     assert plain.certificate is None
+
+
+def test_figures_are_in_newtons_with_their_places(finished):
+    """A finger with a depth has them; the bodies of the other tests have none."""
+    told = json.loads((finished / "metrics.json").read_text(encoding="utf-8"))
+    fem, depth = told["solvers"]["fem"], told["design"]["depth"]
+    force = -depth * fem["reaction"][1]
+    values = fem["figures"]["values"]
+    assert values["force_N"] == pytest.approx(force)
+    assert values["force_50_N"] == pytest.approx(force / 2)
+    assert values["strain_energy_mJ"] == pytest.approx(fem["energy"] * depth)
+    assert "force_low_N" not in values
+    assert set(fem["figures"]["places"]) == {"von_mises", "principal_strain"}
+
+
+def test_the_report_says_what_the_finger_does_in_newtons(finished):
+    told = json.loads((finished / "metrics.json").read_text(encoding="utf-8"))
+    network = {**told["solvers"]["fem"], "family": "neural network"}
+    both = {**told, "solvers": {"fem": told["solvers"]["fem"], "pinn-std": network}}
+    questions = [answer.question for answer in answers(both)]
+    assert questions.index("May the network be trusted here?") < questions.index("What does the finger do?")
+    told["solvers"] = {"fem": told["solvers"]["fem"]}
+    first = answers(told)[0]
+    assert first.question == "What does the finger do?"
+    values = told["solvers"]["fem"]["figures"]["values"]
+    assert f"{values['force_N']:.3g} N" in first.verdict
+    values |= {"force_low_N": 4.0, "force_high_N": 5.0}
+    assert "95 % interval 4.00 to 5.00 N" in answers(told)[0].verdict
+    assert any("(4.00 to 5.00)" in cell for row in answers(told)[0].table.rows for cell in row)
