@@ -216,7 +216,7 @@ def test_the_report_says_what_the_finger_does_in_newtons(finished):
     first = answers(told)[0]
     assert first.question == "What does the finger do?"
     values = told["solvers"]["fem"]["figures"]["values"]
-    assert f"{values['force_N']:.3g} N" in first.verdict
+    assert f"{values['force_N']:#.3g} N" in first.verdict
     values |= {"force_low_N": 4.0, "force_high_N": 5.0}
     assert "95 % interval 4.00 to 5.00 N" in answers(told)[0].verdict
     assert any("(4.00 to 5.00)" in cell for row in answers(told)[0].table.rows for cell in row)
