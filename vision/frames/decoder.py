@@ -2,7 +2,7 @@
 
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,6 @@ PNG_HEADER = 33
 DEFLATE = 1032
 """Largest ratio by which a PNG's compression makes data smaller. Source: zlib, technical details."""
 
-MOST_TOGETHER = 2_000_000_000
-"""Bytes of all frames of an animation, which OpenCV decodes at once."""
 DEPTHS = (10, 12, 14, 16)
 """Possible numbers of significant bits in 16-bit pictures."""
 
@@ -56,19 +54,21 @@ class Decoder:
     def __call__(self, content: bytes, label: str, name: str) -> Iterator[tuple[str, Image]]:
         """The images in a file's content with their names: of several pages, the page's number follows.
 
+        Animated PNG and WebP are refused: OpenCV crashes on damaged ones.
+
         Raises:
             UserError: If it is no whole picture, or neither of 8 nor of 16 bits.
         """
         numbers, first = pages(content, label), self._image(content, label)
-        if len(numbers) == 1 and numbers != [0]:
+        if len(numbers) == 1 and numbers[0]:
             first = self._in_8_bits(self._page(content, numbers[0], label), label)
         if len(numbers) == 1:
             yield name, first
             return
-        animation = None if content.startswith(TIFF) else self._animation(content, len(numbers), first, label)
+        if not content.startswith(TIFF):
+            raise UserError(f"cannot read {label}: it has {len(numbers)} frames, not one; make a video of it")
         for count, page in enumerate(numbers):
-            image = self._page(content, page, label) if animation is None else animation[page]
-            yield f"{name}:{count}", self._in_8_bits(image, label)
+            yield f"{name}:{count}", self._in_8_bits(self._page(content, page, label), label)
 
     def _image(self, content: bytes, label: str) -> Image:
         """The first image."""
@@ -99,18 +99,6 @@ class Decoder:
             if done and len(found) == 1:
                 return found[0]
         raise UserError(f"cannot read {label}: page {page} is damaged or too large")
-
-    @staticmethod
-    def _animation(content: bytes, count: int, first: Image, label: str) -> Sequence[MatLike]:
-        """All frames of an animated PNG or WebP as they are stored."""
-        found: Sequence[MatLike] = ()
-        if count * first.shape[0] * first.shape[1] * 4 > MOST_TOGETHER:
-            raise UserError(f"cannot read {label}: its {count} frames are too many; make a video of it")
-        with silenced(), suppress(cv2.error):
-            _, found = cv2.imdecodemulti(np.frombuffer(content, dtype=np.uint8), _AS_STORED)
-        if len(found) != count:
-            raise UserError(f"cannot read {label}: {len(found)} of its {count} frames can be read")
-        return found
 
     def _in_8_bits(self, image: MatLike, label: str) -> Image:
         """An image as it is stored in 8 bits, without transparency."""

@@ -1,6 +1,7 @@
 """What a picture file holds: a format that is not read, and the numbers of its pages."""
 
 import re
+from collections.abc import Sequence
 
 from geometry.errors import UserError
 
@@ -57,7 +58,7 @@ def has_pages(head: bytes) -> bool:
     return head.startswith((PNG, *TIFF)) or (head.startswith(b"RIFF") and head[8:12] == b"WEBP")
 
 
-def pages(content: bytes, label: str) -> list[int]:
+def pages(content: bytes, label: str) -> Sequence[int]:
     """Numbers of a picture's pages: more than [0] for a TIFF of several, an animated PNG or WebP.
 
     Smaller copies and masks of other pages of a TIFF are left out.
@@ -70,9 +71,9 @@ def pages(content: bytes, label: str) -> list[int]:
     """
     if content.startswith(PNG):
         control = content.find(b"acTL", 0, content.find(b"IDAT"))
-        return list(range(int.from_bytes(content[control + 4 : control + 8], "big"))) if control > 0 else [0]
+        return range(max(1, int.from_bytes(content[control + 4 : control + 8], "big") if control > 0 else 1))
     if content.startswith(b"RIFF"):
-        return list(range(_frames_of_webp(content))) or [0]
+        return range(max(1, _frames_of_webp(content)))
     return _pages_of_tiff(content, label) or [0] if content.startswith(TIFF) else [0]
 
 

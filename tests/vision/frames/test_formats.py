@@ -44,9 +44,6 @@ def seen(source: Path | str) -> list[int]:
         ("stack.tif", {"compression": "tiff_lzw"}),
         ("stack.tif", {"big_tiff": True}),
         ("stack.stk", {"format": "TIFF"}),  # of MetaMorph
-        ("moving.webp", {"lossless": True, "duration": 50}),
-        ("moving.png", {"duration": 50}),
-        ("moving.apng", {"format": "PNG", "duration": 50}),
         ("moving.gif", {"duration": 50}),
     ],
 )
@@ -87,7 +84,7 @@ def test_a_smaller_copy_is_no_page(tmp_path):
     small.encoderinfo = {"tiffinfo": {254: 1}}
     Image.fromarray(np.full((12, 16), 70, np.uint8)).save(path, save_all=True, append_images=[small])
     assert seen(path) == [70]
-    assert pages(path.read_bytes(), "a") == [0]
+    assert list(pages(path.read_bytes(), "a")) == [0]
 
 
 def test_pages_of_another_size_are_named(tmp_path):
@@ -105,7 +102,10 @@ def test_pages_of_another_size_are_named(tmp_path):
             "6 of its 9000 pages",
         ),
         (lambda path: path.write_bytes(stack(path).read_bytes()[:-150]), "of its pages can be|is damaged"),
-        (lambda path: path.write_bytes(stack(path, format="PNG").read_bytes()[:-60]), "its end is missing"),
+        (
+            lambda path: path.write_bytes(stack(path, format="PNG").read_bytes()[:-60]),
+            "its end is missing",
+        ),
     ],
 )
 def test_a_stack_that_lacks_pages_is_named(tmp_path, make, said):
@@ -141,6 +141,20 @@ def test_a_format_that_is_not_read_is_named_alone_and_among_others(tmp_path, nam
                 reading(source)
             assert name in str(error.value)
             assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["a.webp", "a.png", "a.apng"])
+def test_an_animation_is_never_one_picture(tmp_path, name):
+    path = stack(tmp_path / name, format="WEBP" if name == "a.webp" else "PNG")
+    for reading in (seen, lambda source: list(photographs([source]))):
+        with pytest.raises(UserError, match=rf"{name}: it has 6 frames, not one; make a video of it"):
+            reading(path)
+
+
+def test_a_header_that_promises_frames_without_end_takes_no_memory(tmp_path):
+    content = stack(tmp_path / "a.png", format="PNG").read_bytes()
+    at = content.index(b"acTL") + 4
+    assert len(pages(content[:at] + b"\xff" * 4 + content[at + 4 :], "a")) == 2**32 - 1
 
 
 def test_a_film_among_pictures_is_named(tmp_path):
