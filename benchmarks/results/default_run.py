@@ -49,12 +49,11 @@ class Figures(NamedTuple):
     force: float
     seconds: float
 
+
     @property
     def held_out_sum(self) -> float | None:
         """Mean of |Δu| + |Δv| at markers that were not given, mm, as in report and terminal."""
-        if self.held_out_u is None or self.held_out_v is None:
-            return None
-        return self.held_out_u + self.held_out_v
+        return None if self.held_out_u is None or self.held_out_v is None else self.held_out_u + self.held_out_v
 
 
 def figures_of(name: str, entry: Mapping[str, Any]) -> Figures:

@@ -119,20 +119,26 @@ def errors_note(evaluation: Evaluation, observations: Observations) -> str:
     return f"MAE{kind}: u {errors.mae_u:.3f}, v {errors.mae_v:.3f} mm"
 
 
-def _motion(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
-    """The path of the contact, on average, or of a cylinder, which is drawn where it ends."""
+def contact_motion(comparison: Results, evaluation: Evaluation) -> tuple[FloatArray, FloatArray]:
+    """Where the middle of the contact starts and ends, or a cylinder's lowest point, each shape (2,), mm."""
     mesh, load = comparison.mesh, comparison.load
     nodes = np.unique(mesh.boundary("contact"))
     if load.radius is None:
         start = mesh.points[nodes].mean(axis=0)
-        arrow(axes, start, start + evaluation.node_displacement[nodes].mean(axis=0))
-        return
+        return start, start + evaluation.node_displacement[nodes].mean(axis=0)
     x = (mesh.points[nodes, 0].min() + mesh.points[nodes, 0].max()) / 2
     front = mesh.points[np.unique(mesh.boundary("front"))]
     front = front[front[:, 0].argsort()]
     x = x if load.position is None else load.position
     start = np.array([x, np.interp(x, *front.T)])
-    end = start + load.values
-    centre = (end[0], end[1] + load.radius)  # it can lie outside the picture
-    axes.add_patch(Circle(centre, load.radius, fill=False, color=MUTED, lw=0.8, zorder=3))
+    return start, start + load.values
+
+
+def _motion(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
+    """The path of the contact, on average, or of a cylinder, which is drawn where it ends."""
+    radius = comparison.load.radius
+    start, end = contact_motion(comparison, evaluation)
+    if radius is not None:
+        centre = (end[0], end[1] + radius)  # it can lie outside the picture
+        axes.add_patch(Circle(centre, radius, fill=False, color=MUTED, lw=0.8, zorder=3))
     arrow(axes, start, end)

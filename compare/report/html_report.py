@@ -23,6 +23,7 @@ from compare.evaluation.metrics import force_error, indistinct, reference_differ
 from compare.figures import Picture
 from compare.figures.body import diverging
 from compare.figures.fields import QUANTITIES, FieldQuantity, difference_scale, field_scale, triangle_values
+from compare.figures.overlay import contact_motion
 from compare.report import text
 from compare.report.output_files import metrics
 from compare.report.summary import answers
@@ -94,6 +95,7 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
         "differences": [_stop(share) for share in np.linspace(0, 1, 17)],
         "quantities": [
             {
+                "name": quantity.name,
                 "title": quantity.title,
                 "unit": quantity.unit,
                 "low": (scale := field_scale(quantity, mesh, reference)).low,
@@ -103,6 +105,7 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
             for quantity in quantities
         ],
         "solvers": [_solver(each, comparison, quantities, packed) for each in shown],
+        "name": comparison.design.name,
     }
     return {"manifest": manifest, "data": packed.text(), "library": _library(), "shown": shown}
 
@@ -119,17 +122,45 @@ def _solver(
         if is_reference:
             fields.append(packed.add_steps(values))
             continue
-        own = packed.add_steps(values - triangle_values(quantity, reference))
-        fields.append(own | {"scale": difference_scale(quantity, mesh, evaluation, reference).high})
+        fields.append(packed.add_steps(values - triangle_values(quantity, reference)))
+    against = {"reference": reference, "truth": comparison.truth}
+    start, end = contact_motion(comparison, evaluation)
     fractions, states, path = _load_path(evaluation)
     return {
         "label": "truth (simulated)" if evaluation.solver == TRUTH else evaluation.label,
         "isReference": is_reference,
+        "isTruth": evaluation.solver == TRUTH,
+        "scales": {
+            name: [difference_scale(quantity, mesh, evaluation, other).high for quantity in quantities]
+            for name, other in against.items()
+            if other is not None and other.finite
+        },
+        "contact": [start.tolist(), end.tolist()],
+        "markers": _markers(evaluation, comparison),
+        "observed": _observed(evaluation, comparison),
         "fields": fields,
         "fractions": fractions,
         "states": packed.add_steps(states),
         "path": path,
     }
+
+
+def _markers(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
+    """Markers as the finger has them: at rest, displaced at the full load, and the nearest node of each."""
+    mesh, points = comparison.mesh, comparison.observations.points
+    nearest = [int(np.linalg.norm(mesh.points - point, axis=1).argmin()) for point in points]
+    moved = evaluation.marker_displacement
+    return {"points": points.tolist(), "displacements": moved.tolist(), "nodes": nearest}
+
+
+def _observed(evaluation: Evaluation, comparison: Results) -> list[list[float]]:
+    """Positions of the markers that were seen, mm, in the frame of the finger as the solver found it."""
+    observations = comparison.observations
+    if not observations.known:
+        return []
+    off = evaluation.shown_displacement - evaluation.marker_displacement
+    seen = (observations.points + observations.displacements - off)[observations.visible]
+    return np.asarray(seen).tolist()
 
 
 def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:

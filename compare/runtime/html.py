@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 from PIL import Image
 
 from geometry.atomic import write_text
@@ -17,6 +18,9 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 SMALL = 300_000
 """Bytes up to which a picture, as a rule one of lines, is embedded as it is."""
+
+LONG = 24
+"""Letters of a name that does not fit a line of a phone."""
 
 
 def write_html(path: Path, template: str, **values: Any) -> Path:
@@ -32,7 +36,7 @@ def write_html(path: Path, template: str, **values: Any) -> Path:
 def template_environment() -> Environment:
     """The environment of `compare/templates`: HTML is escaped, and a missing name is an error.
 
-    The filter `png` turns the path of a PNG file into a data URL.
+    The filter `png` turns the path of a PNG file into a data URL; `unbroken` keeps names with hyphens whole.
     """
     environment = Environment(
         loader=PackageLoader("compare"),
@@ -41,8 +45,17 @@ def template_environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["png"] = png_url
+    environment.filters |= {"png": png_url, "unbroken": unbroken}
     return environment
+
+
+def unbroken(text: object) -> Markup:
+    """The text with lines that break between its words only, not at a hyphen unless the word is long."""
+    word = Markup('<span class="word">{}</span>')
+    return Markup(" ").join(
+        word.format(part) if "-" in part and len(part) < LONG else escape(part)
+        for part in str(text).split(" ")
+    )
 
 
 def png_url(path: Path) -> str:

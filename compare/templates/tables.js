@@ -132,6 +132,21 @@
     table.parentElement.after(tools);
   }
 
+  // A table that is wider than its window says so, and can be scrolled by keys.
+  const measured = new ResizeObserver((found) => {
+    for (const { target } of found) {
+      const cut = target.scrollWidth > target.clientWidth + 1;
+      target.classList.toggle("cut", cut);
+      if (cut) target.tabIndex = 0;
+      else target.removeAttribute("tabindex");
+    }
+  });
+  for (const window of document.querySelectorAll(".scroll")) measured.observe(window);
+
+  for (const image of document.querySelectorAll(".pictures img")) {
+    image.addEventListener("click", () => image.parentElement.classList.toggle("wide"));
+  }
+
   window.pinnrayTables = { csv, latex };
   addEventListener("beforeprint", () => {
     for (const part of document.querySelectorAll("details")) part.open = true;

@@ -6,147 +6,139 @@
   const box = byId("viewer");
   if (!box) return;
   const canvas = byId("viewer-canvas");
-  const { manifest, unpacked, kept, field, difference, displacement } = pinnrayFields;
+  const { manifest, unpacked, others } = pinnrayFields;
+  const { traces, shape, way, scaleOf, ink } = pinnrayTraces;
   let points, triangles;
   const chosen = (name) => byId(name)?.value;
+  const FOOT = 80; // pixels below the body, for the colour bars
 
+  // One panel or two: of what solver, which quantity, and minus what.
   function state() {
-    const solver = manifest.solvers[chosen("viewer-solver")];
     const number = Number(chosen("viewer-quantity"));
-    const minus = chosen("viewer-show") === "difference" && !solver.isReference;
-    return { solver, number, quantity: manifest.quantities[number], minus, load: Number(chosen("viewer-load")) / 100 };
+    const panel = (solver, show) => ({ solver, number, against: solver === others[show] ? undefined : others[show] && show });
+    const solver = manifest.solvers[chosen("viewer-solver")];
+    const [show, beside] = [chosen("viewer-show"), chosen("viewer-beside")];
+    const panels = [panel(solver, show)];
+    if (beside in others) panels.push(panel(solver, beside));
+    else if (beside) panels.push(panel(manifest.solvers[beside], show));
+    return { panels, number, quantity: manifest.quantities[number], load: Number(chosen("viewer-load")) / 100 };
   }
 
   const digits = (value) => String(Number(value.toPrecision(3))).replace("-", "−");
-
-  function shape({ solver, load }) {
-    const moved = displacement(solver, load);
-    const x = [];
-    const y = [];
-    for (let node = 0; node < points.length / 2; node += 1) {
-      x.push(points[2 * node] + moved[2 * node]);
-      y.push(points[2 * node + 1] + moved[2 * node + 1]);
-    }
-    return { moved, x, y };
-  }
-
-  // The colours of the displacement follow the load; those of stress and strain are of the full load.
-  function colours(now, moved) {
-    if (now.minus) return difference(now.solver, now.number);
-    if (now.number !== 0 || now.load === 1) return field(now.solver, now.number);
-    const size = (node) => Math.hypot(moved[2 * node], moved[2 * node + 1]);
-    const found = new Float64Array(triangles.length / 3);
-    for (let t = 0; t < found.length; t += 1) {
-      found[t] = (size(triangles[3 * t]) + size(triangles[3 * t + 1]) + size(triangles[3 * t + 2])) / 3;
-    }
-    return found;
-  }
-
-  function outline(x, y) {
-    const lines = { x: [], y: [], z: [] };
-    for (const path of manifest.outlines) {
-      for (const node of path) {
-        lines.x.push(x[node]);
-        lines.y.push(y[node]);
-        lines.z.push(0.01);
-      }
-      for (const axis of Object.values(lines)) axis.push(null);
-    }
-    return lines;
-  }
-
-  const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  let shown;
-
-  function traces(now) {
-    const { moved, x, y } = shape(now);
-    const { solver, quantity, minus } = now;
-    const values = colours(now, moved);
-    const scale = minus ? solver.fields[now.number].scale : quantity.high;
-    shown = { values, x, y, minus, unit: quantity.unit };
-    const corner = (k) => Array.from({ length: triangles.length / 3 }, (_, t) => triangles[3 * t + k]);
-    return [
-      {
-        type: "mesh3d", x, y, z: new Array(x.length).fill(0),
-        i: kept("i", () => corner(0)), j: kept("j", () => corner(1)), k: kept("k", () => corner(2)),
-        intensity: values, intensitymode: "cell", flatshading: true, hoverinfo: "none",
-        cmin: minus ? -scale : quantity.low, cmax: scale,
-        colorscale: minus || quantity.signed ? manifest.differences : "Viridis",
-        lighting: { ambient: 1, diffuse: 0, specular: 0, fresnel: 0, roughness: 1 },
-        colorbar: {
-          orientation: "h", y: -0.02, yanchor: "top", len: 0.7, thickness: 12, outlinewidth: 0,
-          tickfont: { color: ink("--ink") }, nticks: 6, exponentformat: "power",
-          title: { text: `${minus ? "difference, " : ""}${quantity.unit}`, side: "bottom", font: { color: ink("--ink") } },
-        },
-      },
-      { type: "scatter3d", mode: "lines", ...outline(x, y), line: { color: ink("--ink"), width: 1.5 }, hoverinfo: "skip" },
-      { type: "scatter3d", mode: "lines", ...kept("rest", () => {
-        const [left, right] = [0, 1].map((axis) => Array.from({ length: points.length / 2 }, (_, n) => points[2 * n + axis]));
-        return outline(left, right);
-      }), line: { color: ink("--muted"), width: 1 }, opacity: 0.5, hoverinfo: "skip" },
-    ];
-  }
+  const named = ({ solver, against }) => solver.label + (against ? ` minus ${against === "truth" ? "truth" : manifest.reference}` : "");
 
   // What the numbers mean, beside the canvas; the page's words for those who do not see it.
-  function describe(now) {
-    const { solver, quantity, minus, load } = now;
-    const scale = minus ? `±${digits(solver.fields[now.number].scale)}` : `${digits(quantity.low)} to ${digits(quantity.high)}`;
-    const own = minus ? "a scale of its own" : "one scale for all solvers";
-    byId("viewer-title").textContent =
-      `${quantity.title}, ${quantity.unit}: ${solver.label}${minus ? ` minus ${manifest.reference}` : ""}`;
-    const late = load < 1 && (minus || now.number !== 0) ? " Colours are those of the full load." : "";
+  function describe({ panels, quantity, load }) {
+    const title = `${quantity.title}, ${quantity.unit}: `;
+    byId("viewer-title").textContent = title + (panels.length > 1
+      ? `left ${named(panels[0])}; right ${named(panels[1])}` : named(panels[0]));
+    const scale = (panel) => {
+      const { low, high } = scaleOf(panel);
+      return panel.against
+        ? `±${digits(high)} ${quantity.unit}, a scale of its own`
+        : `${digits(low)} to ${digits(high)} ${quantity.unit}, one scale for all solvers`;
+    };
+    const same = panels.filter(({ against, solver }) => !against && solver === others[chosen("viewer-show")]);
     byId("viewer-note").textContent =
-      `Colours: ${scale} ${quantity.unit}, ${own}; values beyond take the end colours. ` +
-      `Shape at ${Math.round(100 * load)} % of the load, displacement at true scale: ${solver.path}.${late}` +
-      (chosen("viewer-show") === "difference" && solver.isReference ? ` ${solver.label} is what the others are compared with.` : "");
+      `Colours: ${[...new Set(panels.map(scale))].join("; ")}; values beyond take the end colours. ` +
+      `Shape and colours at ${Math.round(100 * load)} % of the load, displacement at true scale: ` +
+      `${[...new Set(panels.map(({ solver }) => solver.path))].join("; ")}.` +
+      same.map(({ solver }) => ` ${solver.label} is what the others are compared with.`).join("");
   }
 
   // View: `range` are the data's limits; the scene scales them to `size`, which zooms, around the camera's centre.
-  let range, whole, size, centre;
+  let range, size, centre;
 
+  // Everything that any solver shows at any load, and a little room around it.
   function fit() {
-    const all = manifest.solvers.flatMap((solver) => [0, 1].map((load) => shape({ solver, load })));
-    const limits = (axis) => [
-      Math.min(...all.map((one) => one[axis].reduce((a, b) => Math.min(a, b)))),
-      Math.max(...all.map((one) => one[axis].reduce((a, b) => Math.max(a, b)))),
-    ];
-    range = { x: limits("x"), y: limits("y") };
+    const found = { x: [Infinity, -Infinity], y: [Infinity, -Infinity] };
+    const meet = (axis, value) => {
+      found[axis] = [Math.min(found[axis][0], value), Math.max(found[axis][1], value)];
+    };
+    for (const solver of manifest.solvers) {
+      for (const load of [0, ...solver.fractions]) {
+        const { x, y } = shape(solver, load);
+        for (const value of x) meet("x", value);
+        for (const value of y) meet("y", value);
+      }
+      for (const [x, y] of [...solver.observed, ...way(solver, 1, 0)]) {
+        meet("x", x);
+        meet("y", y);
+      }
+    }
+    const room = 0.02 * (found.x[1] - found.x[0]);
+    range = { x: [found.x[0] - room, found.x[1] + room], y: [found.y[0] - room, found.y[1] + room] };
   }
 
   const span = (axis) => range[axis][1] - range[axis][0];
+  const height = () => canvas.clientHeight - FOOT;
+  const breadth = () => canvas.clientWidth / state().panels.length - 8;
+  const perMillimetre = () => (height() / 2) * (size.x / span("x")); // the camera shows a height of 2
 
-  // The whole body in the canvas, above the colour bar: an orthographic camera shows a height of about 2.4.
+  // The whole body in its panel.
   function showAll() {
-    const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
-    const scale = 2.3 * Math.min(wide / high / span("x"), 0.8 / span("y"));
-    whole = { x: span("x") * scale, y: span("y") * scale, z: 0.01 };
-    size = { ...whole };
-    centre = { x: 0, y: -0.12, z: 0 };
+    const scale = 1.94 * Math.min(breadth() / height() / span("x"), 1 / span("y"));
+    size = { x: span("x") * scale, y: span("y") * scale, z: 0.01 };
+    centre = { x: 0, y: 0, z: 0 };
   }
 
-  function layout() {
-    const axis = { visible: false, showspikes: false };
+  const camera = () => ({
+    projection: { type: "orthographic" }, up: { x: 0, y: 1, z: 0 }, center: { ...centre }, eye: { ...centre, z: 2 },
+  });
+
+  // A bar of a round length at the lower right, and its words.
+  function scaleBar() {
+    const wanted = (0.15 * breadth()) / perMillimetre();
+    const power = 10 ** Math.floor(Math.log10(wanted));
+    const length = [5, 2, 1].find((step) => step * power <= wanted) * power;
+    const share = (length * perMillimetre()) / canvas.clientWidth;
+    const line = { type: "line", xref: "paper", yref: "paper", x0: 0.99 - share, x1: 0.99, y0: 0.02, y1: 0.02 };
     return {
-      margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", showlegend: false,
-      scene: {
-        xaxis: { ...axis, range: range.x }, yaxis: { ...axis, range: range.y }, zaxis: { ...axis, range: [-1, 1] },
-        aspectmode: "manual", aspectratio: { ...size }, dragmode: "pan",
-        camera: {
-          projection: { type: "orthographic" }, up: { x: 0, y: 1, z: 0 }, center: { ...centre },
-          eye: { ...centre, z: 2 },
-        },
-      },
+      shapes: [{ ...line, line: { color: ink("--ink"), width: 3 } }],
+      annotations: [{
+        xref: "paper", yref: "paper", x: 0.99, y: 0.03, xanchor: "right", yanchor: "bottom", showarrow: false,
+        text: `${Number(length.toPrecision(1))} mm`, font: { color: ink("--ink"), size: 12 },
+      }],
     };
   }
 
+  function layout(count) {
+    const axis = { visible: false, showspikes: false };
+    const scene = (left, right) => ({
+      xaxis: { ...axis, range: range.x }, yaxis: { ...axis, range: range.y }, zaxis: { ...axis, range: [-1, 1] },
+      aspectmode: "manual", aspectratio: { ...size }, dragmode: "pan", camera: camera(), domain: { x: [left, right] },
+    });
+    return {
+      margin: { l: 0, r: 0, t: 0, b: FOOT }, paper_bgcolor: "rgba(0,0,0,0)", showlegend: false, ...scaleBar(),
+      scene: scene(0, count > 1 ? 0.495 : 1), ...(count > 1 ? { scene2: scene(0.505, 1) } : {}),
+    };
+  }
+
+  let shown;
   async function draw() {
     const now = state();
+    const count = now.panels.length;
     describe(now);
-    await Plotly.react(canvas, traces(now), layout(), { displayModeBar: false, responsive: true, scrollZoom: true, logging: 0 });
+    const found = now.panels.map((panel, number) => traces(panel, now.load, {
+      scene: number ? "scene2" : "scene",
+      bar: { x: (number + 0.5) / count, len: 0.7 / count },
+      head: 0.1 * span("y"),
+      marks: byId("viewer-marks").checked,
+    }));
+    shown = { ...found[0], panel: now.panels[0], unit: now.quantity.unit };
+    await Plotly.react(canvas, found.flatMap(({ drawn }) => drawn), layout(count),
+      { displayModeBar: false, responsive: true, scrollZoom: true, logging: 0 });
     if (probed !== undefined) probe(probed);
   }
 
-  const moved = () => Plotly.relayout(canvas, { "scene.aspectratio": { ...size }, "scene.camera": layout().scene.camera });
+  function moved() {
+    const change = { ...scaleBar() };
+    for (const scene of state().panels.length > 1 ? ["scene", "scene2"] : ["scene"]) {
+      change[`${scene}.aspectratio`] = { ...size };
+      change[`${scene}.camera`] = camera();
+    }
+    return Plotly.relayout(canvas, change);
+  }
 
   function zoom(factor) {
     for (const axis of ["x", "y"]) {
@@ -162,15 +154,28 @@
     moved();
   }
 
+  // The picture as it stands, with its title, at twice the size of the screen.
+  async function save() {
+    const [title, room] = [byId("viewer-title").textContent, 34];
+    const page = { ...canvas.layout, paper_bgcolor: ink("--paper"), margin: { l: 0, r: 0, t: room, b: FOOT } };
+    page.title = { text: title, x: 0.01, xanchor: "left", font: { size: 14, color: ink("--ink") } };
+    const image = await Plotly.toImage({ data: canvas.data, layout: page },
+      { format: "png", width: canvas.clientWidth, height: canvas.clientHeight + room, scale: 2 });
+    const link = document.createElement("a");
+    link.href = image;
+    link.download = `${manifest.name} ${title}`.replace(/[^\w.-]+/g, "-") + ".png";
+    link.click();
+  }
+
   // What is said of a triangle: where it was before the load, and the mean of the field over it.
   let probed;
   function probe(triangle) {
     probed = triangle;
     const nodes = [0, 1, 2].map((k) => triangles[3 * triangle + k]);
     const mean = (axis) => nodes.reduce((sum, node) => sum + points[2 * node + axis], 0) / 3;
-    const what = shown.minus ? "difference" : "value";
+    const what = shown.panel.against ? "difference" : "value";
     byId("viewer-probe").textContent =
-      `x = ${digits(mean(0))} mm, y = ${digits(mean(1))} mm (undeformed): ${what} ${digits(shown.values[triangle])} ${shown.unit}`;
+      `x = ${digits(mean(0))} mm, y = ${digits(mean(1))} mm (undeformed): ${what} ${digits(shown.shown[triangle])} ${shown.unit}`;
   }
 
   function probeMiddle() {
@@ -226,6 +231,21 @@
     obey();
   }
 
+  // A wheel or a finger that passes over the picture scrolls the page; with Ctrl, or after a click, it zooms.
+  function entering() {
+    let entered = false;
+    const enter = (yes) => {
+      entered = yes;
+      canvas.classList.toggle("entered", yes);
+    };
+    document.addEventListener("pointerdown", (event) => enter(canvas.contains(event.target)));
+    document.addEventListener("keydown", (event) => event.key === "Escape" && enter(false));
+    const pass = (event) => {
+      if (!entered && !event.ctrlKey) event.stopPropagation();
+    };
+    for (const kind of ["wheel", "touchstart", "touchmove"]) box.addEventListener(kind, pass, { capture: true, passive: true });
+  }
+
   async function start() {
     const library = document.createElement("script");
     library.textContent = await (await unpacked("viewer-library")).text();
@@ -234,9 +254,15 @@
     fit();
     showAll();
     await draw();
-    for (const name of ["viewer-solver", "viewer-quantity", "viewer-show", "viewer-load"]) {
+    for (const name of ["viewer-solver", "viewer-quantity", "viewer-show", "viewer-load", "viewer-marks"]) {
       byId(name)?.addEventListener("input", draw);
     }
+    byId("viewer-beside")?.addEventListener("input", () => {
+      showAll();
+      draw();
+    });
+    byId("viewer-save").addEventListener("click", save);
+    entering();
     byId("viewer-in").addEventListener("click", () => zoom(1.4));
     byId("viewer-out").addEventListener("click", () => zoom(1 / 1.4));
     byId("viewer-all").addEventListener("click", keys[0]);
@@ -246,10 +272,17 @@
       keys[event.key]();
       probeMiddle();
     });
-    canvas.on("plotly_hover", ({ points: [found] }) => probe(found.pointNumber));
+    canvas.on("plotly_hover", ({ points: [found] }) => {
+      if (found.data.scene !== "scene2") probe(found.pointNumber);
+    });
     canvas.on("plotly_relayout", (change) => {
-      if (change["scene.aspectratio"]) size = { ...size, ...change["scene.aspectratio"] };
-      if (change["scene.camera"]) centre = { ...change["scene.camera"].center };
+      if (change.shapes) return; // by this page itself
+      for (const scene of ["scene", "scene2"]) {
+        const [aspect, seen] = [change[`${scene}.aspectratio`], change[`${scene}.camera`]];
+        if (aspect) size = { ...size, ...aspect };
+        if (seen) centre = { ...seen.center };
+        if (aspect || seen) moved();
+      }
     });
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
     let width = canvas.clientWidth;

@@ -245,3 +245,43 @@ def test_paper_has_every_part_unfolded(desk: Opened) -> None:
     page.emulate_media(media="print")
     assert page.locator("#viewer").is_hidden()
     assert page.locator("#design table").bounding_box()["height"] > 20
+
+
+def height(page: Page) -> int:
+    return int(page.evaluate("document.documentElement.scrollHeight"))
+
+
+def test_a_table_that_goes_on_says_so_and_no_name_breaks(desk: Opened) -> None:
+    page = desk.page
+    page.emulate_media(media="screen")
+    page.set_viewport_size({"width": 390, "height": 900})
+    page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
+    page.locator(".scroll.cut").first.wait_for()
+    hint = "(box) => getComputedStyle(box.nextElementSibling, '::before').content"
+    boxes = page.locator(".scroll:has(> #table-one), .scroll:has(> #differences)").all()
+    assert all("scroll it sideways" in box.evaluate(hint) for box in boxes)
+    assert all(box.get_attribute("tabindex") == "0" for box in boxes)
+    names = page.locator("#table-one tbody:first-of-type th")
+    count = "(cell) => [...cell.querySelectorAll('.word')].map((word) => word.getClientRects().length)"
+    assert [lines for name in names.all() for lines in name.evaluate(count)] == [
+        1
+    ] * 3  # the names with hyphens
+    page.set_viewport_size({"width": 1400, "height": 900})
+    page.wait_for_function("!document.querySelector('#table-one').parentElement.matches('.cut')")
+
+
+def test_a_picture_grows_on_a_click(desk: Opened) -> None:
+    image = desk.page.get_by_alt_text(re.compile(TITLES["marker_errors"]))
+    before = image.bounding_box()["width"]
+    image.click()
+    assert image.bounding_box()["width"] > 1.4 * before
+    image.click()
+    assert image.bounding_box()["width"] == before
+
+
+def test_a_whole_report_is_short_and_prints_on_few_pages(browser: Browser, finished: Path) -> None:
+    page = opened(browser, finished / "report.html").page
+    assert height(page) < 12_000
+    printed = page.pdf(format="A4")
+    assert 5 < len(re.findall(rb"/Type\s*/Page\b", printed)) <= 12
+    page.close()

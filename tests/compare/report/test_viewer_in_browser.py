@@ -1,0 +1,199 @@
+"""The viewer of the report: moved, compared, played and saved as a reader does it, in Chromium."""
+
+import io
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, Page
+
+from compare.evaluation.evaluation import Evaluation
+from compare.report.html_report import write_report
+from geometry.arrays import FloatArray
+from geometry.mesh.triangle_mesh import TriangleMesh
+from tests.compare.report.browser import SOFTWARE_WEBGL, chromium, opened
+
+CANVAS = "document.getElementById('viewer-canvas')"
+ZOOM = f"{CANVAS}.layout.scene.aspectratio.x"
+SOLVER = "pinnrayFields.manifest.solvers[%d]"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium(*SOFTWARE_WEBGL) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def truth(evaluate) -> Evaluation:
+    return evaluate("fem-nonlinear", 1.05)
+
+
+@pytest.fixture(scope="module")
+def followed(failed) -> Evaluation:
+    """A solver that recorded its path, which is far from linear."""
+    end = failed.node_displacement
+    path = np.stack([0 * end, 0.1 * end, end])
+    return replace(failed, path=path, history={"load_fraction": np.array([0.0, 0.5, 1.0])})
+
+
+@pytest.fixture(scope="module")
+def written(fem, pinn, followed, truth, compared, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("viewer") / "report.html"
+    write_report(path, compared(fem, pinn, followed, truth=truth), [], {"seed": 17})
+    return path
+
+
+@pytest.fixture
+def viewer(browser: Browser, written: Path) -> Iterator[Page]:
+    """The page with its viewer ready and in sight."""
+    page = opened(browser, written).page
+    page.locator("#viewer").scroll_into_view_if_needed()
+    page.locator("#viewer[data-ready]").wait_for()
+    yield page
+    page.close()
+
+
+def shot(page: Page) -> FloatArray:
+    """The canvas as it is seen: shape (height, width, 3)."""
+    image = Image.open(io.BytesIO(page.locator("#viewer-canvas").screenshot())).convert("RGB")
+    return np.asarray(image, dtype=np.float64)
+
+
+def test_the_page_scrolls_past_the_viewer(viewer: Page) -> None:
+    """A wheel over it scrolls the page; with Ctrl, or after a click into it, the wheel zooms."""
+    box = viewer.locator("#viewer-canvas").bounding_box()
+    viewer.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    before, place = viewer.evaluate(ZOOM), viewer.evaluate("scrollY")
+    viewer.mouse.wheel(0, 20)
+    viewer.wait_for_function(f"scrollY > {place}")
+    viewer.wait_for_timeout(200)
+    assert viewer.evaluate(ZOOM) == before
+    place = viewer.evaluate("scrollY")
+    viewer.keyboard.down("Control")
+    viewer.mouse.wheel(0, -120)
+    viewer.wait_for_function(f"{ZOOM} != {before}")
+    viewer.keyboard.up("Control")
+    viewer.mouse.down()
+    viewer.mouse.up()
+    zoomed = viewer.evaluate(ZOOM)
+    viewer.mouse.wheel(0, -120)
+    viewer.wait_for_function(f"{ZOOM} != {zoomed}")
+    assert viewer.evaluate("scrollY") == place
+    viewer.keyboard.press("Escape")
+    viewer.mouse.wheel(0, 20)
+    viewer.wait_for_function(f"scrollY > {place}")
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_nothing_is_clipped(viewer: Page, width: int) -> None:
+    """Nothing of the picture touches its edges, with the solver that moves the farthest."""
+    viewer.set_viewport_size({"width": width, "height": 900})
+    viewer.select_option("#viewer-solver", index=2)
+    viewer.wait_for_timeout(500)
+    seen = shot(viewer)
+    edges = [seen[1, 2:-2], seen[2:-2, 1], seen[2:-2, -2], seen[-2, 2:-2]]
+    assert [float(np.ptp(edge)) for edge in edges] == [0.0] * 4
+    assert np.ptp(seen) > 100
+
+
+def test_markers_and_contact_are_drawn_where_they_are(viewer: Page, pinn, mesh, observations) -> None:
+    viewer.select_option("#viewer-solver", label="pinn-std")
+    viewer.wait_for_timeout(300)
+    clouds = viewer.evaluate(f"{CANVAS}.data.slice(3).map(({{x, y}}) => x.map((value, n) => [value, y[n]]))")
+    seen, crosses, arrow = (np.array(cloud, dtype=np.float64) for cloud in clouds)
+    crosses = np.nanmean(crosses.reshape(-1, 6, 2), axis=1)  # each of two strokes
+    np.testing.assert_allclose(seen, observations.points + observations.displacements, atol=1e-6)
+    np.testing.assert_allclose(crosses, mesh.markers + pinn.marker_displacement, atol=2e-3)
+    contact = np.unique(mesh.boundary("contact"))
+    way = [mesh.points[contact], (mesh.points + pinn.node_displacement)[contact]]
+    np.testing.assert_allclose(arrow[:2], [places.mean(axis=0) for places in way], atol=1e-6)
+    pink = np.abs(shot(viewer) - (0xD1, 0x00, 0x6C)).max(axis=2) < 40
+    assert pink.sum() > 20
+    viewer.uncheck("#viewer-marks")
+    viewer.wait_for_timeout(300)
+    assert not (np.abs(shot(viewer) - (0xD1, 0x00, 0x6C)).max(axis=2) < 40).any()
+
+
+@pytest.mark.parametrize("key", ["0", "-"])
+def test_the_scale_bar_has_its_length(viewer: Page, mesh: TriangleMesh, key: str) -> None:
+    """Beside the body at rest, which is as long as the mesh, at each zoom."""
+    viewer.uncheck("#viewer-marks")
+    viewer.locator("#viewer-load").fill("0")
+    viewer.locator("#viewer-canvas").focus()
+    viewer.keyboard.press(key)
+    viewer.wait_for_timeout(400)
+    bar = viewer.evaluate(
+        f"(() => {{ const {{ shapes: [line], annotations: [word] }} = {CANVAS}.layout;"
+        f" return [(line.x1 - line.x0) * {CANVAS}.clientWidth, parseFloat(word.text)]; }})()"
+    )
+    rows = shot(viewer)[:-80]  # without bars of colour and length
+    body = np.flatnonzero((np.ptp(rows, axis=2) > 30).any(axis=0))  # coloured: neither page nor outline
+    assert (body[-1] - body[0]) / np.ptp(mesh.points[:, 0]) == pytest.approx(bar[0] / bar[1], rel=0.02)
+
+
+def fields(page: Page, solver: int, quantity: int, load: float, against: str = "undefined") -> FloatArray:
+    panel = f"{{ solver: {SOLVER % solver}, number: {quantity}, against: {against} }}"
+    return np.array(page.evaluate(f"Array.from(pinnrayFields.values({panel}, {load}))"))
+
+
+def test_a_field_is_shown_minus_the_truth(viewer: Page, pinn: Evaluation, truth: Evaluation) -> None:
+    viewer.select_option("#viewer-solver", label="pinn-std")
+    viewer.select_option("#viewer-quantity", label="Von Mises stress")
+    viewer.select_option("#viewer-show", label="minus truth")
+    assert viewer.inner_text("#viewer-title") == "Von Mises stress, MPa: pinn-std minus truth"
+    expected = pinn.per_triangle(pinn.von_mises - truth.von_mises)
+    found = fields(viewer, 1, 1, 1.0, "'truth'")
+    np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(expected).max())
+    viewer.select_option("#viewer-solver", label="truth (simulated)")
+    assert "is what the others are compared with" in viewer.inner_text("#viewer-note")
+
+
+def test_two_fields_lie_side_by_side_and_move_together(viewer: Page) -> None:
+    viewer.select_option("#viewer-beside", label="pinn-std")
+    viewer.wait_for_timeout(400)
+    assert viewer.inner_text("#viewer-title").endswith("left fem; right pinn-std")
+    coloured = np.ptp(shot(viewer)[:-80], axis=2) > 30
+    middle = coloured.shape[1] // 2
+    assert coloured[:, : middle - 5].sum() == pytest.approx(coloured[:, middle + 5 :].sum(), rel=0.2)
+    viewer.locator("#viewer-in").click()
+    both = f"[{CANVAS}.layout.scene, {CANVAS}.layout.scene2].map((scene) => scene.aspectratio.x)"
+    left, right = viewer.evaluate(both)
+    assert left == right
+    viewer.select_option("#viewer-beside", label="the same minus truth")
+    assert viewer.inner_text("#viewer-title").endswith("left fem; right fem minus truth")
+
+
+def test_the_picture_is_saved_as_png(viewer: Page) -> None:
+    with viewer.expect_download() as waiting:
+        viewer.get_by_role("button", name="Save as PNG").click()
+    assert waiting.value.suggested_filename == "default-Displacement-magnitude-mm-fem.png"
+    with Image.open(waiting.value.path()) as image:
+        assert image.format == "PNG"
+        assert image.width > 1500
+        assert len(image.convert("RGB").getcolors(image.width * image.height)) > 100
+
+
+def test_colours_follow_the_load(viewer: Page, pinn, followed, mesh) -> None:
+    """In proportion for the linear law; with the strain of the recorded displacements along a path."""
+    whole, half = (fields(viewer, 1, 1, load) for load in (1.0, 0.5))
+    np.testing.assert_allclose(half, 0.5 * whole, rtol=1e-12)
+    moved = followed.path[1][mesh.triangles]
+    sides = mesh.points[mesh.triangles][:, 1:] - mesh.points[mesh.triangles][:, :1]
+    gradient = np.linalg.solve(sides, moved[:, 1:] - moved[:, :1]).transpose(0, 2, 1)
+    transposed = gradient.transpose(0, 2, 1)
+    strain = (gradient + transposed + transposed @ gradient) / 2
+    names = viewer.evaluate("pinnrayFields.manifest.quantities.map(({ name }) => name)")
+    for name, (row, column) in {"strain_xx": (0, 0), "strain_yy": (1, 1), "strain_xy": (0, 1)}.items():
+        full = 100 * followed.per_triangle(followed.strain)[:, row, column]
+        end = fields(viewer, 2, names.index(name), 1.0)
+        np.testing.assert_allclose(end, full, atol=1e-3 * np.abs(full).max() + 1e-9)
+        found = fields(viewer, 2, names.index(name), 0.5)
+        last = followed.path[2][mesh.triangles]
+        far = np.linalg.solve(sides, last[:, 1:] - last[:, :1]).transpose(0, 2, 1)
+        green = 100 * (far + far.transpose(0, 2, 1) + far.transpose(0, 2, 1) @ far) / 2
+        expected = 100 * strain[:, row, column] + 0.5 * (full - green[:, row, column])
+        np.testing.assert_allclose(found, expected, atol=0.02 * np.abs(full).max() + 0.02)
