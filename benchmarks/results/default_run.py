@@ -49,11 +49,12 @@ class Figures(NamedTuple):
     force: float
     seconds: float
 
-
     @property
     def held_out_sum(self) -> float | None:
         """Mean of |Δu| + |Δv| at markers that were not given, mm, as in report and terminal."""
-        return None if self.held_out_u is None or self.held_out_v is None else self.held_out_u + self.held_out_v
+        return (
+            None if self.held_out_u is None or self.held_out_v is None else self.held_out_u + self.held_out_v
+        )
 
 
 def figures_of(name: str, entry: Mapping[str, Any]) -> Figures:

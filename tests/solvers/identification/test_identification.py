@@ -33,6 +33,18 @@ def test_a_twin_is_found_with_its_law(identified):
     np.testing.assert_allclose(solution.reaction, true.hypothesis.force, rtol=0.1, atol=0.02)
 
 
+def test_a_contact_that_wraps_is_told_not_to_be_believed(problem):
+    """On a printed finger the force of such a contact was half of the forward one."""
+    solver = FemIdSolver(degree=1, law="given", parameters="position,width,normal_force")
+    extent = np.ptp(problem.mesh.points[problem.mesh.boundary("front").ravel(), 0])
+    for width, told in ((0.8 * extent, True), (0.2 * extent, False)):
+        observed, _ = twin(problem, "neo-hookean", {"normal_force": 0.15, "width": width}, noise=1e-3)
+        law = problem.material.model_copy(update={"law": "neo-hookean"})
+        found = solver.solve(replace(problem, material=law, observations=observed))
+        assert found.stats["width"] == pytest.approx(width, rel=0.1)
+        assert any("OF THE FRONT" in said for said in found.status.warnings) == told
+
+
 @pytest.mark.parametrize("known", [Registration(3.0, 0.3, 0.01, 0.01), HAND_HELD])
 def test_the_frame_of_the_pressed_picture_is_found(problem, known):
     """Turned by 3 degrees, shifted by 0.3 mm, scaled by 1 % and tilted: the force is as if all were right."""
