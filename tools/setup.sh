@@ -44,7 +44,7 @@ if ((${#missing[@]})); then
 Have an administrator run: apt-get install --no-install-recommends ${missing[*]}
 $elsewhere"
     fi
-    apt_get() { "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" </dev/null; }
+    apt_get() { "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 -o DPkg::Lock::Timeout=300 "$@" </dev/null; }
     install() { apt_get install --no-install-recommends -y "${missing[@]}"; }
     say "installing Debian packages: ${missing[*]}"
     if ! install >/dev/null 2>&1; then # as a rule the package lists are absent or old

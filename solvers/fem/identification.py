@@ -10,17 +10,16 @@ import ufl
 from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from geometry.registration import Registration
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_conditions
 from solvers.fem.dolfinx_compat import DistributedSpace, NodeFunction
 from solvers.fem.equilibrium import QUADRATURE_DEGREE
+from solvers.fem.finite_strain.nested_path import coarser
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import Factorisation
 from solvers.identification.body import Linearised
@@ -35,10 +34,6 @@ from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Family, Progress, check_problem, silent
-
-SOUGHT, FINE = 1.0, 4000
-"""Size of the elements on which unknowns are sought first, mm, and number of triangles from which on that is
-worth while."""
 
 
 class FemBody:
@@ -244,7 +239,7 @@ class FemIdSolver(IdentifyingSolver):
         found = with_doubts(
             lambda given: self.refitter(problem)(given, progress),
             problem.observations,
-            lambda given: self._identifier(self._coarse(problem) or problem).expected(given),
+            lambda given: self._identifier(coarser(problem) or problem).expected(given),
         )
         progress(1.0, found.force_phrase)
         return found
@@ -273,15 +268,8 @@ class FemIdSolver(IdentifyingSolver):
         return fitted
 
     def _search(self, problem: Problem) -> Identifier | NestedSearch:
-        fine, coarse = self._identifier(problem), self._coarse(problem)
+        fine, coarse = self._identifier(problem), coarser(problem)
         return fine if coarse is None else NestedSearch(self._identifier(coarse), fine)
-
-    def _coarse(self, problem: Problem) -> Problem | None:
-        """The problem on a mesh of elements of the size `SOUGHT`; None where its own has not many more."""
-        if problem.finger is None or len(problem.mesh.triangles) < FINE:
-            return None
-        mesh = finger_mesh(problem.finger, settings=MeshSettings(size=SOUGHT))
-        return replace(problem, mesh=mesh) if 2 * len(mesh.triangles) < len(problem.mesh.triangles) else None
 
     def _identifier(self, problem: Problem) -> Identifier:
         return Identifier(self, problem, lambda unknowns: FemBody(unknowns, self.degree))

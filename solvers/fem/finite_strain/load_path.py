@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
@@ -19,6 +20,9 @@ from solvers.problem import Problem
 from solvers.solver import Progress
 from solvers.stability import aside, descended
 
+BESIDE = 0.05
+"""Largest distance of an equilibrium from that on coarser elements over the largest displacement; one that is
+further away is of another branch."""
 PENETRATION = 1e-5
 """Largest gap of a node in contact and penetration of any node, mm."""
 
@@ -59,7 +63,7 @@ class LoadPath:
         tolerance: float,
         max_iterations: int,
     ) -> None:
-        self._first_step, self._min_step, self._space, self._guide = first_step, min_step, space, guide
+        self._first_step, self._min_step, self.space, self._guide = first_step, min_step, space, guide
         method: LinearSolver = "iterative" if iterative else "direct"
         self.equilibrium = DiscreteEquilibrium(problem, space, constraints, method)
         self._begin = partial(ConstrainedNewton, self.equilibrium, tolerance, max_iterations)
@@ -69,6 +73,7 @@ class LoadPath:
         self.points = [self.equilibrium.rest]
         self.left = 0  # Number of unstable equilibria that were left for a stable one
         self._halved = self._iterations = 0  # Failed steps; Newton iterations of all steps
+        self._weights: csr_matrix | None = None  # Of coarser nodes at this path's
         self._reason = ""  # Why the last failed step failed, for Newton's method in PETSc's word
 
     def close(self) -> None:
@@ -93,6 +98,49 @@ class LoadPath:
             self.points.append(point)
             progress(fraction, f"{fraction:.0%} of the load, {self._iterations - before} Newton iterations")
             step = min(self._max_step, step * (2 if hardest <= 5 else 1))
+
+    def take_over(self, way: "LoadPath") -> bool:
+        """Go to the full load at once, from its equilibrium on coarser elements of the same body.
+
+        Not where that is not reached or buckles, or leads to no stable equilibrium near it: then `points`
+        stay as they are.
+        """
+        last = way.points[-1]
+        if last.fraction < 1 or way.left or way.equilibrium.unstable:
+            return False
+        guess = replace(
+            self.equilibrium.rest,
+            fraction=1.0,
+            nodal=self.interpolated(way, last.nodal),
+            forces=last.forces,
+            contact=self._carried_contact(way, last),
+        )
+        found, _ = self._found(guess)
+        size = np.abs(guess.nodal).max()
+        if found is None or np.abs(found.nodal - guess.nodal).max() > BESIDE * size:
+            return False
+        self.equilibrium.factorise(found)
+        if self.equilibrium.unstable:
+            return False
+        self.points.append(found)
+        return True
+
+    def interpolated(self, way: "LoadPath", nodal: FloatArray) -> FloatArray:
+        """Displacements of this path's nodes, shape (N, 2), mm, from those of coarser elements."""
+        if self._weights is None:
+            coarse = way.space
+            at_nodes = self.space.mesh.locate_on(coarse.mesh, self.space.nodes)
+            self._weights = coarse.section.shape_functions(at_nodes)
+        return np.asarray(self._weights @ nodal)
+
+    def _carried_contact(self, way: "LoadPath", last: LoadState) -> FloatArray:
+        """Forces on the nodes of the front, N/mm, of the pressure on coarser elements."""
+        own, coarse = self.equilibrium.contact, way.equilibrium.contact
+        if own is None or coarse is None:
+            return self.equilibrium.rest.contact
+        pressure = last.contact / coarse.lengths(last.nodal)
+        at = np.interp(own.positions[:, 0], coarse.positions[:, 0], pressure)
+        return np.asarray(at * own.lengths(self.interpolated(way, last.nodal)))
 
     def relaxed(self, kept: BoolArray) -> LoadState | None:
         """Equilibrium near the last one under the constraints of a mask alone; None if none is found."""
@@ -143,7 +191,11 @@ class LoadPath:
 
     def _step(self, fraction: float) -> tuple[LoadState | None, int]:
         """Equilibrium at a fraction of the load, None if there is none; iterations of the hardest solve."""
-        guess, contact, hardest = self._guess(fraction), self.equilibrium.contact, 0
+        return self._found(self._guess(fraction))
+
+    def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
+        """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""
+        contact, hardest = self.equilibrium.contact, 0
         for _ in range(30):
             result = self._newton.solve(guess)
             self._iterations += result.iterations
@@ -206,19 +258,31 @@ class LoadPath:
 
     def reaction(self, point: LoadState) -> FloatArray:
         """Force of the indenter on the finger, shape (2,), N/mm."""
-        return reaction_by_residual_work(self._space, self.equilibrium.internal_force(point.nodal))
+        return reaction_by_residual_work(self.space, self.equilibrium.internal_force(point.nodal))
 
     def force_abscissa(self, point: LoadState) -> float | None:
         """Abscissa before the load at which the indenter's force along y acts, mm; None without such a force.
 
         It differs from the contact's middle where the contact cannot turn, and holds the finger by a couple.
         """
-        front = np.setdiff1d(self._space.boundary_nodes("front"), self._space.boundary_nodes("base"))
+        front = np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
         forces = self.equilibrium.internal_force(point.nodal)[front, 1]
         total = float(forces.sum())
-        return float(forces @ self._space.nodes[front, 0]) / total if total else None
+        return float(forces @ self.space.nodes[front, 0]) / total if total else None
+
+    def states(self) -> list[FloatArray]:
+        """Displacements of the nodes at every equilibrium, each of shape (N, d), mm."""
+        return [point.nodal for point in self.points]
+
+    def abscissae(self) -> list[float | None]:
+        """`force_abscissa` of every equilibrium."""
+        return [self.force_abscissa(point) for point in self.points]
 
     def region(self, point: LoadState) -> ContactRegion | None:
         """The contact region; None without contact or without a cylinder."""
         contact = self.equilibrium.contact
         return None if contact is None else ContactRegion.of(contact, point)
+
+    def regions(self) -> list[ContactRegion | None]:
+        """The contact region of every equilibrium."""
+        return [self.region(point) for point in self.points]

@@ -13,6 +13,7 @@ from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from solvers.fem.boundary_conditions import DisplacementConstraints
 from solvers.fem.error_estimate import ErrorEstimator, locking_advice
 from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
+from solvers.fem.finite_strain.nested_path import NestedPath, coarser
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
@@ -51,7 +52,9 @@ class FemNonlinearSolver(ElementSettings):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`."""
         check_problem(self, problem)
-        return on_all_ranks(self._solve, problem, progress)
+        # Friction depends on the way: it is followed on the given elements.
+        coarse = None if problem.load.friction else coarser(problem)
+        return on_all_ranks(partial(self._solve, coarse), problem, progress)
 
     def path(
         self, problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints | None = None
@@ -68,19 +71,19 @@ class FemNonlinearSolver(ElementSettings):
             max_iterations=self.max_iterations,
         )
 
-    def _solve(self, problem: Problem, progress: Progress) -> Solution:
+    def _solve(self, coarse: Problem | None, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         path = self.path(problem, space)
-        path.follow(progress)
-        last, history = path.points[-1], path.history()
-        regions = [path.region(point) for point in path.points]
+        followed = self._followed(coarse, path, progress)
+        last, history, regions = path.points[-1], followed.history(), followed.regions()
         abscissa = path.force_abscissa(last)
         path.equilibrium.factorise(last)
         unstable = path.equilibrium.unstable or 0
+        abscissae = followed.abscissae()
         solved = time.perf_counter()
         error = _error(path, problem, space)
-        path.close()
+        followed.close()
         names = () if path.equilibrium.contact is None else ("contact_width_mm", "contact_pressure_MPa")
         pressed = {
             name: np.array([region.stats()[name] if region else 0.0 for region in regions]) for name in names
@@ -95,23 +98,34 @@ class FemNonlinearSolver(ElementSettings):
             field=LagrangeField(space, last.nodal),
             energy=float(history["energy"][-1]),
             reaction=np.array([history[name][-1] for name in ("reaction_x", "reaction_y")]),
-            status=_status(path, regions, unstable, "; ".join(filter(None, remarks))),
+            status=_status(path, followed.phrase, regions, unstable, "; ".join(filter(None, remarks))),
             stats={
                 "seconds": solved - started,
                 "estimate_seconds": time.perf_counter() - solved,
                 "unknowns": last.nodal.size,
-                **path.stats,
+                **followed.stats,
                 "unstable_directions": unstable,
                 "left_unstable": path.left,
                 "degree": self.degree,
                 **({} if abscissa is None else {"force_abscissa_mm": abscissa}),
                 **(regions[-1].stats() if regions[-1] else {}),
             },
-            history={**history, **_place_history(path), **pressed},
-            states=[LagrangeField(space, point.nodal) for point in path.points],
+            history={**history, **_place_history(abscissae), **pressed},
+            states=[LagrangeField(space, nodal) for nodal in followed.states()],
             error=error,
             contact=contact_of(problem, abscissa, regions[-1]),
         )
+
+    def _followed(self, coarse: Problem | None, path: LoadPath, progress: Progress) -> LoadPath | NestedPath:
+        """The path to the full load: on coarse elements as far as that leads, else on the given ones."""
+        if coarse is not None:
+            way = self.path(coarse, LagrangeSpace(coarse.mesh, self.degree))
+            way.follow(progress)
+            if path.take_over(way):
+                return NestedPath(path, way)
+            way.close()
+        path.follow(progress)
+        return path
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,9 +179,11 @@ def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstim
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 
 
-def _status(path: LoadPath, regions: Sequence[ContactRegion | None], unstable: int, remarks: str) -> Status:
+def _status(
+    path: LoadPath, taken: str, regions: Sequence[ContactRegion | None], unstable: int, remarks: str
+) -> Status:
     """Success at the full load with remarks, or advice."""
-    contact, taken = path.equilibrium.contact, path.phrase
+    contact = path.equilibrium.contact
     if path.points[-1].fraction < 1:
         wider = "a wider contact" if contact is None else "another radius"
         return Status(False, f"{taken}; take a finer mesh, {wider} or a smaller stroke")
@@ -190,9 +206,8 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None], unstable: i
     return Status(True, "; ".join(filter(None, [taken, remarks])))
 
 
-def _place_history(path: LoadPath) -> dict[str, FloatArray]:
+def _place_history(found: Sequence[float | None]) -> dict[str, FloatArray]:
     """The force's abscissa, mm; a state without a force, such as rest, has the next one's."""
-    found = [path.force_abscissa(point) for point in path.points]
     known = [number for number, abscissa in enumerate(found) if abscissa is not None]
     if not known:
         return {}

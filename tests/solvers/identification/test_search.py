@@ -196,7 +196,7 @@ def test_on_a_fine_mesh_the_unknowns_are_sought_on_a_coarse_one(monkeypatch):
     monkeypatch.setattr(FemBody, "linearised", counted)
     found = {}
     for fine in (10**9, 1000):
-        monkeypatch.setattr("solvers.fem.identification.FINE", fine)
+        monkeypatch.setattr("solvers.fem.finite_strain.nested_path.FINE", fine)
         solution = solver.solve(problem)
         found[fine] = solution, sizes.count(len(mesh.triangles))
         sizes.clear()

@@ -1,0 +1,84 @@
+"""A load path on coarse elements that ends on fine ones: a part of the work of one on fine ones alone."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.cache import finger_mesh
+from geometry.mesh.settings import MeshSettings
+from solvers.cylinder_contact import ContactRegion
+from solvers.fem.finite_strain.load_path import LoadPath
+from solvers.problem import Problem
+
+COARSE, FINE = 1.0, 4000
+"""Size of the coarse elements, mm, and number of triangles from which on they are worth while."""
+
+
+def coarser(problem: Problem) -> Problem | None:
+    """The problem on elements of the size `COARSE`.
+
+    None where its own mesh has not many more, or is of another body.
+    """
+    if problem.finger is None or len(problem.mesh.triangles) < FINE:
+        return None
+    mesh = finger_mesh(problem.finger, settings=MeshSettings(size=COARSE))
+    same_body = np.isclose(mesh.areas.sum(), problem.mesh.areas.sum(), rtol=1e-2)
+    fewer = 2 * len(mesh.triangles) < len(problem.mesh.triangles)
+    return replace(problem, mesh=mesh) if same_body and fewer else None
+
+
+class NestedPath:
+    """The equilibria of a way on coarse elements up to the full load, and the last one on fine elements.
+
+    Energies and forces on the way are scaled by what the fine elements change of the last ones: the error of
+    coarse elements is nearly the same share of every one.
+
+    Args:
+        path: Has taken over the end of the way.
+        way: On coarse elements.
+    """
+
+    def __init__(self, path: LoadPath, way: LoadPath) -> None:
+        self._path, self._way = path, way
+
+    def history(self) -> dict[str, FloatArray]:
+        """Fraction of the load, energy, N mm/mm, and reaction, N/mm, at every equilibrium."""
+        coarse, fine = self._way.history(), self._path.history()
+        size = {
+            name: float(np.hypot(each["reaction_x"][-1], each["reaction_y"][-1]))
+            for name, each in (("coarse", coarse), ("fine", fine))
+        }
+        force = size["fine"] / size["coarse"] if size["coarse"] else 1.0
+        energy = float(fine["energy"][-1] / coarse["energy"][-1]) if coarse["energy"][-1] else 1.0
+        scales = {"load_fraction": 1.0, "energy": energy, "reaction_x": force, "reaction_y": force}
+        return {name: np.append(scale * coarse[name][:-1], fine[name][-1]) for name, scale in scales.items()}
+
+    def states(self) -> list[FloatArray]:
+        """Displacements of the fine nodes at every equilibrium, each of shape (N, 2), mm."""
+        before = [self._path.interpolated(self._way, nodal) for nodal in self._way.states()[:-1]]
+        return [*before, self._path.points[-1].nodal]
+
+    def abscissae(self) -> list[float | None]:
+        """See `LoadPath`."""
+        return [*self._way.abscissae()[:-1], self._path.abscissae()[-1]]
+
+    def regions(self) -> list[ContactRegion | None]:
+        """See `LoadPath`."""
+        return [*self._way.regions()[:-1], self._path.regions()[-1]]
+
+    @property
+    def phrase(self) -> str:
+        """The steps taken, in words."""
+        more = self._path.stats["newton_iterations"]
+        return f"{self._way.phrase}, on elements of {COARSE:g} mm; {more} more on the given ones"
+
+    @property
+    def stats(self) -> dict[str, float | int | str]:
+        """The number of steps and iterations."""
+        return self._way.stats
+
+    def close(self) -> None:
+        """Free what PETSc holds, on all ranks at once."""
+        self._path.close()
+        self._way.close()

@@ -1,0 +1,84 @@
+"""A load path on coarse elements whose end is carried to fine ones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.cache import finger_mesh
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.finite_strain import solver
+from solvers.fem.finite_strain.nested_path import coarser
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.problem import Load, Material, Problem
+
+FINGER = Design()
+FINE = Problem(
+    finger_mesh(FINGER, settings=MeshSettings(size=0.3)), Material(law="neo-hookean"), finger=FINGER
+)
+LOADS = {
+    "mean": Load(),
+    "patch": Load(kind="patch", displacement=(None, -6.0)),
+    "cylinder": Load(kind="cylinder", radius=5.0, displacement=(0.0, -4.0)),
+}
+
+
+def plainly(problem):
+    """The solution by the path on the given elements alone."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(solver, "coarser", lambda _: None)
+        return FemNonlinearSolver().solve(problem)
+
+
+@pytest.mark.parametrize("kind", ["mean", "patch", pytest.param("cylinder", marks=pytest.mark.slow)])
+def test_the_end_is_the_equilibrium_of_the_path_on_fine_elements(kind):
+    """Newton's tolerance leaves 1e-8 mm, the settling of a contact 1e-5 mm of penetration."""
+    problem = replace(FINE, load=LOADS[kind])
+    nested = FemNonlinearSolver().solve(problem)
+    assert "on elements of 1 mm" in nested.status.message
+    plain = plainly(problem)
+    assert "on elements of" not in plain.status.message
+    nodes = problem.mesh.points
+    away = np.abs(nested.displacement(nodes) - plain.displacement(nodes)).max()
+    assert away < (5e-5 if kind == "cylinder" else 1e-6)
+    assert nested.energy == pytest.approx(plain.energy, rel=1e-5 if kind == "cylinder" else 1e-9)
+    np.testing.assert_allclose(nested.reaction, plain.reaction, atol=1e-5 * np.abs(plain.reaction).max())
+    # Elements of 1 mm are up to 1 % off on the way.
+    for column in ("energy", "reaction_y"):
+        at = np.array([0.3, 0.6, 0.9])
+        ways = [
+            np.interp(at, each.history["load_fraction"], each.history[column]) for each in (nested, plain)
+        ]
+        np.testing.assert_allclose(*ways, atol=0.02 * np.abs(plain.history[column]).max())
+    assert len(nested.states) == len(nested.history["load_fraction"])
+    half = nested.states[-2].displacement(problem.mesh.locate(problem.mesh.markers))
+    assert np.isfinite(half).all()
+
+
+def test_where_coarse_elements_lead_elsewhere_the_path_is_followed_on_the_fine_ones(monkeypatch):
+    """The guess is spoilt: the equilibrium found from it is far from it."""
+    followed = solver.LoadPath.interpolated
+
+    def elsewhere(path, way, nodal):
+        return 1.2 * followed(path, way, nodal)
+
+    monkeypatch.setattr(solver.LoadPath, "interpolated", elsewhere)
+    found = FemNonlinearSolver().solve(FINE)
+    assert found.status.converged
+    assert "on elements of" not in found.status.message
+
+
+def test_friction_is_followed_on_the_given_elements():
+    load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -1.0), friction=0.3)
+    found = FemNonlinearSolver().solve(replace(FINE, load=load))
+    assert found.status.converged
+    assert "on elements of" not in found.status.message
+
+
+def test_a_mesh_that_is_coarse_or_of_another_body_has_no_coarser_one():
+    assert coarser(FINE) is not None
+    assert coarser(replace(FINE, finger=None)) is None
+    assert coarser(replace(FINE, finger=FINGER.replaced(front_thickness=3.0))) is None
+    coarse = finger_mesh(FINGER, settings=MeshSettings(size=0.8))
+    assert coarser(replace(FINE, mesh=coarse)) is None
