@@ -160,7 +160,7 @@ def _observed(evaluation: Evaluation, comparison: Results) -> list[list[float]]:
         return []
     off = evaluation.shown_displacement - evaluation.marker_displacement
     seen = (observations.points + observations.displacements - off)[observations.visible]
-    return np.asarray(seen).tolist()
+    return [list(map(float, place)) for place in seen]
 
 
 def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
