@@ -44,10 +44,14 @@ add_module_names = False
 # A name of the public interface must be on a page. Those of other libraries would need a network.
 nitpicky = True
 nitpick_ignore_regex = [
-    ("py:.*", r"(numpy|pathlib|annotated_types|collections\.abc|types|pandas|pd|matplotlib|pydantic)\..*"),
+    (
+        "py:.*",
+        r"(numpy|pathlib|annotated_types|collections\.abc|types|pandas|pd|matplotlib|pydantic|pyvista)\..*",
+    ),
     ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|(.*\.)?T|.*Options)"),
     ("py:.*", r"compare\.(runtime|figures|camera|crossval|evaluation\.truths)\..*"),
     ("py:.*", r"geometry\.(finger\.(rules|parameters)|drawing\.placement)\..*"),
+    ("py:.*", r"(pinnray\.observations|studies|vision)\..*"),
     ("py:.*", r"solvers\.fem\.adaptive_refinement\..*"),
 ]
 

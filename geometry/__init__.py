@@ -32,4 +32,4 @@ if TYPE_CHECKING:
 else:
     from geometry.lazy_exports import lazy_exports
 
-    __getattr__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

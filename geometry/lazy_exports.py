@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 
-def lazy_exports(package: str, file: str) -> tuple[Callable[[str], Any], list[str]]:
-    """`__getattr__` and `__all__` of a package, read from the imports in its `__init__.py`.
+def lazy_exports(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """`__getattr__`, `__dir__` and `__all__` of a package, read from the imports in its `__init__.py`.
 
     Imports of the form `from module import name as name` under `TYPE_CHECKING` are exports; type checkers
     read the same lines. Source: Scientific Python SPEC 1, whose `lazy_loader.attach_stub` reads a stub file.
@@ -30,4 +30,5 @@ def lazy_exports(package: str, file: str) -> tuple[Callable[[str], Any], list[st
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         return getattr(import_module(homes[name]), name)
 
-    return load, sorted(homes)
+    names = sorted(homes)
+    return load, lambda: names, names

@@ -1,8 +1,36 @@
-"""HTML by which objects show themselves in a notebook."""
+"""How objects show themselves: HTML in a notebook, and one line elsewhere."""
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from html import escape
+from textwrap import shorten
+from typing import Any
+
+WIDEST, LONGEST = 60, 240
+"""Letters of a text in a line, and of the line."""
+
+
+def brief(shown: Any) -> str:
+    """A dataclass in one line: the shapes of arrays, the kinds and numbers of what else is large.
+
+    To be the `__repr__` of a dataclass that holds arrays.
+    """
+    parts = [f"{each.name}={_in_short(getattr(shown, each.name))}" for each in fields(shown) if each.repr]
+    return shorten(f"{type(shown).__name__}({', '.join(parts)})", LONGEST, placeholder=" ...)")
+
+
+def _in_short(value: object) -> str:
+    shape = getattr(value, "shape", None)
+    if shape:
+        return f"<{' x '.join(map(str, shape))}>"
+    if isinstance(value, str):
+        return repr(shorten(value, WIDEST, placeholder=" ..."))
+    if isinstance(value, Mapping | Sequence):
+        return f"<{len(value)}>" if value else "<none>"
+    if value is None or isinstance(value, bool | int | float):
+        return repr(value)
+    return f"<{type(value).__name__}>"
 
 
 def fact_table(title: str, facts: Mapping[str, object], picture: str = "") -> str:

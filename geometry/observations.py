@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import inf
+from textwrap import shorten
 
 import numpy as np
 
@@ -39,6 +40,10 @@ class Observations:
     marker_radius: float
     pressed: Registration = FIXED
     drawn: Registration = FIXED
+
+    def __repr__(self) -> str:
+        seen = f"{self.visible.sum()} of {len(self.visible)} markers"
+        return f"Observations({seen}, {self.label}: {shorten(self.source, 80, placeholder=' ...')!r})"
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.visible))

@@ -64,3 +64,18 @@ def _check_numbers(value: Any) -> None:
         raise ValueError(f"it has a number of {len(str(value))} digits")
     for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
         _check_numbers(each)
+
+
+def as_path(given: object, what: str) -> Path:
+    """A path from a text or a path.
+
+    Args:
+        given: What a user gave.
+        what: Its name in an error, such as "the file".
+
+    Raises:
+        UserError: If it is something else.
+    """
+    if isinstance(given, str | Path):
+        return Path(given)
+    raise UserError(f"{what} is {given!r}; give a path")

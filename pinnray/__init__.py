@@ -13,13 +13,18 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from compare.crossval.result import CrossvalResult as CrossvalResult
+    from compare.evaluation.evaluation import Evaluation as Evaluation
     from geometry.drawing.drawn_finger import DrawnFinger as DrawnFinger
+    from geometry.errors import OutsideBodyError as OutsideBodyError
     from geometry.errors import UserError as UserError
     from geometry.finger.design import Design as Design
     from geometry.finger.presets import load_design as load_design
     from geometry.finger.presets import preset_names as preset_names
     from geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
-    from geometry.observations import Observations as Observations
+    from pinnray.camera import calibrate as calibrate
+    from pinnray.camera import film_forces as film_forces
+    from pinnray.camera import rig as rig
+    from pinnray.camera import track as track
     from pinnray.comparison import Comparison as Comparison
     from pinnray.designers import optimise as optimise
     from pinnray.designers import predict as predict
@@ -30,13 +35,17 @@ if TYPE_CHECKING:
     from pinnray.functions import mesh as mesh
     from pinnray.functions import solve as solve
     from pinnray.functions import solver as solver
-    from pinnray.functions import track as track
-    from solvers.problem import Load as Load
-    from solvers.problem import Material as Material
+    from pinnray.observations import Observations as Observations
+    from pinnray.solution import Solution as Solution
+    from solvers.physics import Load as Load
+    from solvers.physics import Material as Material
     from solvers.problem import Problem as Problem
     from solvers.registry import solver_names as solver_names
-    from solvers.solution import Solution as Solution
+    from studies.optimum.search import Optimum as Optimum
+    from vision.calibration.camera_calibration import Calibration as Calibration
+    from vision.rig.exposure import Exposure as Exposure
+    from vision.rig.motion import Motion as Motion
 else:
     from geometry.lazy_exports import lazy_exports
 
-    __getattr__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Self
 
 from compare.evaluation import comparison
 from geometry.notebook import fact_table
+from geometry.text_files import as_path
 
 if TYPE_CHECKING:
     from geometry.figure import Figure
@@ -61,9 +62,10 @@ class Comparison(comparison.Results):
             "versions": package_versions(),
             "machine": machine(),
         }
+        file = as_path(path, "the report")
         with TemporaryDirectory() as folder:
-            write_report(Path(path), self, draw_all(Path(folder), self), provenance)
-        return Path(path)
+            write_report(file, self, draw_all(Path(folder), self), provenance)
+        return file
 
     def _repr_html_(self) -> str:
         """Design, load, markers, remarks and the main columns of `table`, in a notebook."""

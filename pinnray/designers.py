@@ -5,26 +5,57 @@ under `if __name__ == "__main__":`.
 """
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from compare.runtime.provenance import cores
 from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.finger.finger import Finger
+from geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
+from geometry.text_files import as_path
+from pinnray.arguments import JobKeywords
+from solvers.physics import Physics
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from studies.optimum.search import Optimum
+    from studies.sweep.study import Study
 
 
-def sweep(study: str | Path, *, out: str | Path, processes: int | None = None) -> "pd.DataFrame":
-    """Solve the samples of a study; see `pinnray sweep`.
+def sweep(
+    study: str | Path | Mapping[str, Any],
+    *,
+    design: str | Path | Finger = "default",
+    solver: str = "fem",
+    size: float = 0.5,
+    samples: int | None = None,
+    sampling: Literal["grid", "latin", "sobol"] | None = None,
+    seed: int = 0,
+    out: str | Path | None = None,
+    processes: int | None = None,
+    progress: bool | None = None,
+    **fixed: Unpack[JobKeywords],
+) -> "pd.DataFrame":
+    """Solve many fingers: `sweep({"rib_count": [4, 6], "young": [3, 5]}, stroke=8)`; see `pinnray sweep`.
 
     Args:
-        study: TOML file.
-        out: Folder that keeps each result; the same call goes on where it was stopped.
+        study: The values of each parameter of finger, material or load that is varied: a list of them, or
+            `{"from": LOW, "to": HIGH}` with `samples`; or the TOML file of a study, which says all the rest.
+        design: The finger from which they differ.
+        solver: Name of the solver.
+        size: Largest element in walls and ribs, mm.
+        samples: Number of samples between the ends of the ranges.
+        sampling: `grid` (every combination), `sobol` or `latin`; if None a grid of lists, else `sobol`.
+        seed: Of the samples.
+        out: Folder that keeps each result; the same call goes on where it was stopped. None keeps nothing.
         processes: Worker processes; None means one per core.
+        progress: Whether to show the stages; if None in a notebook only.
+        fixed: Parameters with one value for all fingers.
 
     Returns:
         A row for every finished sample, with units in the headings, such as `force_N`. Warns of samples
@@ -33,27 +64,46 @@ def sweep(study: str | Path, *, out: str | Path, processes: int | None = None) -
     Raises:
         UserError: If the study cannot be run, or the folder holds another one.
     """
+    from compare.runtime.stages import shown_stages
     from studies.sweep.job import StudyJob
-    from studies.sweep.study import load_study
+    from studies.sweep.study import Study, load_study
     from studies.sweep.sweep import run_sweep
     from studies.sweep.tables import sample_table
 
-    file = Path(study)
-    done = run_sweep(StudyJob(load_study(file), file.parent, Path(out), processes or cores()))
+    finger: Finger | None = None
+    folder = Path()
+    if isinstance(study, Mapping):
+        given = {"solver": solver, "mesh_size": size, "samples": samples, "seed": seed}
+        read, finger = _study(Study, study, design, sampling, given, fixed)
+    else:
+        if not isinstance(study, str | Path):
+            raise UserError(
+                f"give a dictionary such as {{'rib_count': [4, 6]}} or a study's file, not {study!r}"
+            )
+        file = Path(study)
+        if fixed or samples is not None or sampling is not None:
+            said = next(iter(fixed), "samples" if samples is not None else "sampling")
+            raise UserError(f"{said} is said by the study in {file}; change it there")
+        read, folder = load_study(file), file.parent
+    with _kept(out) as where, shown_stages(progress) as stages:
+        job = StudyJob(read, folder, where, _processes(processes), finger=finger)
+        done = run_sweep(job, stages)
     for remark in done.remarks:
         warnings.warn(remark, stacklevel=2)
     return sample_table(done)
 
 
-def predict(sweep: str | Path, fingers: Sequence[Mapping[str, object]]) -> "pd.DataFrame":
+def predict(
+    sweep: str | Path, fingers: Mapping[str, object] | Sequence[Mapping[str, object]]
+) -> "pd.DataFrame":
     """Predict the quantities of fingers from a sweep; see `pinnray predict`.
 
     Args:
         sweep: Folder of a sweep.
-        fingers: Values of every parameter that the sweep varies.
+        fingers: Values of every parameter that the sweep varies, of one finger or of several.
 
     Returns:
-        A row for every finger: each quantity, such as `force_N`, and the ends of its 95 % interval,
+        A row for every finger, with each quantity, such as `force_N`, and the ends of its 95 % interval,
         `force_N_low` and `force_N_high`.
 
     Raises:
@@ -62,28 +112,97 @@ def predict(sweep: str | Path, fingers: Sequence[Mapping[str, object]]) -> "pd.D
     from studies.emulator.emulator import prediction_table
     from studies.emulator.store import emulator_of
 
-    emulator = emulator_of(Path(sweep))
-    read = [emulator.inputs.read({name: str(value) for name, value in each.items()}) for each in fingers]
+    several = [fingers] if isinstance(fingers, Mapping) else fingers
+    if not isinstance(several, Sequence) or not all(isinstance(each, Mapping) for each in several):
+        raise UserError(f"the fingers are dictionaries such as {{'rib_count': 5}}, not {fingers!r}")
+    emulator = emulator_of(as_path(sweep, "the sweep"))
+    read = [emulator.inputs.read({name: str(value) for name, value in each.items()}) for each in several]
     for place, finger in enumerate(read):
         if fault := emulator.inputs.fault(finger):
             raise UserError(f"finger {place}: {fault}")
     return prediction_table(emulator, read, emulator.predict(read))
 
 
-def optimise(question: str | Path, *, out: str | Path, processes: int | None = None) -> "Optimum":
+def optimise(
+    question: str | Path | Mapping[str, Any],
+    *,
+    out: str | Path | None = None,
+    processes: int | None = None,
+    progress: bool | None = None,
+) -> "Optimum":
     """Search for the Pareto front of a question; see `pinnray optimise`.
 
     Args:
-        question: TOML file.
-        out: Folder that keeps each run; the same call goes on where it was stopped.
+        question: TOML file, or what it would hold: a dictionary with `varied`, `objectives` and so on.
+        out: Folder that keeps each run; the same call goes on where it was stopped. None keeps nothing.
         processes: Worker processes; None means one per core.
+        progress: Whether to show the stages; if None in a notebook only.
 
     Raises:
         UserError: If the question cannot be asked, the folder holds another one, or nothing is allowed.
     """
-    from studies.optimum.question import load_question
+    from compare.runtime.stages import shown_stages
+    from studies.optimum.question import load_question, question_of
     from studies.optimum.search import search_front
     from studies.sweep.job import StudyJob
 
-    file = Path(question)
-    return search_front(StudyJob(load_question(file), file.parent, Path(out), processes or cores()))
+    if isinstance(question, Mapping):
+        read, folder = question_of({"name": "question", **question}), Path()
+    else:
+        file = as_path(question, "the question")
+        read, folder = load_question(file), file.parent
+    with _kept(out) as where, shown_stages(progress) as stages:
+        return search_front(StudyJob(read, folder, where, _processes(processes)), stages)
+
+
+def _study(
+    kind: type["Study"],
+    varied: Mapping[str, Any],
+    design: str | Path | Finger,
+    sampling: str | None,
+    given: Mapping[str, Any],
+    fixed: Mapping[str, Any],
+) -> tuple["Study", Finger | None]:
+    """A study of parameters in the words of Python, and the finger if it is no preset or file."""
+    ranges = {name: _range(name, values) for name, values in by_parameter_name(varied, Physics).items()}
+    words = by_parameter_name(fixed, Physics)
+    for name in words:
+        if SYMBOLS.get(name, name) not in Parameters.model_fields and name not in Physics.model_fields:
+            raise UserError(unknown_parameter(name, Parameters, Physics, besides=tuple(given)))
+    if sampling is None:
+        sampling = "grid" if all("values" in each for each in ranges.values()) else "sobol"
+    finger = design if isinstance(design, Design) else None
+    if finger is None and not isinstance(design, str | Path):
+        raise UserError(f"{design!r} is no design; give one that is made, the name of a preset or a file")
+    named = {} if finger is not None else {"design": str(design)}
+    known = {name: value for name, value in given.items() if value is not None}
+    content = {"name": "sweep", "sampling": sampling, "fixed": words, "varied": ranges, **named, **known}
+    return kind(**content), finger
+
+
+def _range(name: str, values: object) -> Mapping[str, Any]:
+    if isinstance(values, Mapping):
+        return values
+    if isinstance(values, str) or not hasattr(values, "__iter__"):
+        raise UserError(
+            f"{name}: give a list of values, such as [4, 6], or {{'from': LOW, 'to': HIGH}}, not {values!r}"
+        )
+    return {"values": [each.item() if hasattr(each, "item") else each for each in values]}
+
+
+def _processes(given: int | None) -> int:
+    if given is None:
+        return cores()
+    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+        raise UserError(f"processes = {given!r}: give a whole number from 1")
+    return given
+
+
+@contextmanager
+def _kept(out: str | Path | None) -> Iterator[Path]:
+    """The folder of a study; one that is removed afterwards if None."""
+    if out is not None:
+        yield as_path(out, "out")
+        return
+    with TemporaryDirectory() as folder:
+        yield Path(folder) / "study"

@@ -1,28 +1,40 @@
-"""Functions of the front door: mesh, solve, compare, track, cross-validate."""
+"""Functions of the front door: mesh, solve, compare, cross-validate.
+
+Parameters of the finger, the material and the indenter's travel are keywords of each, with the names of the
+[tables of parameters](../parameters.md): `solve("default", rib_count=6, young=5, stroke=8)`.
+"""
 
 import warnings
 from collections.abc import Sequence
-from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Unpack
 
-from geometry.cache import drawn_finger, finger_mesh
-from geometry.drawing.description import Description, description_beside, load_description
+from geometry.cache import finger_mesh
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.errors import UserError
-from geometry.finger.design import Design
 from geometry.finger.finger import Finger
-from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from geometry.text_files import as_path
+from pinnray.arguments import (
+    JobKeywords,
+    MeshKeywords,
+    mesh_settings,
+    read_drawing,
+    read_job,
+    read_solver,
+    read_solvers,
+)
+from pinnray.camera import read_observations
 from pinnray.comparison import Comparison
-from solvers.problem import Load, Material, Problem
+from pinnray.solution import Solution
+from solvers.physics import Load, LoadKind, Material
+from solvers.problem import Problem
 from solvers.registry import make_solver
-from solvers.solution import Solution
-from solvers.solver import Solver, solved, with_law
+from solvers.solver import Solver, Traits, solved, with_law
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,17 +42,20 @@ if TYPE_CHECKING:
     from compare.crossval.result import CrossvalResult
 
 
-def mesh(design: str | Path | Finger = "default", **settings: Any) -> TriangleMesh:
-    """The mesh of a finger, from the cache if it was made before.
+def mesh(design: str | Path | Finger = "default", **given: Unpack[MeshKeywords]) -> TriangleMesh:
+    """The mesh of a finger, from the cache if it was made before: `mesh(size=0.5, rib_count=6)`.
 
     Args:
         design: A finger, the name of a preset, or the path of a TOML file or of a drawing.
-        settings: Of `geometry.mesh.settings.MeshSettings`, such as `size=0.5`, mm.
+        given: Settings of `geometry.mesh.settings.MeshSettings`, mm, and parameters of the finger.
 
     Raises:
         UserError: If the design or a setting is not admissible.
     """
-    return finger_mesh(_design(design), settings=MeshSettings(**settings))
+    words: dict[str, Any] = {**given}
+    settings = {name: words.pop(name) for name in MeshSettings.model_fields if name in words}
+    finger, _, _ = read_job(design, None, None, words, besides=tuple(MeshSettings.model_fields), allowed=())
+    return finger_mesh(finger, settings=MeshSettings(**settings))
 
 
 def load_drawing(file: str | Path, **description: Any) -> DrawnFinger:
@@ -54,12 +69,15 @@ def load_drawing(file: str | Path, **description: Any) -> DrawnFinger:
     Raises:
         UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
     """
-    known = load_description(description_beside(Path(file))).model_dump(exclude_none=True)
-    return drawn_finger(Path(file), Description(**{**known, **description}))
+    return read_drawing(file, description)
 
 
-def solver(name: str, **settings: Any) -> Solver:
+def solver(name: str = "", **settings: Any) -> Solver:
     """A solver by its name, with its defaults for the settings that are not given.
+
+    Args:
+        name: One of `solver_names()`.
+        settings: Of the solver, such as `preset="trained"` of `pinn-std`.
 
     Raises:
         UserError: If there is no such solver or setting, or a library that it needs is missing.
@@ -68,75 +86,95 @@ def solver(name: str, **settings: Any) -> Solver:
 
 
 def solve(
-    problem: str | Path | Finger | Problem,
-    solver: str | Solver = "fem",
+    problem: str | Path | Finger | Problem = "default",
+    solver: str | Solver | None = None,
     *,
+    preset: str | None = None,
     size: float | None = None,
     material: Material | None = None,
-    load: Load | None = None,
+    load: Load | LoadKind | None = None,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
+    progress: bool | None = None,
+    **given: Unpack[JobKeywords],
 ) -> Solution:
     """Solve a problem, or a design with the usual material and load, with one solver.
 
-    Warns of numbers that look like another unit, of unlikely measurements, and of a body that is turned
-    inside out or goes through itself; the solution's status has these faults, too.
+    Warns of numbers that look like another unit, of unlikely measurements, of a solver that is to fit markers
+    and has none, and of a body that is turned inside out or goes through itself; the solution's status has
+    these faults, too.
 
     Args:
         problem: A problem, or a design in one of the ways of `mesh`.
-        solver: A solver or its name; it takes the material law that it has.
-        size: Largest element in walls and ribs, mm; as the other arguments, for a design only.
-        material: The elastic constants.
-        load: Motion of the indenter.
+        solver: A solver or its name, which takes the material law that it has; if None `fem`, or with a
+            preset `pinn-std`.
+        preset: Of a network: `fast`, `local`, `paper` or `trained`.
+        size: Largest element in walls and ribs, mm; as the next arguments, for a design only.
+        material: The elastic constants, unless `young` and others are given.
+        load: Motion of the indenter, or its kind alone.
         measurements: Marker displacements, for a solver that assimilates them.
+        progress: Whether to show the stages; if None in a notebook only.
+        given: Parameters of the finger (`rib_count`), the material (`young` or E, `poisson` or nu, `plane`,
+            `law`) and the load (`stroke`, mm, `direction`, degrees, `slide`, `radius`, mm, `friction`).
 
     Raises:
         UserError: If the solver does not support the problem, or the measurements cannot be of it.
     """
     from compare.evaluation.deformed_body import DeformedBody
     from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+    from compare.runtime.stages import shown_stages
 
-    chosen = _solver(solver)
-    if not isinstance(problem, Problem):
-        finger = _design(problem)
-        triangles = finger_mesh(finger, settings=_mesh_settings(size))
-        given = _observations(measurements, finger)
-        problem = Problem(triangles, material or Material(), load or Load(), given, finger)
-    elif any(each is not None for each in (size, material, load, measurements)):
-        raise UserError(
-            "a Problem has its own mesh, material, load and observations; give a design to choose them"
-        )
-    problem = replace(problem, material=with_law(problem.material, chosen))
-    remarks = [] if problem.finger is None else unit_remarks(problem)  # a body of a closed form has any unit
-    if (given := problem.observations) is not None:
-        check_positions(given, problem.mesh)
-        remarks += displacement_remarks(given, problem)
-    solution = solved(chosen, problem)
+    chosen = read_solver(solver, preset)
+    others = (size, material, load, measurements)
+    with shown_stages(progress) as stages:
+        if not isinstance(problem, Problem):
+            words = ("size", "material", "load", "measurements", "preset", "solver")
+            finger, elastic, moved = read_job(problem, material, load, given, besides=words)
+            with stages.stage("mesh"):
+                triangles = finger_mesh(finger, settings=mesh_settings(size))
+            problem = Problem(triangles, elastic, moved, read_observations(measurements, finger), finger)
+        elif given or any(each is not None for each in others):
+            raise UserError(
+                "a Problem has its own mesh, material, load and observations; give a design to choose them"
+            )
+        problem = replace(problem, material=with_law(problem.material, chosen))
+        remarks = [] if problem.finger is None else unit_remarks(problem)  # a closed form has any unit
+        if (seen := problem.observations) is not None:
+            check_positions(seen, problem.mesh)
+            remarks += displacement_remarks(seen, problem)
+        with stages.stage(chosen.name) as report:
+            solution = solved(chosen, problem, report)
+    if seen is None and Traits.of(chosen).assimilates:
+        said = solution.status.message
+        remarks.append(f"{chosen.name} fits markers, and no measurements were given: {said}")
     status, faults = DeformedBody(problem.mesh).status(solution)
     for remark in [*status.warnings, *remarks, *faults]:
         warnings.warn(remark, stacklevel=2)
-    return replace(solution, status=status)
+    return Solution.of(replace(solution, status=status))
 
 
 def compare(
     design: str | Path | Finger = "default",
     solvers: str | Sequence[str | Solver] | None = None,
     *,
+    preset: str | None = None,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
     truth: str = "sliding",
     size: float | None = None,
     adapt: float | None = None,
     material: Material | None = None,
-    load: Load | None = None,
+    load: Load | LoadKind | None = None,
     reference: str | None = None,
     out: str | Path | None = None,
     resume: bool = False,
-    progress: bool = False,
+    progress: bool | None = None,
+    **given: Unpack[JobKeywords],
 ) -> Comparison:
     """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
 
     Args:
         design: A finger, the name of a preset, or the path of a TOML file or of a drawing.
         solvers: Solvers or their names; those of the complete table that support the problem if None.
+        preset: Of the networks among them: `fast`, `local`, `paper` or `trained`.
         measurements: Marker displacements: a data frame or CSV file (x_mm, y_mm, u_mm, v_mm), or a video to
             track without a camera file; simulated by a finite-strain run if None.
         truth: What is simulated then: "sliding", "stvk", "gent", "cylinder", "oblique", "friction",
@@ -144,85 +182,44 @@ def compare(
         size: Largest element in walls and ribs, mm.
         adapt: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
         material: The elastic constants; each solver takes the law that it has.
-        load: Motion of the indenter.
+        load: Motion of the indenter, or its kind alone.
         reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
         out: Folder for the files of `compare` on the command line; nothing is written if None.
         resume: Whether to take over solutions that an earlier run with the same `out` finished.
-        progress: Whether to show the stages on standard error.
+        progress: Whether to show the stages; if None in a notebook only.
+        given: Parameters of finger, material and load, as for `solve`.
 
     Raises:
         UserError: If the comparison cannot be made.
     """
     from compare.pipeline.job import Job, checked
     from compare.pipeline.pipeline import compute, run
-    from compare.runtime.stages import Stages
+    from compare.runtime.stages import shown_stages
     from pinnray.options.preset_jobs import job_defaults
 
-    finger = _design(design)
-    names = job_defaults(None).solvers.split(",") if solvers is None else solvers
-    chosen = [_solver(each) for each in ([names] if isinstance(names, str) else names)]
+    if adapt is not None and (isinstance(adapt, bool) or not isinstance(adapt, int | float)):
+        raise UserError(f"adapt = {adapt!r} is no number; give a tolerance in mm")
+    words = ("solvers", "size", "adapt", "material", "load", "measurements", "truth", "preset", "reference")
+    finger, elastic, moved = read_job(design, material, load, given, besides=words)
+    chosen = read_solvers(job_defaults(None).solvers.split(",") if solvers is None else solvers, preset)
     job = Job(
         design=finger,
         solvers=chosen,
         spare=[each.name for each in chosen if each.name != reference] if solvers is None else (),
-        mesh=_mesh_settings(size),
+        mesh=mesh_settings(size),
         adapt=adapt,
-        material=material or Material(),
-        load=load or Load(),
-        measurements=_observations(measurements, finger),
+        material=elastic,
+        load=moved,
+        measurements=read_observations(measurements, finger),
         truth=truth,
         reference=reference,
         resume=resume,
     )
-    with Stages(quiet=not progress) as stages:
+    with shown_stages(progress) as stages:
         if out is not None:
-            return Comparison.of(run(replace(job, out=Path(out)), stages))
+            return Comparison.of(run(replace(job, out=as_path(out, "out")), stages))
         with TemporaryDirectory() as folder:
             return Comparison.of(compute(checked(job), stages, Path(folder)))
-
-
-def track(
-    source: str | Path,
-    design: str | Path | Finger = "default",
-    *,
-    camera: str | Path | None = None,
-    workspace: str | Path | None = None,
-    colour: str = "dark",
-    method: Literal["precise", "hough"] = "precise",
-    fps: float | None = None,
-    out: str | Path | None = None,
-) -> Observations:
-    """Measure the markers of a finger in a film that shows it at rest, pressed, and held.
-
-    Args:
-        source: Video, folder or glob of pictures, or number of a camera.
-        design: The finger, in one of the ways of `mesh`.
-        camera: Camera file, as `pinnray calibrate` writes it.
-        workspace: JSON file of the fiducials; those around the design if None.
-        colour: Of the markers, as `pinnray pick` prints it.
-        method: Detection of the discs; `hough` is the paper's pipeline.
-        fps: Frames a second of pictures, which do not say it; 30 if None.
-        out: Folder for observations, tracks and pictures; nothing is kept if None.
-
-    Raises:
-        UserError: If the film does not show the finger.
-    """
-    from compare.camera.film import Film
-    from compare.camera.track_film import track_film
-    from solvers.solver import silent
-
-    film = Film(
-        str(source),
-        camera=None if camera is None else Path(camera),
-        workspace=None if workspace is None else Path(workspace),
-        colour=colour,
-        method=method,
-        fps=fps,
-    )
-    with TemporaryDirectory() if out is None else nullcontext(out) as folder:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        _, observations = track_film(film, _design(design), Path(folder), silent, video=out is not None)
-    return observations
 
 
 def crossval(
@@ -233,8 +230,8 @@ def crossval(
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
     size: float | None = None,
     material: Material | None = None,
-    load: Load | None = None,
-    progress: bool = False,
+    load: Load | LoadKind | None = None,
+    progress: bool | None = None,
     **study: Any,
 ) -> "CrossvalResult":
     """Judge solvers by markers, loads and fields that they were not given.
@@ -246,10 +243,10 @@ def crossval(
         measurements: As for `compare`, but no film.
         size: Largest element in walls and ribs, mm; 0.5 if None.
         material: The elastic constants.
-        load: Motion of the indenter.
-        progress: Whether to show the stages on standard error.
+        load: Motion of the indenter, or its kind alone.
+        progress: Whether to show the stages; if None in a notebook only.
         study: Further attributes of `compare.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
-            `seeds`, `noise`.
+            `seeds`, `noise`; and parameters of finger, material and load, as for `solve`.
 
     Returns:
         The scores; `table()` has them by truth, layout, solver and scheme.
@@ -259,66 +256,26 @@ def crossval(
     """
     from compare.crossval.cross_validation import cross_validate
     from compare.crossval.study import ELEMENT_SIZE, CrossvalStudy, solver_variants
-    from compare.runtime.stages import Stages
+    from compare.runtime.stages import shown_stages
 
-    finger, elastic = _design(design), material or Material()
-    chosen = [_solver(each) for each in ([solvers] if isinstance(solvers, str) else solvers)]
+    own = [each.name for each in fields(CrossvalStudy)]
+    words = {name: study.pop(name) for name in list(study) if name not in own}
+    finger, elastic, moved = read_job(design, material, load, words, besides=own)
+    for name in SEVERAL & study.keys():
+        study[name] = (study[name],) if isinstance(study[name], str) else study[name]
     job = CrossvalStudy(
         design=finger,
-        variants=solver_variants(chosen, elastic),
-        out=Path(out),
-        mesh=MeshSettings(size=ELEMENT_SIZE if size is None else size),
+        variants=solver_variants(read_solvers(solvers), elastic),
+        out=as_path(out, "out"),
+        mesh=mesh_settings(size, ELEMENT_SIZE),
         material=elastic,
-        load=load or Load(),
-        measurements=_observations(measurements, finger),
+        load=moved,
+        measurements=read_observations(measurements, finger),
         **study,
     )
-    with Stages(quiet=not progress) as stages:
+    with shown_stages(progress) as stages:
         return cross_validate(job, stages)
 
 
-def _design(design: str | Path | Finger) -> Finger:
-    if isinstance(design, str | Path):
-        drawn = Path(design).suffix.lower() in (".step", ".stp", ".dxf", ".svg", ".msh")
-        return load_drawing(design) if drawn else load_design(design)
-    if not isinstance(design, Design | DrawnFinger):
-        raise UserError(f"{design!r} is no design; give a finger, the name of a preset or a file")
-    return design
-
-
-def _solver(given: str | Solver) -> Solver:
-    if isinstance(given, type) or not isinstance(given, str | Solver):
-        raise UserError(
-            f"{given!r} is no solver; give one that is made, such as pr.solver('fem'), or its name"
-        )
-    return solver(given) if isinstance(given, str) else given
-
-
-def _mesh_settings(size: float | None) -> MeshSettings:
-    return MeshSettings() if size is None else MeshSettings(size=size)
-
-
-def _observations(
-    given: "str | Path | Observations | pd.DataFrame | None", design: Finger
-) -> Observations | None:
-    """Observations from a data frame, a CSV file, or a film."""
-    from vision.measurements import read_measurements
-
-    if given is None or isinstance(given, Observations):
-        return given
-    if isinstance(given, str | Path):
-        if Path(given).suffix.lower() != ".csv":
-            return track(given, design)
-        return read_measurements(Path(given), marker_radius=design.marker_radius)
-    if not hasattr(given, "to_csv"):
-        raise UserError(
-            f"measurements that are a {type(given).__name__}; give a data frame, Observations, or a file"
-        )
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "measurements.csv"
-        given.to_csv(path, index=False)
-        try:
-            read = read_measurements(path, marker_radius=design.marker_radius)
-        except UserError as error:
-            raise UserError(str(error).replace(str(path), "the data frame")) from None
-    return replace(read, source="measurements from a data frame")
+SEVERAL = {"truths", "layouts", "schemes", "picture_formats"}
+"""Attributes of a cross-validation that are lists of names, of which one may stand alone."""

@@ -60,6 +60,18 @@ def solver_names() -> list[str]:
     return [*BUILT_IN, *sorted({entry.name for entry in entry_points(group=GROUP)} - set(BUILT_IN))]
 
 
+def unknown_solver(name: object) -> str:
+    """The message for a name that no solver has: near ones, and all of them."""
+    names = solver_names()
+    word = str(name).lower().replace("_", "-").replace(" ", "-")
+    near = [each for each in names if each == word]
+    near = near or [each for each in names if each.startswith(f"{word}-")]
+    near = near or get_close_matches(word, names, n=1)
+    hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+    said = f"no solver is called {name!r}" if name else "no solver was named"
+    return f"{said}{hint} (there are: {', '.join(names)})"
+
+
 def make_solver(name: str, **settings: Any) -> Solver:
     """The solver called `name`, with its settings; `preset` chooses one of its `PRESETS`, if it has any.
 
@@ -67,11 +79,15 @@ def make_solver(name: str, **settings: Any) -> Solver:
         UserError: If there is no such solver or preset, or a package that offers it cannot be loaded.
         MissingLibraryError: If a library that it needs is missing.
     """
+    if not isinstance(name, str):
+        raise UserError(unknown_solver(name))
     if name in FORMER:
         warnings.warn(f"{name} is now the preset local of {FORMER[name]}", stacklevel=1)
         name, settings = FORMER[name], {"preset": "local", **settings}
     if name in BUILT_IN:
         place = BUILT_IN[name]
+        if "preset" in settings and name not in PRESETS:
+            raise UserError(f"{name} has no presets; {' and '.join(PRESETS)} have")
         if name in PRESETS and "preset" in settings:
             if (preset := settings.pop("preset")) not in PRESETS[name]:
                 raise UserError(f"{name} has no preset {preset!r}; it has {', '.join(PRESETS[name])}")
@@ -84,9 +100,7 @@ def make_solver(name: str, **settings: Any) -> Solver:
     else:
         found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
         if not found:
-            near = get_close_matches(name, solver_names(), n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise UserError(f"no solver is called {name!r}{hint} (there are: {', '.join(solver_names())})")
+            raise UserError(unknown_solver(name))
         try:
             factory = found[0].load()
         except Exception as error:

@@ -2,21 +2,17 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
-from geometry.notebook import fact_table
+from geometry.notebook import brief, fact_table
 from geometry.registration import Pictures
 from solvers.elasticity import energy_density_of, strain_of, stress_of, von_mises
 from solvers.problem import Problem
-
-if TYPE_CHECKING:
-    from geometry.figure import Figure
 
 
 class DisplacementField(Protocol):
@@ -75,6 +71,8 @@ class ContactPoints:
     friction: FloatArray
     slips: BoolArray  #: Whether the point slips along the cylinder at the end of the load, shape (k,)
 
+    __repr__ = brief
+
 
 def _interval(value: float, low: float, high: float) -> str:
     return f"{value:.4g} ({low:.4g} to {high:.4g})"
@@ -130,6 +128,8 @@ class ErrorEstimate:
     markers: FloatArray  #: Exact minus computed displacement at the mesh's markers, shape (m, 2), mm
     field: DisplacementField  #: A more accurate field, whose distance from the solution is the estimate
 
+    __repr__ = brief
+
     @property
     def at_markers(self) -> float:
         """Largest error of u or v at a marker, mm."""
@@ -168,25 +168,48 @@ class Solution:
     pictures: Pictures | None = None  #: Frames of the observations' pictures, from a solver that finds them
 
     def displacement(self, points: ArrayLike | LocatedPoints) -> FloatArray:
-        """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.
+        """Displacement at points of shape (n, 2) or at one of shape (2,), mm: of the same shape, mm.
 
         Raises:
             OutsideBodyError: If a point lies outside the finger.
         """
-        return self.field.displacement(self._locate(points))
+        return self._at(points, self.field.displacement)
 
     def displacement_in_space(self, points: ArrayLike | LocatedPoints) -> FloatArray:
-        """Displacement of the material that is at points (n, 2), mm, before the load: shape (n, 2), mm.
+        """Displacement of the material that is at points before the load, as `displacement`.
 
         It differs from `displacement` where the solver has found that the walls are not as drawn.
         """
         if isinstance(self.field, MovedWallsField):
-            return self.field.displacement_in_space(self._locate(points))
+            return self._at(points, self.field.displacement_in_space)
         return self.displacement(points)
+
+    def at_markers(self) -> FloatArray:
+        """Displacement of the markers, shape (m, 2), mm: of those observed, else of those of the design."""
+        seen = self.problem.observations
+        return self.displacement_in_space(self.problem.mesh.markers if seen is None else seen.points)
+
+    @property
+    def force(self) -> float:
+        """Force of the indenter along its travel, N, over the whole depth; `reaction` is per mm of depth."""
+        travel = np.array([value or 0.0 for value in self.problem.load.displacement])
+        length = float(np.linalg.norm(travel))
+        return float(self.reaction @ (self.depth * travel / length)) if length else 0.0
+
+    @property
+    def depth(self) -> float:
+        """Depth of the finger, mm."""
+        finger = self.problem.finger
+        return self.problem.mesh.depth if finger is None else finger.depth
 
     def shown(self, points: FloatArray, displacement: FloatArray) -> FloatArray:
         """What the observations' pictures show of the displacement of points, all of shape (n, 2), mm."""
         return displacement if self.pictures is None else self.pictures.shown(points, displacement)
+
+    def __repr__(self) -> str:
+        outcome = "converged" if self.status.converged else "not converged"
+        load = f"{self.problem.load.kind} {self.problem.load.displacement} mm"
+        return f"{type(self).__name__}({self.solver!r}, {outcome}; load {load}, force {self.force:.4g} N)"
 
     @property
     def force_phrase(self) -> str:
@@ -195,43 +218,15 @@ class Solution:
         return self.identified.phrase(finger.depth if finger else None) if self.identified else ""
 
     def gradient(self, points: ArrayLike | LocatedPoints) -> FloatArray:
-        """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2)."""
-        return self.field.gradient(self._locate(points))
+        """Displacement gradient du_i/dx_j at points (n, 2) or one of (2,), mm: shape (n, 2, 2) or (2, 2)."""
+        return self._at(points, self.field.gradient)
 
     def state(self, points: ArrayLike | LocatedPoints) -> "State":
-        """Strain, stress and energy density at points of shape (n, 2), mm."""
-        location = self._locate(points)
-        if isinstance(self.field, SolidField):
-            return State.from_gradient(self.field.solid_gradient(location), self.problem)
-        return State.from_gradient(self.field.gradient(location), self.problem)
-
-    def plot(
-        self, quantity: Literal["displacement", "von_mises"] = "displacement", *, scale: float = 1.0
-    ) -> "Figure":
-        """A field on the deformed mesh, as a matplotlib figure.
-
-        Args:
-            quantity: `displacement`: its magnitude, mm; `von_mises`: the stress, MPa.
-            scale: Factor of the displacement that is drawn.
-
-        Raises:
-            UserError: If the quantity is another one.
-        """
-        from geometry.mesh.picture import plot_field
-
-        mesh = self.problem.mesh
-        moved = self.displacement(mesh.points)
-        if quantity == "displacement":
-            name, unit = "displacement magnitude", "mm"
-            values = np.linalg.norm(moved, axis=1)[mesh.triangles].mean(axis=1)
-        elif quantity == "von_mises":
-            name, unit, values = "von Mises stress", "MPa", self.state(mesh.at_centroids()).von_mises
-        else:
-            raise UserError(f"there is no field {quantity!r} to plot; there are displacement, von_mises")
-        remark = "" if self.status.converged else " (not converged)"
-        times = "true scale" if scale == 1 else f"displacement times {scale:g}"
-        title = f"{self.solver}{remark}: {name}, {times}"
-        return plot_field(mesh, scale * moved, values, title=title, label=f"{name}, {unit}")
+        """Strain, stress and energy density at points of shape (n, 2), or at one of shape (2,), mm."""
+        location, alone = self._locate(points)
+        gradient = self.field.solid_gradient if isinstance(self.field, SolidField) else self.field.gradient
+        state = State.from_gradient(gradient(location), self.problem)
+        return State(**{name: values[0] for name, values in vars(state).items()}) if alone else state
 
     def _repr_html_(self) -> str:
         """Status, energy, reaction, unknowns and time, in a notebook."""
@@ -241,13 +236,30 @@ class Solution:
             "status": f"{outcome}: {self.status.message}",
             "energy": f"{self.energy:.5g} N mm per mm of depth",
             "reaction": f"({u:.4g}, {v:.4g}) N per mm of depth",
+            "force along the travel": f"{self.force:.4g} N over a depth of {self.depth:g} mm",
             "unknowns": self.stats.get("unknowns", "–"),
             "time": f"{float(self.stats.get('seconds', np.nan)):.3g} s",
         }
         return fact_table(f"Solution of {self.solver}", facts)
 
-    def _locate(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
-        return points if isinstance(points, LocatedPoints) else self.problem.mesh.locate(points)
+    def _at(
+        self, points: ArrayLike | LocatedPoints, field: Callable[[LocatedPoints], FloatArray]
+    ) -> FloatArray:
+        """A field at points; without the first axis at a single point."""
+        location, alone = self._locate(points)
+        values = field(location)
+        return values[0] if alone else values
+
+    def _locate(self, points: ArrayLike | LocatedPoints) -> tuple[LocatedPoints, bool]:
+        """The location of points, and whether it is one point by itself, of shape (2,)."""
+        if isinstance(points, LocatedPoints):
+            return points, False
+        alone = (
+            isinstance(points, list | tuple | np.ndarray)
+            and np.shape(points[:1]) == (1,)
+            and len(points) == 2
+        )
+        return self.problem.mesh.locate(cast(ArrayLike, [points]) if alone else points), alone
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -259,6 +271,8 @@ class State:
     stress_zz: FloatArray  #: Out-of-plane Cauchy stress, shape (n,), MPa; zero in plane stress
     von_mises: FloatArray  #: Shape (n,), MPa
     energy_density: FloatArray  #: Strain energy per reference volume, shape (n,), MPa
+
+    __repr__ = brief
 
     @classmethod
     def from_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":

@@ -37,5 +37,5 @@ def test_notebooks_run(page, tmp_path, monkeypatch):
             exec(compile("\n" * block.line + block.text, str(page), "exec"), names)
 
 
-def test_there_are_three_notebooks():
-    assert len(NOTEBOOKS) == 3
+def test_there_are_four_notebooks():
+    assert len(NOTEBOOKS) == 4

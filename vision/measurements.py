@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from math import hypot
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -84,59 +85,92 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
             or a marker occurs twice; the message names the line.
     """
     comments, table = _lines(path)
-    header = table[0][1] if table else []
+    sources = _said(comments, SOURCE_MARK)
+    simulated = any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in comments)
+    known = {picture: said[0] for picture, mark in PICTURES.items() if (said := _said(comments, mark))}
+    return measurements_of(
+        table[0][1] if table else [],
+        [(f"line {number}", cells) for number, cells in table[1:]],
+        marker_radius=marker_radius,
+        table=str(path),
+        source=sources[0] if sources else f"measurements from {path.name}",
+        simulated=simulated,
+        pictures=known,
+    )
+
+
+def measurements_of(
+    header: Sequence[str],
+    rows: Sequence[tuple[str, Sequence[str]]],
+    *,
+    marker_radius: float,
+    table: str,
+    source: str,
+    simulated: bool = False,
+    pictures: Mapping[str, str] = MappingProxyType({}),
+) -> Observations:
+    """Observations from a table; columns and defaults as in `read_measurements`.
+
+    Args:
+        header: Names of the columns.
+        rows: Cells of every marker, as texts, each row with its name in messages.
+        marker_radius: Radius of the markers' discs, mm.
+        table: Name of the table in messages.
+        source: One sentence on the origin of the numbers.
+        simulated: True if no camera was involved.
+        pictures: How well the frames of the pictures of `PICTURES` are known, in words.
+
+    Raises:
+        UserError: If a column is missing, a value is no number or a marker occurs twice.
+    """
     for name in REQUIRED:
         if name not in header:
-            if other := foreign_table([cells for _, cells in table]):
-                raise UserError(f"{path} has no column {name}; {other}")
+            if other := foreign_table([header, *(cells for _, cells in rows)]):
+                raise UserError(f"{table} has no column {name}; {other}")
             raise UserError(
-                f"{path} has no column {name}; the header must name {', '.join(REQUIRED)} "
+                f"{table} has no column {name}; the header must name {', '.join(REQUIRED)} "
                 f"and may name {', '.join(OPTIONAL)}, with commas between; it {_titles(header)}"
             )
     for name in (*REQUIRED, *OPTIONAL):
         if header.count(name) > 1:
-            raise UserError(f"{path} has the column {name} twice; keep one")
-    if len(table) == 1:
-        raise UserError(f"{path} has a header but no marker")
+            raise UserError(f"{table} has the column {name} twice; keep one")
+    if not rows:
+        raise UserError(f"{table} has a header but no marker")
     markers: list[dict[str, float]] = []
-    for number, cells in table[1:]:
+    for number, cells in rows:
         if len(cells) != len(header):
             raise UserError(
-                f"{path}, line {number}: the header names {len(header)} columns, this line has {len(cells)}; "
+                f"{table}, {number}: the header names {len(header)} columns, this line has {len(cells)}; "
                 "separate them with commas, and write decimals with a point"
             )
-        marker = _marker(dict(zip(header, cells, strict=True)), f"{path}, line {number}")
+        marker = _marker(dict(zip(header, cells, strict=True)), f"{table}, {number}")
         if any(
             hypot(other["x_mm"] - marker["x_mm"], other["y_mm"] - marker["y_mm"]) < SMALLEST_DISTANCE
             for other in markers
         ):
             place = f"({marker['x_mm']:g}, {marker['y_mm']:g}) mm"
-            raise UserError(f"{path}, line {number}: there is already a marker at {place}; keep one")
+            raise UserError(f"{table}, {number}: there is already a marker at {place}; keep one")
         markers.append(marker)
     columns = {name: np.array([marker[name] for marker in markers]) for name in (*REQUIRED, *OPTIONAL)}
     if not columns["visible"].any():
-        raise UserError(f"{path}: none of the markers is visible; at least one is needed")
-    sources = _said(comments, SOURCE_MARK)
-    simulated = any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in comments)
+        raise UserError(f"{table}: none of the markers is visible; at least one is needed")
     seen = columns["visible"] == 1
     deviations = np.column_stack([columns["std_u_mm"], columns["std_v_mm"]])
     try:
         known = _unsaid(simulated, deviations)
-        for picture, mark in PICTURES.items():
-            if said := _said(comments, mark):
-                known[picture] = Registration.parse(said[0])
+        known |= {picture: Registration.parse(said) for picture, said in pictures.items()}
         return Observations(
             points=np.column_stack([columns["x_mm"], columns["y_mm"]]),
             displacements=np.column_stack([columns["u_mm"], columns["v_mm"]]),
             standard_deviations=deviations,
             visible=seen,
-            source=sources[0] if sources else f"measurements from {path.name}",
+            source=source,
             simulated=simulated,
             marker_radius=marker_radius,
             **known,
         )
     except UserError as error:
-        raise UserError(f"{path}: {error}") from None
+        raise UserError(f"{table}: {error}") from None
 
 
 def _unsaid(simulated: bool, deviations: FloatArray) -> dict[str, Registration]:

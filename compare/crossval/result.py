@@ -20,6 +20,7 @@ from compare.crossval.scores import (
 from compare.crossval.study import CrossvalStudy, SolverVariant
 from compare.crossval.true_fields import TrueContact
 from compare.runtime.tables import Cell
+from geometry.notebook import brief
 from geometry.observations import Observations
 from solvers.solver import Traits
 
@@ -150,6 +151,8 @@ class CrossvalResult:
     study: CrossvalStudy
     cases: Mapping[Case, CaseResult]
     true_contacts: Mapping[str, TrueContact] = field(default_factory=dict)
+
+    __repr__ = brief
 
     @property
     def truths(self) -> list[str]:

@@ -52,6 +52,11 @@ class Results:
         """Former name of `unsupported`."""
         return self.unsupported
 
+    def __repr__(self) -> str:
+        solvers, seen = ", ".join(each.solver for each in self.evaluations), self.observations
+        markers = f"{seen.visible.sum()} of {len(seen.visible)} markers {seen.label}"
+        return f"{type(self).__name__}(finger {self.design.name!r}, {solvers}; {markers})"
+
     def __getitem__(self, solver: str) -> Evaluation:
         named = {evaluation.solver: evaluation for evaluation in self.evaluations}
         if solver not in named:

@@ -19,6 +19,7 @@ from geometry.arrays import FloatArray
 from geometry.atomic import write_arrays
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.notebook import brief
 from solvers.finger_figures import FingerFigures
 from solvers.lagrange import LagrangeSpace
 from solvers.solution import IdentifiedForce, SolidField, Solution
@@ -121,6 +122,8 @@ class Evaluation:
     #: Displacement of the nodes at every row of the history, shape (k, n, 2), mm, if the load was followed.
     path: FloatArray | None = None
     certificate: Certificate | None = None  #: Judgement by the energy of finite elements; not archived.
+
+    __repr__ = brief
 
     @classmethod
     def of(cls, solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> "Evaluation":

@@ -6,9 +6,11 @@ What is impossible is refused; what is unlikely is warned of, with what it looks
 from collections.abc import Callable, Mapping
 
 import numpy as np
+import shapely
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import OutsideBodyError, UserError
+from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.identification.contradiction import likely_order, order_words
@@ -19,6 +21,7 @@ from vision.measurements import SMALLEST_DISTANCE
 
 UNITS = {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0, "micrometres": 0.001}
 """Millimetres in other units."""
+MICROMETRES = "these look like micrometres"
 LOOKS_LIKE = "this looks like"
 """Words before the unit that a number is taken to have."""
 POSITION_MIXUPS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
@@ -55,6 +58,11 @@ def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
         mesh.locate(points)
     except OutsideBodyError as error:
         looks = [said for said, undone in POSITION_MIXUPS.items() if _inside(mesh, undone(points))]
+        far = np.abs(points).max() > 10 * np.abs(mesh.points).max()
+        if not far and MICROMETRES in looks:  # a thousandth of any finger is near the origin, in the body
+            looks.remove(MICROMETRES)
+        if not looks and _in_outline(mesh, points):
+            looks = ["it is in a cavity, as a marker of another design would be"]
         hint = f"; {looks[0]}" if looks else ""
         raise UserError(
             f"the measurements are not of this finger: {error}{hint}; "
@@ -194,6 +202,13 @@ def _cosine(one: FloatArray, other: FloatArray) -> float:
     """Cosine of the angle between two arrays as vectors; 0 if one vanishes."""
     sizes = float(np.linalg.norm(one) * np.linalg.norm(other))
     return float((one * other).sum()) / sizes if sizes else 0.0
+
+
+def _in_outline(mesh: TriangleMesh, points: FloatArray) -> bool:
+    """Whether points lie in the body or its cavities."""
+    edges = shapely.linestrings(mesh.points[boundary_edges(mesh.triangles)])
+    filled = shapely.union_all(shapely.polygonize(edges))
+    return bool(shapely.covers(filled, shapely.points(points)).all())
 
 
 def _inside(mesh: TriangleMesh, points: FloatArray) -> bool:

@@ -66,6 +66,19 @@ QUANTITIES = (
 )
 
 
+DISPLACEMENT = FieldQuantity(
+    "displacement",
+    "Displacement magnitude",
+    "|u|",
+    "mm",
+    False,
+    lambda evaluation: np.hypot(*evaluation.displacement.T),
+)
+
+VIEWED = (DISPLACEMENT, *QUANTITIES)
+"""Quantities to choose from where one at a time is shown."""
+
+
 def triangle_values(quantity: FieldQuantity, evaluation: Evaluation) -> FloatArray:
     """Mean of the quantity over each triangle, shape (t,), as it is drawn."""
     return evaluation.per_triangle(quantity.values(evaluation))

@@ -22,7 +22,14 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, indistinct, reference_differences, truth_differences
 from compare.figures import Picture
 from compare.figures.body import diverging
-from compare.figures.fields import QUANTITIES, FieldQuantity, difference_scale, field_scale, triangle_values
+from compare.figures.fields import (
+    QUANTITIES,
+    VIEWED,
+    FieldQuantity,
+    difference_scale,
+    field_scale,
+    triangle_values,
+)
 from compare.figures.overlay import contact_motion
 from compare.report import text
 from compare.report.output_files import metrics
@@ -36,15 +43,6 @@ from geometry.mesh.boundary import boundary_edges, edge_paths
 
 BUDGET = 6_000_000
 """Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""
-
-DISPLACEMENT = FieldQuantity(
-    "displacement",
-    "Displacement magnitude",
-    "|u|",
-    "mm",
-    False,
-    lambda evaluation: np.hypot(*evaluation.displacement.T),
-)
 
 
 class Packed:
@@ -83,7 +81,7 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
     mesh, reference = comparison.mesh, comparison.reference
     shown = [each for each in comparison.shown_fields if each.finite]
     size = 2 * len(shown) * len(mesh.triangles)
-    quantities = [DISPLACEMENT, *QUANTITIES][: BUDGET // size if size else 0]
+    quantities = VIEWED[: BUDGET // size if size else 0]
     if not quantities or not reference.finite:
         return None
     packed = Packed()

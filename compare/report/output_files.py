@@ -147,7 +147,12 @@ SYMMETRIC = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 
 
 def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
-    """Write one solver's fields on the shared mesh, atomically.
+    """Write one solver's fields on the shared mesh, atomically; see `field_grid`."""
+    _write(path, field_grid(mesh, evaluation))
+
+
+def field_grid(mesh: TriangleMesh, evaluation: Evaluation) -> pyvista.UnstructuredGrid:
+    """One solver's fields on the shared mesh as a grid of VTK.
 
     At the nodes: `displacement_mm` (u, v, 0), and where the solver estimates it, its standard deviation
     `displacement_deviation_mm`.
@@ -184,7 +189,7 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     grid.field_data["status"] = [_ascii(evaluation.message)]
     grid.field_data["energy_N_mm_per_mm"] = [evaluation.energy]
     grid.field_data["reaction_N_per_mm"] = evaluation.reaction[None]
-    _write(path, grid)
+    return grid
 
 
 def _ascii(text: str) -> str:

@@ -37,15 +37,51 @@ def quiet_stages() -> Iterator[None]:
         _quiet.reset(token)
 
 
+def in_notebook() -> bool:
+    """Whether this process serves a notebook, which can show a line and change it."""
+    return Console().is_jupyter
+
+
+def shown_stages(shown: bool | None) -> "Stages":
+    """Stages that are shown or not; if None, in a notebook only."""
+    return Stages(quiet=not (in_notebook() if shown is None else shown))
+
+
+class NotebookLine:
+    """One line of a notebook's cell that changes, a few times a second at most."""
+
+    EVERY = 0.2  # Time between two changes, s
+
+    def __init__(self) -> None:
+        self._handle: Any = None
+        self._last = 0.0
+
+    def show(self, text: str, *, now: bool = False) -> None:
+        """Show a text in place of the last one; unless it has to be `now`, it may be passed over."""
+        if not now and time.perf_counter() - self._last < self.EVERY:
+            return
+        from IPython.display import Pretty, display
+
+        shown, self._last = Pretty(text), time.perf_counter()
+        if self._handle is None:
+            self._handle = display(shown, display_id=True)
+        else:
+            self._handle.update(shown)
+
+
 class Stages:
-    """Shows a line with progress and time left for every stage; without a terminal, a line at its end."""
+    """Shows a line with progress and time left for every stage; without a terminal, a line at its end.
+
+    In a notebook it is one line for all of them, which ends as the list of their times.
+    """
 
     def __init__(self, console: Console | None = None, *, quiet: bool = False) -> None:
         console, quiet = console or Console(stderr=True), quiet or _quiet.get()
         self.seconds: dict[str, float] = {}  #: Duration of every finished stage, s.
         self._started = datetime.now(UTC)
         self._console = console
-        self._log = not (quiet or console.is_terminal)
+        self._line = NotebookLine() if console.is_jupyter and not quiet else None
+        self._log = not (quiet or console.is_terminal or console.is_jupyter)
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(bar_width=16),
@@ -72,6 +108,9 @@ class Stages:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._progress.stop()
+        if self._line is not None and self.seconds:
+            times = (f"{name} {seconds:.1f} s" for name, seconds in self.seconds.items())
+            self._line.show(", ".join(times), now=True)
 
     def record(self) -> dict[str, Any]:
         """Start, durations so far and machine, for the provenance of a result."""
@@ -85,6 +124,8 @@ class Stages:
     def stage(self, name: str) -> Iterator[Report]:
         """Run a stage; it yields a function that takes the fraction done and a short note."""
         started = time.perf_counter()
+        if self._line is not None:
+            self._line.show(name)
         task = self._progress.add_task(name, total=1.0, note="")
         last = ""
 
@@ -92,6 +133,8 @@ class Stages:
             nonlocal last
             last = note
             self._progress.update(task, completed=fraction, note=note)
+            if self._line is not None:
+                self._line.show(f"{name}: {fraction:.0%} {note}")
 
         try:
             yield report

@@ -19,7 +19,7 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.notebook import fact_table, png_image
+from geometry.notebook import brief, fact_table, png_image
 from geometry.section.loop import Loop
 from geometry.section.section import Section
 
@@ -72,6 +72,8 @@ class DrawnFinger:
     unit: float = 1.0
     reading: Mapping[str, str | float] = field(default_factory=dict)
     mesh: TriangleMesh | None = None
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         markers = frozen_array(self.markers, dtype=np.float64, shape=(None, 2), name="markers")

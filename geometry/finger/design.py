@@ -1,13 +1,19 @@
 """A finger from parameters that obey every rule."""
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic import model_validator
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.finger.parameters import SYMBOLS, Parameters, parameter_info, with_symbol, with_unit
+from geometry.finger.parameters import (
+    MARKER,
+    SYMBOLS,
+    Parameters,
+    by_parameter_name,
+    parameter_info,
+    with_unit,
+)
+from geometry.finger.rules import fitting_marker
 from geometry.finger.section import finger_section, marker_positions
 from geometry.finger.validation import check
 from geometry.notebook import fact_table
@@ -25,7 +31,7 @@ class Design(Parameters):
 
     def replaced(self, **changes: Any) -> "Design":
         """A checked copy with some parameters changed, by name or symbol."""
-        return Design(**{**self.model_dump(), **by_parameter_name(changes)})
+        return Design(**{**self.model_dump(exclude_unset=True), **by_parameter_name(changes)})
 
     @property
     def section(self) -> Section:
@@ -36,6 +42,14 @@ class Design(Parameters):
     def markers(self) -> FloatArray:
         """Centres of the markers, ordered from base to tip, shape (m, 2), mm."""
         return marker_positions(self)
+
+    @property
+    def small_markers(self) -> str:
+        """Why the markers are smaller than usual, if walls are too thin for others; else empty."""
+        usual = self.model_copy(update={"marker_diameter": MARKER})
+        if self.marker_diameter < MARKER and fitting_marker(usual) == self.marker_diameter:
+            return f"the usual {MARKER:g} mm do not fit"
+        return ""
 
     def at_contact(self, position: float) -> "Design":
         """The same finger with the contact's middle at another x, mm."""
@@ -54,7 +68,10 @@ class Design(Parameters):
                 continue
             meaning = (described.description or name).split(" [")[0].replace("`", "")
             unit = str(parameter_info(name, "unit"))
-            rows.append((meaning, str(parameter_info(name, "symbol")), _in_words(value, unit)))
+            words = _in_words(value, unit)
+            if name == "marker_diameter" and self.small_markers:
+                words += f", as {self.small_markers}"
+            rows.append((meaning, str(parameter_info(name, "symbol")), words))
         return [*rows, ("Abscissa of the contact's middle", "", _in_words(self.contact_abscissa, "mm"))]
 
     def plot(self) -> "Figure":
@@ -70,32 +87,28 @@ class Design(Parameters):
         facts = {
             f"{name} ({symbol})": with_unit(getattr(self, name), name) for symbol, name in SYMBOLS.items()
         }
+        if self.small_markers:
+            facts["markers"] = f"of {self.marker_diameter:g} mm: {self.small_markers}"
         return fact_table(f"Design “{self.name}”", facts, section_svg(self).partition("?>")[2])
 
-    @model_validator(mode="before")
-    @classmethod
-    def _accept_symbols(cls, values: Any) -> Any:
-        return by_parameter_name(values) if isinstance(values, Mapping) else values
+    def __repr__(self) -> str:
+        """The name, the paper's nine parameters and what else differs from its default, in one line."""
+        shown = {"name", *SYMBOLS.values()} | {
+            name for name, field in type(self).model_fields.items() if getattr(self, name) != field.default
+        }
+        return f"Design({', '.join(f'{name}={value!r}' for name, value in self if name in shown)})"
+
+    __str__ = __repr__
 
     @model_validator(mode="after")
     def _obey_rules(self) -> "Design":
         check(self)
+        self.__dict__["marker_diameter"] = fitting_marker(
+            self
+        )  # still unset: a copy shrinks by its own walls
         return self
 
 
 def _in_words(value: object, unit: str) -> str:
     number = f"{value:g}" if isinstance(value, int | float) else str(value)
     return number + {"": "", "deg": "°"}.get(unit, f" {unit}")
-
-
-def by_parameter_name(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values with the paper's symbols replaced by names."""
-    named: dict[str, Any] = {}
-    for key, value in values.items():
-        name = SYMBOLS.get(key, key)
-        if name in named:
-            raise UserError(
-                f"{with_symbol(name)} is given twice, by its name and by its symbol; give it once"
-            )
-        named[name] = value
-    return named

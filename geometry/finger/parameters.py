@@ -5,8 +5,10 @@ Invalid values are refused in one line: the parameter, the value, and the allowe
 
 import difflib
 import reprlib
+from collections.abc import Mapping, Sequence
+from functools import cache
 from textwrap import shorten
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_core import ErrorDetails
@@ -26,8 +28,12 @@ def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meani
     )
 
 
+MARKER = 1.6
+"""Diameter of a marker, mm, unless another one is asked for; thin walls get smaller ones of themselves."""
+
+
 class CheckedModel(BaseModel):
-    """A frozen model that refuses invalid values in one line.
+    """A frozen model that refuses invalid values in one line; a parameter goes by its name or its symbol.
 
     Raises:
         UserError: With the parameter, the value and what would be right; semicolons between several. Likewise
@@ -35,25 +41,29 @@ class CheckedModel(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    other_words: ClassVar[tuple[str, ...]] = ()  # which `__init__` turns into parameters
 
-    def __init__(self, *unnamed: Any, **values: Any) -> None:
-        if unnamed:
-            names = shorten(", ".join(type(self).model_fields), 120, placeholder=" ...")
-            given = " ".join(reprlib.repr(unnamed[0]).split())
-            raise UserError(f"{type(self).__name__} takes values by name only ({names}), not {given}")
-        for name, value in values.items():
-            field = type(self).model_fields.get(name)
-            if (
-                isinstance(value, bool)
-                and field
-                and field.annotation in (int, float, int | None, float | None)
-            ):
-                values[name] = str(value).lower()  # no number, though Python has it as 0 or 1
-        try:
-            super().__init__(**values)
-        except ValidationError as error:
-            sentences = (_sentence(problem, type(self)) for problem in error.errors())
-            raise UserError("; ".join(sentences)) from None
+    if not TYPE_CHECKING:  # type checkers see the parameters instead, each with its type
+
+        def __init__(self, *unnamed, **given) -> None:
+            if unnamed:
+                names = shorten(", ".join(type(self).model_fields), 120, placeholder=" ...")
+                said = " ".join(reprlib.repr(unnamed[0]).split())
+                raise UserError(f"{type(self).__name__} takes values by name only ({names}), not {said}")
+            values = by_parameter_name(given, type(self))
+            for name, value in values.items():
+                field = type(self).model_fields.get(name)
+                if (
+                    isinstance(value, bool)
+                    and field
+                    and field.annotation in (int, float, int | None, float | None)
+                ):
+                    values[name] = str(value).lower()  # no number, though Python has it as 0 or 1
+            try:
+                super().__init__(**values)
+            except ValidationError as error:
+                sentences = (_sentence(problem, type(self)) for problem in error.errors())
+                raise UserError("; ".join(sentences)) from None
 
 
 class Parameters(CheckedModel):
@@ -129,7 +139,7 @@ class Parameters(CheckedModel):
         description="Markers on the centre line of the front wall, or at the rib-wall joints and in the tip",
     )
     marker_count: int = bounded(9, 1, 60, "", "", "Number of markers of the layout `front`")
-    marker_diameter: float = bounded(1.6, 0.1, 20, "mm", "", "Diameter of a marker")
+    marker_diameter: float = bounded(MARKER, 0.1, 20, "mm", "", "Diameter of a marker")
     marker_height: float = bounded(0.6, 0.05, 50, "mm", "", "How deep a marker is inlaid into the side face")
 
     @field_validator("tip_radius", "fillet_radius", "foot_height")
@@ -183,27 +193,81 @@ def with_symbol(name: str, model: type[BaseModel] = Parameters) -> str:
     return f"{name} ({symbol})" if symbol else name
 
 
-SYMBOLS = {symbol: name for name in Parameters.model_fields if (symbol := parameter_info(name, "symbol"))}
+@cache
+def symbols(model: type[BaseModel]) -> dict[str, str]:
+    """Names of a model's parameters by their symbols."""
+    return {symbol: name for name in model.model_fields if (symbol := parameter_info(name, "symbol", model))}
+
+
+SYMBOLS = symbols(Parameters)
 """Parameter names by the paper's symbols."""
 
+SYNONYMS = {
+    "ribs": "rib_count",
+    "e": "young",
+    "modulus": "young",
+    "elastic_modulus": "young",
+    "stiffness": "young",
+    "nu": "poisson",
+    "length": "height",
+    "width": "base_width",
+    "travel": "stroke",
+    "indentation": "stroke",
+    "angle": "direction",
+    "friction_coefficient": "friction",
+    "mu": "friction",
+    "mesh_size": "size",
+    "element_size": "size",
+    "elements": "size",
+    "solver": "solvers",
+    "solvers": "solver",
+}
+"""Other words for parameters, which messages answer with the right one; none of them is understood."""
 
-def unknown_parameter(key: str, model: type[BaseModel]) -> str:
-    """The message for a parameter that `model` does not have: near matches, or the whole list."""
-    known = list(model.model_fields)
-    near = difflib.get_close_matches(key.lower(), known, n=3, cutoff=0.6)
-    near = near or [name for name in known if key.lower() in name or key.lower()[:3] == name[:3]]
-    titles = ", ".join(with_symbol(name, model) for name in near or known)
-    hint = f"did you mean {titles}?" if near else f"there are {titles}"
-    return f"unknown parameter {key!r}; {hint}"
+
+def by_parameter_name(values: Mapping[str, Any], model: type[BaseModel] = Parameters) -> dict[str, Any]:
+    """The values with a model's symbols replaced by the names of its parameters.
+
+    Raises:
+        UserError: If a parameter is given by its name and by its symbol.
+    """
+    known, named = symbols(model), dict[str, Any]()
+    for key, value in values.items():
+        name = known.get(key, key)
+        if name in named:
+            raise UserError(
+                f"{with_symbol(name, model)} is given twice, by its name and by its symbol; give it once"
+            )
+        named[name] = value
+    return named
 
 
-def _sentence(problem: ErrorDetails, model: type[BaseModel]) -> str:
+def unknown_parameter(key: str, *models: type[BaseModel], besides: Sequence[str] = ()) -> str:
+    """The message for a parameter that no model has: near matches, or the whole list.
+
+    Args:
+        key: The unknown word.
+        models: Models that were searched.
+        besides: Further words that would have been understood.
+    """
+    titles = {name: with_symbol(name, model) for model in models for name in model.model_fields}
+    titles |= {name: name for name in besides}
+    word = key.lower()
+    near = [SYNONYMS[word]] if SYNONYMS.get(word) in titles else []
+    near = near or difflib.get_close_matches(word, titles, n=3, cutoff=0.6)
+    if len(word) > 2:  # a single letter is part of nearly every name
+        near = near or [name for name in titles if word in name or word[:3] == name[:3]]
+    said = ", ".join(titles[name] for name in near or titles)
+    return f"unknown parameter {key!r}; {f'did you mean {said}?' if near else f'there are {said}'}"
+
+
+def _sentence(problem: ErrorDetails, model: type[CheckedModel]) -> str:
     kind, value, context = problem["type"], problem["input"], problem.get("ctx", {})
     if not problem["loc"]:
         return str(context.get("error", problem["msg"]))
     name = str(problem["loc"][0])
     if kind == "extra_forbidden":
-        return unknown_parameter(name, model)
+        return unknown_parameter(name, model, besides=model.other_words)
     titled = with_symbol(name, model)
     if kind in ("greater_than_equal", "less_than_equal"):
         try:

@@ -2,11 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from geometry.errors import UserError
-from geometry.finger.design import Design, by_parameter_name
-from geometry.finger.parameters import SYMBOLS, Parameters, unknown_parameter, with_symbol
+from geometry.finger.design import Design
+from geometry.finger.keywords import FingerKeywords
+from geometry.finger.parameters import (
+    SYMBOLS,
+    Parameters,
+    by_parameter_name,
+    unknown_parameter,
+    with_symbol,
+)
 from geometry.text_files import read_toml
 
 FOLDER = Path(__file__).parent.parent / "designs"
@@ -19,20 +26,31 @@ def preset_names() -> list[str]:
     return sorted(names, key=lambda name: name != "default")
 
 
-def load_design(name_or_path: str | Path = "default", overrides: Mapping[str, Any] | None = None) -> Design:
-    """A preset, or the design in a TOML file, with some parameters overridden.
+def load_design(
+    name_or_path: str | Path = "default",
+    overrides: Mapping[str, Any] | None = None,
+    **parameters: Unpack[FingerKeywords],
+) -> Design:
+    """A preset, or the design in a TOML file, with some parameters changed: `load_design(rib_count=6)`.
 
     Args:
         name_or_path: Name of a preset, or path of a TOML file that gives parameters by name or symbol; those
             it leaves out have their default value. Without `name`, the file's name is the design's.
         overrides: Parameters by name or symbol; values may be text, as from a command line.
+        parameters: The same as keywords.
 
     Raises:
         UserError: If there is no such preset or file, it cannot be read, or the design breaks a rule.
     """
+    if not isinstance(overrides, Mapping | None):
+        raise UserError(
+            f"the changes of a design are a dictionary such as {{'rib_count': 6}}, not {overrides!r}"
+        )
+    if twice := sorted((overrides or {}).keys() & parameters.keys()):
+        raise UserError(f"{with_symbol(twice[0])} is given twice; give it once")
     path = _path_of(name_or_path)
     values = by_parameter_name(read_toml(path, "design file"))
-    changes = by_parameter_name(overrides or {})
+    changes = by_parameter_name({**(overrides or {}), **parameters})
     try:
         return Design(**{"name": path.stem, **values, **changes})
     except UserError as error:
@@ -64,6 +82,10 @@ def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
 
 def _path_of(name_or_path: str | Path) -> Path:
     """The TOML file of a preset's name or of a path."""
+    if not isinstance(name_or_path, str | Path):
+        raise UserError(
+            f"{name_or_path!r} is no design; give the name of a preset or the path of a .toml file"
+        )
     path = Path(name_or_path)
     if path.suffix == ".toml" or isinstance(name_or_path, Path) or len(path.parts) > 1:
         if not path.is_file():

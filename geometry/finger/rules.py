@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from scipy.spatial.distance import pdist
 
-from geometry.finger.parameters import Parameters
+from geometry.finger.parameters import MARKER, Parameters, parameter_info
 from geometry.finger.section import (
     back_line,
     cavity_ends,
@@ -157,30 +157,64 @@ def fillets_fit(p: Parameters) -> RuleResult:
 
 def markers_fit(p: Parameters) -> RuleResult:
     """Every marker lies in the material; the cavities' roundings are left out."""
-    centres = marker_positions(p)
-    body = shapely.Polygon(finger_outline(p).flattened()[0], list(cells(p)))
-    away = shapely.distance(body.boundary, shapely.points(centres))
-    margins = np.where(shapely.contains_xy(body, *centres.T), away, -away)
-    worst = int(margins.argmin())
-    x, y = centres[worst]
-    room = 2 * (margins[worst] - MIN_MARKER_WALL)
+    worst, room = _marker_room(p)
+    x, y = marker_positions(p)[worst]
     return RuleResult(
-        float(margins[worst] - MIN_MARKER_WALL - p.marker_radius),
+        (room - _smallest_marker(p)) / 2,
         f"marker {worst + 1} of layout {p.marker_layout!r} at ({x:.4g}, {y:.4g}) mm does not fit into the "
-        f"material: marker_diameter is {p.marker_diameter:g} mm, there is room for {max(room, 0):.3g} mm",
+        f"material: {_marker_words(p)}, there is room for {max(room, 0):.3g} mm",
     )
 
 
 def markers_apart(p: Parameters) -> RuleResult:
     """Neighbouring markers leave material between them."""
-    centres = marker_positions(p)
-    nearest = float(pdist(centres).min()) if len(centres) > 1 else np.inf
+    count, nearest, least = len(marker_positions(p)), _nearest_markers(p), _smallest_marker(p)
     return RuleResult(
-        nearest - p.marker_diameter - MIN_MARKER_WALL,
-        f"markers overlap: {len(centres)} markers of layout {p.marker_layout!r} with marker_diameter "
-        f"{p.marker_diameter:g} mm are {nearest:.3g} mm apart, at least "
-        f"{p.marker_diameter + MIN_MARKER_WALL:g} mm is needed",
+        nearest - least - MIN_MARKER_WALL,
+        f"markers overlap: {count} markers of layout {p.marker_layout!r} are {nearest:.3g} mm apart, at "
+        f"least {least + MIN_MARKER_WALL:g} mm is needed: {_marker_words(p)}",
     )
+
+
+def fitting_marker(p: Parameters) -> float:
+    """Diameter of the markers, mm: as asked for, but markers of the default diameter shrink where they must.
+
+    Args:
+        p: A finger that obeys every rule.
+    """
+    if p.marker_diameter != MARKER:
+        return p.marker_diameter
+    room = min(_marker_room(p)[1], _nearest_markers(p) - MIN_MARKER_WALL)
+    hundredths = np.floor(100 * room + 1e-6)  # so that a wall of 1 mm has markers of 0.8, not 0.79 mm
+    return float(np.clip(hundredths / 100, _smallest_marker(p), MARKER))
+
+
+def _smallest_marker(p: Parameters) -> float:
+    """Diameter that has to fit, mm: any will do where no other than the default is asked for."""
+    return (
+        float(parameter_info("marker_diameter", "low")) if p.marker_diameter == MARKER else p.marker_diameter
+    )
+
+
+def _marker_words(p: Parameters) -> str:
+    shrinks = ", which shrinks," if p.marker_diameter == MARKER else ""
+    return f"marker_diameter{shrinks} is {'at least ' if shrinks else ''}{_smallest_marker(p):g} mm"
+
+
+def _marker_room(p: Parameters) -> tuple[int, float]:
+    """The marker that has the least room around it, and the largest diameter that fits there, mm."""
+    centres = marker_positions(p)
+    body = shapely.Polygon(finger_outline(p).flattened()[0], list(cells(p)))
+    away = shapely.distance(body.boundary, shapely.points(centres))
+    margins = np.where(shapely.contains_xy(body, *centres.T), away, -away)
+    worst = int(margins.argmin())
+    return worst, 2 * float(margins[worst] - MIN_MARKER_WALL)
+
+
+def _nearest_markers(p: Parameters) -> float:
+    """Smallest distance of two markers, mm."""
+    centres = marker_positions(p)
+    return float(pdist(centres).min()) if len(centres) > 1 else np.inf
 
 
 def markers_not_through(p: Parameters) -> RuleResult:

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray, IntArray, frozen_array
 from geometry.errors import OutsideBodyError
+from geometry.notebook import brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,6 +18,8 @@ class LocatedPoints:
     points: FloatArray  # shape (n, 2), mm
     cells: IntArray  # numbers of the triangles, shape (n,)
     barycentric: FloatArray  # coordinates in them, shape (n, 3)
+
+    __repr__ = brief
 
     def __len__(self) -> int:
         return len(self.points)

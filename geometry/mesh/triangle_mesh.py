@@ -49,6 +49,10 @@ class TriangleMesh:
     contact_node: int
     depth: float = 20.0
 
+    def __repr__(self) -> str:
+        nodes, triangles, markers = len(self.points), len(self.triangles), len(self.marker_nodes)
+        return f"TriangleMesh({nodes} nodes, {triangles} triangles, {markers} markers)"
+
     def __post_init__(self) -> None:
         edges = {
             name: frozen_array(nodes, dtype=np.int64, shape=(None, 2), name=f"boundary {name!r}")

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from geometry.arrays import BoolArray, FloatArray, IntArray, frozen_array
 from geometry.errors import ShapeError, UserError
+from geometry.notebook import brief
 
 STRAIGHT = 1e-12
 """Largest absolute bulge of a straight piece."""
@@ -33,6 +34,8 @@ class Loop:
     points: FloatArray
     bulges: FloatArray
     names: tuple[str, ...]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         points = frozen_array(self.points, dtype=np.float64, shape=(None, 2), name="points")

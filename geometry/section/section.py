@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from geometry.arrays import BoolArray, FloatArray
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
+from geometry.notebook import brief
 from geometry.section.loop import Loop
 
 DEVIATION = 1e-5
@@ -31,6 +32,8 @@ class Section:
 
     outline: Loop  # counter-clockwise
     cavities: tuple[Loop, ...] = ()  # clockwise
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         if self.outline.area <= 0 or any(cavity.area >= 0 for cavity in self.cavities):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
+from compare.runtime.exits import say
 from compare.runtime.provenance import cores
 from geometry.cache import drawn_finger
 from geometry.drawing.description import description_beside, load_description
@@ -102,6 +103,8 @@ class FingerOptions:
         design = load_design(self.design, changes)
         if changes and "name" not in changes:  # so that it has its own output folder
             design = design.replaced(name=_changed_name(design, changes))
+        if design.small_markers:
+            say(f"markers of {design.marker_diameter:g} mm: {design.small_markers}")
         return design
 
     def _drawn(self, file: Path) -> Finger:

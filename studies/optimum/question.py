@@ -90,23 +90,32 @@ def load_question(path: Path) -> Question:
     Raises:
         UserError: If it cannot be read, or something in it is wrong.
     """
-    content: dict[str, Any] = read_toml(path, "question")
+    content = read_toml(path, "question")
+    try:
+        return question_of({"name": path.stem, **content})
+    except UserError as error:
+        raise UserError(f"question {path}: {error}") from None
+
+
+def question_of(given: Mapping[str, Any]) -> Question:
+    """The question that a dictionary describes, as its TOML file would.
+
+    Raises:
+        UserError: If something in it is wrong.
+    """
+    content = dict(given)
     own: dict[str, Any] = {
         name: content.pop(name) for name in ("objectives", "constraints", "runs") if name in content
     }
-    try:
-        if given := [name for name in ("sampling", "samples") if name in content]:
-            raise UserError(f"{given[0]} belongs to a study; the search chooses its samples: give runs")
-        limits = own.get("constraints", {})
-        if not isinstance(limits, Mapping) or not all(isinstance(each, Mapping) for each in limits.values()):
-            raise UserError("write constraints as NAME = {at_least = LOW, at_most = HIGH}")
-        own["constraints"] = {name: _limit(name, entry) for name, entry in limits.items()}
-        runs = own.get("runs", 120)
-        start = max(runs // 3, 2) if isinstance(runs, int) else 2
-        chosen: dict[str, Any] = {**content, **own, "sampling": "sobol", "samples": start}
-        return Question(**{"name": path.stem, **chosen})
-    except UserError as error:
-        raise UserError(f"question {path}: {error}") from None
+    if said := [name for name in ("sampling", "samples") if name in content]:
+        raise UserError(f"{said[0]} belongs to a study; the search chooses its samples: give runs")
+    limits = own.get("constraints", {})
+    if not isinstance(limits, Mapping) or not all(isinstance(each, Mapping) for each in limits.values()):
+        raise UserError("write constraints as NAME = {at_least = LOW, at_most = HIGH}")
+    own["constraints"] = {name: _limit(name, entry) for name, entry in limits.items()}
+    runs = own.get("runs", 120)
+    start = max(runs // 3, 2) if isinstance(runs, int) else 2
+    return Question(**{**content, **own, "sampling": "sobol", "samples": start})
 
 
 def _limit(name: str, entry: Mapping[str, Any]) -> Limit:

@@ -14,6 +14,7 @@ from geometry.atomic import write_json
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.validation import broken_rule
+from geometry.notebook import brief
 from studies.emulator.emulator import fitted
 from studies.emulator.inputs import Inputs
 from studies.optimum.front import hypervolume, reference_point, unbeaten
@@ -57,6 +58,8 @@ class Optimum:
     front: list[int]
     volumes: FloatArray
     reference: dict[str, float]
+
+    __repr__ = brief
 
     def place(self, run: int) -> int:
         """Place of a run on the front, from 1: its number in the table and in the names of the files."""

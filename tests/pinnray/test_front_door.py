@@ -144,11 +144,11 @@ FRAME = pd.DataFrame({"x_mm": [20.0, 50.0], "y_mm": -1.0, "u_mm": [-1.0, -1.5], 
         (lambda: pr.compare("default", "fem", measurements=np.zeros((3, 4)), **COARSE), "that are a ndarray"),
         (
             lambda: pr.compare("default", "fem", measurements=FRAME.assign(visible=[0.9, 1.0]), **COARSE),
-            "the data frame, line 2: visible is '0.9'; it must be 1",
+            "the data frame, row 0: visible is '0.9'; it must be 1",
         ),
         (
             lambda: pr.compare("default", "fem", measurements=FRAME.assign(visible=["yes", "?"]), **COARSE),
-            "the data frame, line 3: visible is '[?]'; it must be 1",
+            "the data frame, row 1: visible is '[?]'; it must be 1",
         ),
     ],
 )

@@ -41,20 +41,15 @@ def rig(
         codec: ffv1 or png (lossless), mjpg or mp4v.
         out: Output folder.
     """
-    from compare.camera.filmed_force import LONGEST_STEP, filmed_course, true_forces
-    from compare.evaluation.truths import experiment_source, simulate
+    from compare.camera.filmed_force import filmed_course
+    from compare.camera.virtual_film import filmed_solution, write_film
     from compare.pipeline.shared_mesh import shared_mesh
-    from compare.runtime.output_folder import check_output, replaced_folder, write_run
-    from compare.runtime.provenance import machine, package_versions
+    from compare.runtime.output_folder import check_output
     from compare.runtime.stages import Stages
-    from compare.runtime.tables import write_csv
     from pinnray.options.cost import EXPERIMENT
-    from solvers.problem import Problem
-    from solvers.solver import solved, with_law
-    from vision.rig.boards import board_poses, board_scene
     from vision.rig.occluders import cables, check_covers
     from vision.rig.recording import Recording
-    from vision.rig.recording_files import check_codec, photograph, record
+    from vision.rig.recording_files import check_codec
     from vision.tracking.workspace import default_workspace
 
     design, mesh_settings = finger.read(options.preset)
@@ -73,18 +68,7 @@ def rig(
         mesh, _ = shared_mesh(design, mesh_settings, stages)
         bench = scene.bench(mesh, design, workspace)
         check_covers(covered, len(mesh.marker_nodes))
-        if filmed is None:
-            problem = Problem(mesh, material, load)
-            with stages.stage("virtual experiment") as progress:
-                solution = simulate(problem, progress, max_step=LONGEST_STEP)
-            source = experiment_source(problem)
-        else:
-            with stages.stage(filmed.name) as progress:
-                problem = Problem(mesh, with_law(material, filmed), load, finger=design)
-                solution = solved(filmed, problem, progress)
-            if not solution.status.converged:
-                raise UserError(f"{filmed.name} {solution.status.message}; its displacements are not filmed")
-            source = f"displacements of {filmed.name}, rendered by the virtual rig; no camera was involved"
+        solution, source = filmed_solution(mesh, design, material, load, filmed, stages)
         displacement = solution.displacement(mesh.at_nodes())
         course = filmed_course(solution)
         recording = Recording(
@@ -98,24 +82,17 @@ def rig(
             seed=options.seed,
             course=course,
         )
-        with replaced_folder(out) as folder:
-            with stages.stage("film") as progress:
-                record(recording, folder, source=source, codec=codec, progress=progress)
-            write_csv(folder / "truth_force.csv", true_forces(solution, recording, design.depth))
-            if boards.boards:
-                with stages.stage("boards") as progress:
-                    poses = board_poses(board, camera, boards.boards, seed=options.seed)
-                    photograph(board_scene(board), poses, recording, folder / "boards", progress=progress)
-            write_run(
-                folder,
-                {
-                    "source": source,
-                    "cover": {"shares": covered, "during": scene.cover_during} if covered else None,
-                    "board": str(board) if boards.boards else None,
-                    "versions": package_versions(),
-                    "machine": machine(),
-                },
-            )
+        write_film(
+            recording,
+            solution,
+            out,
+            stages,
+            source=source,
+            codec=codec,
+            board=board,
+            boards=boards.boards,
+            facts={"cover": {"shares": covered, "during": scene.cover_during} if covered else None},
+        )
     for path in sorted(out.iterdir()):
         print(path)
     return 0

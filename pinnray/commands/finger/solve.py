@@ -17,7 +17,7 @@ from pinnray.options.shared import (
 
 
 def solve(
-    solver: str,
+    solver: str | None = None,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
@@ -46,9 +46,12 @@ def solve(
     from compare.report.output_files import write_vtu
     from compare.runtime.stages import Stages
     from solvers.problem import Problem
+    from solvers.registry import unknown_solver
     from solvers.solver import Traits, solved, with_law
     from vision.measurements import read_measurements
 
+    if not solver:
+        raise UserError(unknown_solver(solver))
     at_strokes = [_stroke(text) for text in comma_list(strokes or "")]
     chosen, settings = finger.read(options.preset)
     material, load = physics.read(options.preset)

@@ -27,9 +27,10 @@ BAD_DESIGNS = [
     ({"contact_width": 90}, "contact_width", "contact outside the front face"),
     ({"marker_diameter": 2}, "marker_diameter", "does not fit"),
     ({"marker_layout": "front", "marker_count": 40}, "marker_count", "does not fit"),  # the last falls out
-    ({"front_thickness": 1.5}, "front_thickness", "does not fit"),
-    ({"back_thickness": 1}, "back_thickness", "does not fit"),
-    ({"rib_count": 40, "rib_thickness": 0.2}, "rib_count", "markers overlap"),
+    ({"front_thickness": 0.29}, "front_thickness", "which shrinks, is at least 0.1 mm"),
+    ({"front_thickness": 1.5, "marker_diameter": 1.5}, "front_thickness", "does not fit"),
+    ({"back_thickness": 1, "marker_diameter": 1.5}, "back_thickness", "does not fit"),
+    ({"rib_count": 40, "rib_thickness": 0.2, "marker_diameter": 1.5}, "rib_count", "markers overlap"),
     ({"marker_height": 25}, "marker_height", "goes through the finger"),
     ({"fillet_radius": 4}, "fillet_radius", "fillets too large"),
     ({"depth": 1, "marker_height": 1}, "depth", "goes through the finger"),

@@ -1,0 +1,303 @@
+"""Functions of the front door for experimenters: calibrate, track, force from a film, and the virtual rig."""
+
+from collections.abc import Iterable
+from contextlib import nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Literal, Unpack
+
+from geometry import observations
+from geometry.errors import UserError
+from geometry.finger.finger import Finger
+from geometry.text_files import as_path
+from pinnray.arguments import MATERIAL, JobKeywords, mesh_settings, read_finger, read_job, read_solver
+from pinnray.observations import Observations
+from solvers.physics import Load, LoadKind, Material
+from solvers.solver import Solver
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from compare.camera.film import Film
+    from compare.runtime.tables import Cell
+    from vision.calibration.camera_calibration import Calibration
+    from vision.rig.exposure import Exposure
+    from vision.rig.motion import Motion
+
+
+def calibrate(
+    images: str | Path | Iterable[str | Path],
+    board: str,
+    *,
+    square: float,
+    marker: float | None = None,
+    dictionary: str = "5X5_100",
+    model: Literal["brown", "fisheye"] = "brown",
+    k3: bool = False,
+    out: str | Path | None = None,
+) -> "Calibration":
+    """Calibrate a camera from photographs of a chessboard, a ChArUco board or a grid of dots.
+
+    Args:
+        images: Photographs of the board, all of one size: pictures, folders, patterns, or a video.
+        board: Inner corners of a chessboard, such as "9x6", squares of a ChArUco board, "charuco:8x6", or
+            dots of a grid, "circles:7x6" or "acircles:4x11".
+        square: Side of a square, mm.
+        marker: Side of a marker of a ChArUco board, mm.
+        dictionary: ArUco dictionary of a ChArUco board.
+        model: Lens model: `brown` up to about 100 degrees of view, `fisheye` beyond.
+        k3: Whether to fit the third radial coefficient too.
+        out: Camera file, .json or .yaml, that `track` takes; nothing is written if None.
+
+    Raises:
+        UserError: If the photographs do not determine the camera.
+    """
+    from vision.calibration.camera_calibration import calibrate_camera
+    from vision.calibration.camera_file import check_format, save_calibration
+    from vision.calibration.charuco import parse_board
+    from vision.calibration.lens_fit import LensChoice
+    from vision.frames.sources import photographs
+
+    given = [images] if isinstance(images, str | Path) or not isinstance(images, Iterable) else images
+    sources = [as_path(each, "a photograph") for each in given]
+    file = None if out is None else as_path(out, "out")
+    if file is not None:
+        check_format(file)
+    chosen = parse_board(str(board), square, marker=marker, dictionary=dictionary)
+    found = calibrate_camera(photographs(sources), chosen, lens=LensChoice(model, k3))
+    if file is not None:
+        save_calibration(file, found)
+    return found
+
+
+def track(
+    source: str | Path,
+    design: str | Path | Finger = "default",
+    *,
+    camera: str | Path | None = None,
+    workspace: str | Path | None = None,
+    colour: str = "dark",
+    method: Literal["precise", "hough"] = "precise",
+    fps: float | None = None,
+    out: str | Path | None = None,
+    progress: bool | None = None,
+) -> Observations:
+    """Measure the markers of a finger in a film that shows it at rest, pressed, and held.
+
+    Args:
+        source: Video, folder or glob of pictures, or number of a camera.
+        design: The finger, in one of the ways of `mesh`.
+        camera: Camera file, as `calibrate` writes it.
+        workspace: JSON file of the fiducials; those around the design if None.
+        colour: Of the markers, as `pinnray pick` prints it.
+        method: Detection of the discs; `hough` is the paper's pipeline.
+        fps: Frames a second of pictures, which do not say it; 30 if None.
+        out: Folder for observations, tracks and pictures; nothing is kept if None.
+        progress: Whether to show the stages; if None in a notebook only.
+
+    Raises:
+        UserError: If the film does not show the finger.
+    """
+    from compare.camera.track_film import track_film
+    from compare.runtime.stages import shown_stages
+
+    film, finger = _film(source, camera, workspace, colour, method, fps), read_finger(design)
+    with (
+        TemporaryDirectory() if out is None else nullcontext(as_path(out, "out")) as folder,
+        shown_stages(progress) as stages,
+        stages.stage("track") as report,
+    ):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        _, found = track_film(film, finger, Path(folder), report, video=out is not None)
+    return Observations.of(found)
+
+
+def film_forces(
+    source: str | Path,
+    design: str | Path | Finger = "default",
+    *,
+    camera: str | Path | None = None,
+    workspace: str | Path | None = None,
+    colour: str = "dark",
+    method: Literal["precise", "hough"] = "precise",
+    fps: float | None = None,
+    material: Material | None = None,
+    progress: bool | None = None,
+    **given: Unpack[JobKeywords],
+) -> "pd.DataFrame":
+    """Estimate the indenter's force and its place in every frame of a film, from the markers.
+
+    Args:
+        source: The film; as the next arguments, see `track`.
+        design: The finger.
+        camera: Camera file.
+        workspace: JSON file of the fiducials.
+        colour: Of the markers.
+        method: Detection of the discs.
+        fps: Frames a second of pictures.
+        material: The elastic constants; if the law is the linear one, the law of finite strain that the
+            markers tell is taken. The force is in proportion to Young's modulus.
+        progress: Whether to show the stages; if None in a notebook only.
+        given: Parameters of the finger and the material, as for `solve`.
+
+    Returns:
+        A row for every frame, with time, force in N and N/mm and contact's place in mm, with 95 % intervals.
+
+    Raises:
+        UserError: If the film does not show the finger, or DOLFINx is missing.
+    """
+    import pandas as pd
+
+    from compare.camera.force_estimate import MESH, force_rows, force_tracker, forces_of
+    from compare.camera.track_film import track_film
+    from compare.runtime.stages import shown_stages
+    from geometry.cache import finger_mesh
+
+    film = _film(source, camera, workspace, colour, method, fps)
+    finger, elastic, _ = read_job(
+        design, material, None, given, besides=("material", "camera", "colour"), allowed=MATERIAL
+    )
+    with shown_stages(progress) as stages:
+        with TemporaryDirectory() as folder, stages.stage("track") as report:
+            tracking, seen = track_film(film, finger, Path(folder), report, video=False)
+        with stages.stage("mesh"):
+            mesh = finger_mesh(finger, settings=MESH)
+        with stages.stage("force") as report:
+            tracker = force_tracker(mesh, elastic, seen.points, finger.marker_radius)
+            forces = forces_of(tracking, tracker, report)
+    rows = force_rows(forces, finger.depth)
+    return pd.DataFrame([_with_nan(row) for row in rows])
+
+
+def rig(
+    design: str | Path | Finger = "default",
+    solver: str | Solver | None = None,
+    *,
+    out: str | Path,
+    frame: tuple[int, int] = (1280, 720),
+    tilt: float = 0.0,
+    turn: float = 0.0,
+    paint: Literal["dark", "red", "green", "blue"] = "dark",
+    exposure: "Exposure | None" = None,
+    motion: "Motion | None" = None,
+    boards: int = 0,
+    board: str = "9x6",
+    square: float = 8.0,
+    seed: int = 0,
+    size: float | None = None,
+    material: Material | None = None,
+    load: Load | LoadKind | None = None,
+    progress: bool | None = None,
+    **given: Unpack[JobKeywords],
+) -> Path:
+    """Film a pressed finger with a virtual camera, and write the true markers and forces beside the film.
+
+    Args:
+        design: The finger, in one of the ways of `mesh`.
+        solver: Of the filmed displacements; the finite-strain simulation of `compare` if None.
+        out: Folder for the film and its files, which is replaced.
+        frame: Width and height, pixels.
+        tilt: Angle between the optical axis and the finger's z axis, degrees, up to 30.
+        turn: Rotation of the camera about its optical axis, degrees.
+        paint: Of the markers.
+        exposure: Light, lens and sensor, as `vision.rig.exposure.Exposure`.
+        motion: Numbers of frames at rest, moving and held, as `vision.rig.motion.Motion`.
+        boards: Number of photographs of a calibration board, for `calibrate`.
+        board: Inner corners of a chessboard, such as "9x6".
+        square: Side of its squares, mm.
+        seed: Of the noise.
+        size: Largest element in walls and ribs, mm.
+        material: The elastic constants.
+        load: Motion of the indenter, or its kind alone.
+        progress: Whether to show the stages; if None in a notebook only.
+        given: Parameters of finger, material and load, as for `solve`.
+
+    Returns:
+        The video; `camera.json` and `observations_true.csv` are beside it.
+
+    Raises:
+        UserError: If the finger cannot be filmed so.
+    """
+    from compare.camera.filmed_force import filmed_course
+    from compare.camera.virtual_film import filmed_solution, write_film
+    from compare.runtime.output_folder import check_output
+    from compare.runtime.stages import shown_stages
+    from geometry.cache import finger_mesh
+    from vision.calibration.charuco import parse_board
+    from vision.rig.bench import PAINTS, Bench
+    from vision.rig.exposure import Exposure
+    from vision.rig.motion import Motion
+    from vision.rig.recording import Recording
+    from vision.rig.recording_files import FILES
+    from vision.rig.virtual_camera import default_camera, viewing_pose
+    from vision.tracking.workspace import default_workspace
+
+    folder = as_path(out, "out")
+    check_output(folder)
+    limits = {"tilt": (tilt, -30, 30), "turn": (turn, -360, 360), "boards": (boards, 0, 1000)}
+    for name, (value, low, high) in limits.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise UserError(f"{name} = {value!r}: give a number from {low} to {high}")
+    if len(frame) != 2 or not all(isinstance(each, int) and 10 <= each <= 4000 for each in frame):
+        raise UserError(f"frame = {frame!r}: give width and height in pixels, such as (1280, 720)")
+    if paint not in PAINTS:
+        raise UserError(f"paint = {paint!r}: there are {', '.join(PAINTS)}")
+    finger, elastic, moved = read_job(design, material, load, given, besides=("material", "load", "size"))
+    chosen = None if solver is None else read_solver(solver)
+    sheet, workspace, camera = parse_board(board, square), default_workspace(finger), default_camera(*frame)
+    with shown_stages(progress) as stages:
+        with stages.stage("mesh"):
+            mesh = finger_mesh(finger, settings=mesh_settings(size))
+        solution, source = filmed_solution(mesh, finger, elastic, moved, chosen, stages)
+        recording = Recording(
+            bench=Bench(mesh, finger, workspace, paint),
+            displacement=solution.displacement(mesh.at_nodes()),
+            camera=camera,
+            pose=viewing_pose(camera, workspace, tilt=tilt, turn=turn),
+            exposure=exposure or Exposure(),
+            motion=motion or Motion(),
+            seed=seed,
+            course=filmed_course(solution),
+        )
+        write_film(recording, solution, folder, stages, source=source, board=sheet, boards=boards, facts={})
+    return folder / FILES["ffv1"]
+
+
+def read_observations(
+    given: "str | Path | observations.Observations | pd.DataFrame | None", design: Finger
+) -> observations.Observations | None:
+    """Observations of a finger, from a data frame, a CSV file, or a film."""
+    if given is None or isinstance(given, observations.Observations):
+        return given
+    if not isinstance(given, str | Path):
+        return Observations.from_dataframe(given, marker_radius=design.marker_radius)
+    if Path(given).suffix.lower() != ".csv":
+        return track(given, design)
+    return Observations.from_csv(given, marker_radius=design.marker_radius)
+
+
+def _with_nan(row: "dict[str, Cell]") -> "dict[str, Cell]":
+    """A row of a file with nan in place of empty cells, but for its remark."""
+    return {name: float("nan") if cell == "" and name != "remark" else cell for name, cell in row.items()}
+
+
+def _film(
+    source: object,
+    camera: str | Path | None,
+    workspace: str | Path | None,
+    colour: str,
+    method: Literal["precise", "hough"],
+    fps: float | None,
+) -> "Film":
+    from compare.camera.film import Film
+
+    if method not in ("precise", "hough"):
+        raise UserError(f"method = {method!r}: there are precise, hough")
+    return Film(
+        str(source),
+        camera=None if camera is None else as_path(camera, "the camera"),
+        workspace=None if workspace is None else as_path(workspace, "the workspace"),
+        colour=colour,
+        method=method,
+        fps=fps,
+    )

@@ -1,0 +1,467 @@
+"""What a user types first: keywords, defaults, one-line reprs, messages that suggest the right word."""
+
+import ast
+import subprocess
+import sys
+import typing
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any, get_args
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import pinnray as pr
+from compare.figures.fields import VIEWED
+from geometry.finger.keywords import FingerKeywords
+from geometry.finger.parameters import Parameters
+from geometry.mesh.settings import MeshSettings
+from pinnray.arguments import LOAD, MATERIAL, JobKeywords, MeshKeywords, PhysicsKeywords
+from pinnray.solution import Quantity
+from solvers.physics import Physics
+from studies.sweep.quantities import forces
+
+ROOT = Path(__file__).parents[2]
+COARSE = {"size": 2.0}
+SHORT = [[20.0, -1.0], [50.0, -1.0]], [[-1.0, -3.0], [-1.5, -8.5]]
+
+
+@pytest.fixture(scope="module")
+def solved() -> pr.Solution:
+    return pr.solve("default", "fem", **COARSE)
+
+
+@pytest.fixture(scope="module")
+def compared() -> pr.Comparison:
+    return pr.compare("default", "fem", **COARSE)
+
+
+# --- what is there ---
+
+
+def test_dir_lists_what_is_loaded_on_first_use_and_nothing_else():
+    code = "import pinnray as pr; print([*dir(pr)] == [*pr.__all__], 'sweep' in dir(pr))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "True"]
+
+
+def test_the_reference_lists_every_name():
+    pages = (ROOT / "docs" / "reference" / "python").glob("*.md")
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    assert [name for name in pr.__all__ if f"`{name}`" not in text and f".{name}\n" not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "model", "names"),
+    [
+        (FingerKeywords, Parameters, list(Parameters.model_fields)),
+        (PhysicsKeywords, Physics, [*MATERIAL, *LOAD]),
+        (MeshKeywords, MeshSettings, list(MeshSettings.model_fields)),
+    ],
+)
+def test_typed_keywords_are_the_parameters_with_their_types(words: Any, model: Any, names: list[str]):
+    hints = typing.get_type_hints(words)
+    assert [name for name in names if hints[name] != model.model_fields[name].annotation] == []
+    known = {*names, "E", "nu"} | (set(Parameters.model_fields) if words is MeshKeywords else set())
+    assert hints.keys() <= known
+
+
+def test_a_type_checker_knows_the_keywords(tmp_path: Path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import pinnray as pr\n"
+        "pr.solve('default', rib_count=6, young=5, stroke=8)\n"
+        "pr.Material(E=3, nu=0.4)\n"
+        "pr.Load('cylinder', stroke=5)\n"
+        "pr.Observations([[1, 2]], [[3, 4]])\n"
+        "pr.Design(rib_cuont=6)  # wrong\n"
+        "pr.solve('default', rib_cuont=6)  # wrong\n"
+        "pr.Load('cilinder')  # wrong\n"
+    )
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "mypy",
+            "--strict",
+            "--config-file",
+            str(ROOT / "pyproject.toml"),
+            str(script),
+        ],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    assert [line.split(":")[1] for line in done.stdout.splitlines() if ": error:" in line] == ["6", "7", "8"]
+
+
+# --- the words are understood ---
+
+
+def test_finger_material_and_travel_are_keywords_of_solve():
+    found = pr.solve("default", rib_count=6, young=5, stroke=8, **COARSE)
+    material, load = pr.Material(young=5), pr.Load(displacement=(0.0, -8.0))
+    design = pr.load_design("default", {"rib_count": 6})
+    other = pr.solve(design, "fem", material=material, load=load, **COARSE)
+    assert found.solver == "fem"
+    assert found.problem.digest == other.problem.digest
+    assert found.energy == pytest.approx(other.energy, rel=1e-12)
+
+
+def test_a_preset_alone_means_the_network_that_has_it(monkeypatch: pytest.MonkeyPatch):
+    from pinnray import functions
+
+    made = []
+    monkeypatch.setattr(functions, "solved", lambda solver, *_: made.append(solver) or pytest.skip.Exception)
+    with pytest.raises(AttributeError):  # of what stands for the solution of a training of minutes
+        pr.solve("default", preset="trained", **COARSE)
+    assert (made[0].name, made[0].settings()["preset"]) == ("pinn-std", "trained")
+
+
+def test_a_design_is_changed_by_keywords_or_a_dictionary():
+    assert pr.load_design("default", rib_count=6) == pr.load_design("default", {"N": 6})
+    assert pr.mesh(rib_count=6, **COARSE).digest == pr.mesh(pr.Design(rib_count=6), **COARSE).digest
+    with pytest.raises(pr.UserError, match=r"rib_count .N. is given twice"):
+        pr.load_design("default", {"rib_count": 6}, rib_count=5)
+
+
+@pytest.mark.parametrize(
+    ("short", "full"),
+    [
+        (lambda: pr.Load(stroke=5), lambda: pr.Load(displacement=(0.0, -5.0))),
+        (lambda: pr.Load("cylinder"), lambda: pr.Load(kind="cylinder", radius=5.0)),
+        (lambda: pr.Load("patch", slide=True), lambda: pr.Load(kind="patch", displacement=(None, -10.0))),
+        (lambda: pr.Material(E=3, nu=0.4), lambda: pr.Material(young=3, poisson=0.4)),
+        (lambda: pr.Load("cylinder", stroke=4, direction=30), lambda: physics("cylinder", 4.0, 30.0)),
+    ],
+)
+def test_the_short_way_is_the_long_one(short: Callable[[], object], full: Callable[[], object]):
+    assert short() == full()
+
+
+def physics(load: str, stroke: float, direction: float) -> pr.Load:
+    return Physics(load=load, stroke=stroke, direction=direction).parts[1]
+
+
+def test_observations_need_points_and_displacements_only(tmp_path: Path):
+    given = pr.Observations(*SHORT)
+    assert given.visible.all()
+    assert not given.standard_deviations.any()
+    assert (pr.Observations(*SHORT, 0.02).standard_deviations == 0.02).all()
+    file = tmp_path / "markers.csv"
+    file.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,-1,-3\n50,-1,-1.5,-8.5\n")
+    read, framed = pr.Observations.from_csv(file), pr.Observations.from_dataframe(pd.read_csv(file))
+    for other in (read, framed):
+        assert (other.points == given.points).all()
+        assert (other.displacements == given.displacements).all()
+        assert other.marker_radius == given.marker_radius == pr.Design().marker_radius
+
+
+def test_a_data_frame_goes_through_no_file(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(pd.DataFrame, "to_csv", None)
+    frame = pd.DataFrame({"x_mm": [20.1], "y_mm": [-1], "u_mm": [1 / 3], "v_mm": [-3], "visible": [True]})
+    assert pr.Observations.from_dataframe(frame).displacements[0, 0] == 1 / 3
+
+
+# --- a solution ---
+
+
+def test_a_point_has_a_displacement_and_a_state(solved: pr.Solution):
+    alone, several = solved.displacement([35, 0]), solved.displacement([[35, 0], [36, 0]])
+    assert alone.shape == (2,)
+    assert (alone == several[0]).all()
+    assert solved.displacement(np.array([35.0, 0.0])).tolist() == alone.tolist()
+    assert solved.state([35, 0]).von_mises == solved.state([[35, 0]]).von_mises[0]
+    assert solved.gradient((35, 0)).shape == (2, 2)
+
+
+def test_markers_stress_and_force_of_a_solution(solved: pr.Solution):
+    markers = solved.problem.mesh.markers
+    assert (solved.at_markers() == solved.displacement(markers)).all()
+    assert solved.von_mises.shape == (len(solved.problem.mesh.triangles),)
+    assert solved.force == pytest.approx(-20.0 * solved.reaction[1])  # N/mm over a depth of 20 mm
+    assert solved.force == forces(solved, solved.depth)["force"]
+    assert "N over a depth of 20 mm" in solved._repr_html_()
+
+
+def test_the_markers_of_observations_are_those_of_the_solution():
+    found = pr.solve("default", "fem-asm", measurements=pr.Observations(*SHORT), **COARSE)
+    assert found.at_markers().shape == (2, 2)
+
+
+def test_a_solution_is_a_table(solved: pr.Solution, compared: pr.Comparison):
+    table, mesh = solved.to_dataframe(), solved.problem.mesh
+    assert len(table) == len(mesh.triangles)
+    assert table["area_mm2"].sum() == pytest.approx(mesh.areas.sum())
+    assert table["von_mises_MPa"].tolist() == solved.von_mises.tolist()
+    assert (table["energy_density_MPa"] * table["area_mm2"]).sum() == pytest.approx(solved.energy, rel=1e-3)
+    markers = solved.to_dataframe("markers")
+    assert list(markers) == ["x_mm", "y_mm", "u_mm", "v_mm"]
+    assert (pr.Observations.from_dataframe(markers).displacements == solved.at_markers()).all()
+    assert len(solved.to_dataframe("nodes")) == len(mesh.points)
+
+
+def test_a_solution_is_a_file_and_a_grid(solved: pr.Solution, tmp_path: Path):
+    import pyvista
+
+    written, grid = pyvista.read(solved.save(tmp_path / "x.vtu")), solved.to_pyvista()
+    assert written.cell_data["von_mises_MPa"].tolist() == grid.cell_data["von_mises_MPa"].tolist()
+    assert len(pd.read_csv(solved.save(str(tmp_path / "x.csv")))) == grid.n_cells
+    with pytest.raises(pr.UserError, match=r"x.stl: give a name that ends in .vtu"):
+        solved.save(tmp_path / "x.stl")
+
+
+def test_a_solution_is_shown_deformed(solved: pr.Solution, monkeypatch: pytest.MonkeyPatch):
+    import pyvista
+
+    def plot(grid: pyvista.UnstructuredGrid, **options: object) -> object:
+        return grid.points, options
+
+    monkeypatch.setattr(pyvista.UnstructuredGrid, "plot", plot)
+    points, options = solved.show(jupyter_backend="static")
+    assert options["scalars"] == "von_mises_MPa"
+    moved = solved.problem.mesh.points + solved.to_dataframe("nodes")[["u_mm", "v_mm"]].to_numpy()
+    assert np.allclose(points[:, :2], moved)
+    with pytest.raises(pr.UserError, match="there is no field 'stress'"):
+        solved.show("stress")
+
+
+@pytest.mark.parametrize("quantity", get_args(Quantity))
+def test_every_quantity_of_the_viewer_is_plotted(solved: pr.Solution, quantity: Quantity):
+    assert [each.name for each in VIEWED] == list(get_args(Quantity))
+    drawn = solved.plot(quantity)
+    low, high = drawn.axes[1].get_xlim()
+    signed = next(each.signed for each in VIEWED if each.name == quantity)
+    assert low == (-high if signed else 0)
+    assert high > 0
+
+
+def test_the_solution_of_a_solver_of_ones_own_gets_these_too():
+    problem = pr.Problem(pr.mesh(**COARSE))
+    assert pr.Solution.of(pr.solver("fem").solve(problem)).von_mises.max() > 0
+
+
+def test_every_object_is_one_short_line(solved: pr.Solution, compared: pr.Comparison, tmp_path: Path):
+    shown = [
+        *(solved, solved.problem, solved.problem.mesh, solved.state([[35, 0]]), solved.error, solved.status),
+        *(compared, compared["fem"], compared.observations, compared.mesh.locate([[35, 0]])),
+        *(pr.Design(), pr.Design().section, pr.Material(), pr.Load(), pr.solver("pinn-std"), MeshSettings()),
+        pr.crossval("default", "fem", out=tmp_path / "cv", schemes="one-out", seeds=1, **COARSE),
+    ]
+    lines = {type(each).__name__: repr(each) for each in shown}
+    long = {name: line for name, line in lines.items() if "\n" in line or len(line) > 250}
+    assert long == {}
+    assert repr(solved).startswith("Solution('fem', converged; load mean (0.0, -10.0) mm, force 4.")
+
+
+def test_the_repr_of_a_design_makes_it_again():
+    design = pr.load_design("slender", rib_count=3)
+    assert eval(repr(design), {"Design": pr.Design}) == design
+
+
+# --- studies ---
+
+
+def test_a_dictionary_is_swept(tmp_path: Path):
+    found = pr.sweep({"front_thickness": [1.2, 1.8]}, young=5, processes=1, **COARSE)
+    assert found["front_thickness_mm"].tolist() == [1.2, 1.8]
+    assert found["force_N"].is_monotonic_increasing
+    assert set(found["state"]) == {"done"}  # though the usual markers do not fit into 1.2 mm
+    once = pr.solve("default", front_thickness=1.8, young=5, **COARSE)
+    assert found["force_N"][1] == pytest.approx(once.force, rel=1e-9)
+
+
+def test_ranges_are_sampled_and_a_design_may_be_an_object():
+    ends = {"E": {"from": 3.0, "to": 5.0}}
+    found = pr.sweep(ends, design=pr.Design(rib_count=3), samples=2, processes=1, **COARSE)
+    assert found["young_MPa"].between(3, 5).all()
+    assert (found["force_N"] / found["young_MPa"]).std() < 1e-9
+
+
+# --- what the camera sees ---
+
+
+def test_the_rig_films_what_is_calibrated_tracked_and_weighed(tmp_path: Path):
+    motion, out = pr.Motion(rest=2, moving=1, held=2), tmp_path / "film"
+    film = pr.rig(
+        out=out, stroke=4, motion=motion, frame=(640, 360), boards=6, square=20.0, rib_count=2, size=1.0
+    )
+    camera = pr.calibrate(out / "boards", "9x6", square=20.0, out=tmp_path / "camera.json")
+    assert camera.rms < 1.0
+    seen = pr.track(film, pr.Design(rib_count=2), camera=out / "camera.json")
+    true = pr.Observations.from_csv(out / "observations_true.csv")
+    assert np.abs(seen.displacements - true.displacements).max() < 0.2
+    forces = pr.film_forces(film, rib_count=2, camera=out / "camera.json")
+    expected = pd.read_csv(out / "truth_force.csv")["force_N"]
+    assert forces["force_N"].iloc[-1] == pytest.approx(expected.iloc[-1], rel=0.3)
+
+
+# --- progress ---
+
+
+class Shown:
+    """Stands for the module `IPython.display`."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def display(self, text: str, *, display_id: bool) -> SimpleNamespace:
+        self.texts.append(text)
+        return SimpleNamespace(update=self.texts.append)
+
+
+def test_a_notebook_shows_the_progress_in_one_line(monkeypatch: pytest.MonkeyPatch):
+    from rich.console import Console
+
+    from compare.runtime.stages import NotebookLine, shown_stages
+
+    shown, module = Shown(), ModuleType("IPython.display")
+    module.__dict__.update(display=shown.display, Pretty=str)
+    monkeypatch.setitem(sys.modules, "IPython", ModuleType("IPython"))
+    monkeypatch.setitem(sys.modules, "IPython.display", module)
+    monkeypatch.setattr(Console, "is_jupyter", True, raising=False)
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setattr(NotebookLine, "EVERY", 0.0)
+    with shown_stages(None) as stages, stages.stage("fem") as report:
+        report(0.5, "half way")
+    assert shown.texts[:2] == ["fem", "fem: 50% half way"]
+    assert shown.texts[-1].startswith("fem 0.")
+    with shown_stages(False) as stages, stages.stage("gp"):
+        pass
+    assert "gp" not in "".join(shown.texts)
+
+
+def test_outside_a_notebook_nothing_is_shown_unless_asked(capfd: pytest.CaptureFixture[str]):
+    pr.solve("default", **COARSE)
+    assert capfd.readouterr() == ("", "")
+    pr.solve("default", progress=True, **COARSE)
+    assert "fem: " in capfd.readouterr().err
+
+
+# --- messages ---
+
+
+def test_a_solver_that_is_to_fit_markers_says_what_it_does_without():
+    said = r"fem-asm fits markers, and no measurements were given: .* this is fem"
+    with pytest.warns(UserWarning, match=said):
+        pr.solve("default", "fem-asm", **COARSE)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pr.solve("default", "fem", **COARSE)
+
+
+def test_a_thin_wall_has_smaller_markers_and_says_so():
+    thin = pr.load_design("default", front_thickness=1.0)
+    assert thin.marker_diameter == pytest.approx(0.8)
+    assert ("Diameter of a marker", "", "0.8 mm, as the usual 1.6 mm do not fit") in thin.facts()
+    assert "the usual 1.6 mm do not fit" in thin._repr_html_()
+    assert thin.replaced(front_thickness=2.0).marker_diameter == 1.6
+    assert pr.Design().small_markers == pr.load_design("slender").small_markers == ""
+    assert pr.Design().digest == "0dde50692e7380cf9eeec686dc391289ae5b0969cfcecdac632f340ffe975f0b"
+    assert pr.Design(back_thickness=0.5).marker_diameter == pytest.approx(0.3)
+
+
+def cavity_marker() -> object:
+    return pr.solve("default", "fem-asm", measurements=pr.Observations([[30, -8]], [[0, -5]]), **COARSE)
+
+
+def larger_finger() -> object:
+    markers = pr.load_design("slender").markers
+    return pr.solve("default", "fem-asm", measurements=pr.Observations(markers, 0 * markers), **COARSE)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: pr.Design(ribs=6), "unknown parameter 'ribs'; did you mean rib_count .N."),
+        (lambda: pr.solve(ribs=6), "did you mean rib_count"),
+        (lambda: pr.solve(E=5, young=5), "young .E. is given twice, by its name and by its symbol"),
+        (lambda: pr.Material(modulus=6), "did you mean young .E."),
+        (lambda: pr.Load(strok=5), "did you mean stroke"),
+        (lambda: pr.Load(stroke=5, displacement=(0, -5)), "stroke and displacement both say how far"),
+        (lambda: pr.Load(stroke="deep"), "stroke = 'deep' is not a finite number"),
+        (lambda: pr.solve(mesh_size=1), "did you mean size"),
+        (lambda: pr.mesh(stroke=8), "unknown parameter 'stroke'"),  # no mesh depends on it
+        (lambda: pr.solver("FEM"), "did you mean 'fem'"),
+        (lambda: pr.solver("fem_nonlinear"), "did you mean 'fem-nonlinear'"),
+        (lambda: pr.solver("pinn"), "did you mean 'pinn-std' or 'pinn-asm' or 'pinn-id'"),
+        (lambda: pr.solver(), "no solver was named .there are: fem, fem-nonlinear, "),
+        (lambda: pr.solver("fem", preset="fast"), "fem has no presets; pinn-std and pinn-asm have"),
+        (
+            lambda: pr.solve(preset="best"),
+            "there is no preset 'best'; pinn-std has fast, local, ",
+        ),
+        (lambda: pr.solve(material=3), "material must be a Material, such as .*, not 3"),
+        (lambda: pr.solve(load=3), "load must be a Load or one of mean, point, patch, cylinder, not 3"),
+        (lambda: pr.solve(load=pr.Load(), stroke=3), "stroke is part of the load that is given"),
+        (lambda: pr.solve(material=pr.Material(), E=3), "young is part of the material that is given"),
+        (lambda: pr.Problem(3), "mesh must be a TriangleMesh, not 3"),
+        (lambda: pr.load_design(3), "3 is no design; give the name of a preset"),
+        (lambda: pr.load_design("default", 3), "a dictionary such as"),
+        (lambda: pr.load_drawing(None), "the drawing is None; give a path"),
+        (lambda: pr.compare(solvers=3), "3 is no solver"),
+        (lambda: pr.compare(solvers="fem", adapt="fine"), "adapt = 'fine' is no number"),
+        (lambda: pr.compare(solvers="fem", out=3), "out is 3; give a path"),
+        (
+            lambda: pr.crossval(solvers="fem", out="x", seedz=2),
+            "'seedz'; did you mean seeds",
+        ),
+        (lambda: pr.sweep(3), "give a dictionary such as .* not 3"),
+        (lambda: pr.sweep({"rib_count": 4}), "rib_count: give a list of values, such as"),
+        (lambda: pr.sweep({"ribs": [4, 6]}), "unknown parameter 'ribs'; did you mean rib_count"),
+        (lambda: pr.sweep({"rib_count": [4]}, ribs=6), "unknown parameter 'ribs'; did you mean rib_count"),
+        (lambda: pr.predict("x", 3), "the fingers are dictionaries"),
+        (lambda: pr.predict(3, []), "the sweep is 3; give a path"),
+        (lambda: pr.optimise(3), "the question is 3; give a path"),
+        (lambda: pr.track("film.mkv", method="eyes"), "method = 'eyes': there are precise, hough"),
+        (lambda: pr.rig(out="x", tilt=60), "tilt = 60: give a number from -30 to 30"),
+        (lambda: pr.calibrate(3, "9x6", square=20), "a photograph is 3; give a path"),
+        (lambda: pr.Observations([[1, 2]], [[1, 2, 3]]), "displacements must have shape"),
+        (lambda: pr.Observations("a", "b"), "points holds something that is no number"),
+        (lambda: pr.Observations.from_csv(3), "the measurements is 3; give a path"),
+        (cavity_marker, "it is in a cavity, as a marker of another design would be"),
+    ],
+)
+def test_a_wrong_value_is_one_line_of_ours(call: Callable[[], object], said: str):
+    with pytest.raises(pr.UserError, match=said) as refused:
+        call()
+    assert "\n" not in str(refused.value)
+    assert "--" not in str(refused.value)
+
+
+@pytest.mark.parametrize("call", [cavity_marker, larger_finger])
+def test_markers_of_another_finger_are_not_taken_for_another_unit(call: Callable[[], object]):
+    with pytest.raises(pr.UserError, match="not of this finger") as refused:
+        call()
+    assert "micrometres" not in str(refused.value)
+
+
+def test_a_report_or_a_plot_of_nothing_is_one_line(compared: pr.Comparison, solved: pr.Solution):
+    for call, said in (
+        (lambda: compared.report(3), "the report is 3; give a path"),
+        (lambda: solved.plot("stress"), "there is no field 'stress' to plot"),
+        (lambda: solved.plot(scale="large"), "scale = 'large' is not a finite number"),
+        (lambda: solved.to_dataframe("corners"), "there are triangles, nodes, markers"),
+    ):
+        with pytest.raises(pr.UserError, match=said):
+            call()
+
+
+def test_no_function_of_the_front_door_names_an_option_of_the_command_line():
+    found = []
+    for path in (ROOT / "pinnray").glob("*.py"):
+        texts = (node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        found += [
+            f"{path.name}:{node.lineno}"
+            for node in texts
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and "--" in node.value
+        ]
+    assert found == []
+
+
+def test_every_word_of_a_job_is_known_to_editors():
+    assert {*typing.get_type_hints(JobKeywords)} == {*Parameters.model_fields, *MATERIAL, *LOAD, "E", "nu"}
