@@ -36,7 +36,7 @@ def test_settings_are_converted_from_text():
         ("pinn-std", {"neurons": 1.5}, "pinn-std: neurons = 1.5: "),
         ("pinn-std", {"preset": "quick"}, "pinn-std has no preset 'quick'; it has fast, local, paper"),
         ("pinn-std", {"preset": "paper", "units": 9}, "pinn-std has no setting 'units'; it has epochs, "),
-        ("fem", {"preset": "paper"}, "fem has no setting 'preset'; it has degree"),
+        ("fem", {"preset": "paper"}, "fem has no presets; pinn-std and pinn-asm have"),
     ],
 )
 def test_mistakes_are_one_line(name, settings, message, plugin_folder, monkeypatch):
