@@ -21,8 +21,8 @@ from geometry.finger.parameters import Parameters
 from geometry.mesh.settings import MeshSettings
 from pinnray.arguments import LOAD, MATERIAL, JobKeywords, MeshKeywords, PhysicsKeywords
 from pinnray.solution import Quantity
+from solvers.finger_figures import figures_of
 from solvers.physics import Physics
-from studies.sweep.quantities import forces
 
 ROOT = Path(__file__).parents[2]
 COARSE = {"size": 2.0}
@@ -184,7 +184,7 @@ def test_markers_stress_and_force_of_a_solution(solved: pr.Solution):
     assert (solved.at_markers() == solved.displacement(markers)).all()
     assert solved.von_mises.shape == (len(solved.problem.mesh.triangles),)
     assert solved.force == pytest.approx(-20.0 * solved.reaction[1])  # N/mm over a depth of 20 mm
-    assert solved.force == forces(solved, solved.depth)["force"]
+    assert solved.force == figures_of(solved).force  # defined alike
     assert "N over a depth of 20 mm" in solved._repr_html_()
 
 
