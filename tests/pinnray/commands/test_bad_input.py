@@ -66,7 +66,7 @@ BAD = [
     ("compare --frobnicate", "Unknown option: --frobnicate"),
     (
         "frobnicate",
-        "Unknown command .* commands: compare, report, design, mesh, solve, sweep, predict, optimise, ",
+        "Unknown command .* commands: compare, report, design, mesh, material, solve, ",
     ),
     ("compare slender", "'slender' belongs to no option"),  # forgot --design
     ("compare --seed", "--seed requires an argument"),
