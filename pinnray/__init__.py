@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pinnray.functions import solver as solver
     from pinnray.observations import Observations as Observations
     from pinnray.solution import Solution as Solution
+    from solvers.materials.presets import MATERIALS as MATERIALS
     from solvers.physics import Load as Load
     from solvers.physics import Material as Material
     from solvers.problem import Problem as Problem

@@ -16,6 +16,7 @@ from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
 from geometry.text_files import as_path
 from solvers.elasticity import LawName
+from solvers.materials.presets import preset
 from solvers.physics import Load, LoadKind, Material, Physics
 from solvers.registry import PRESETS, make_solver, unknown_solver
 from solvers.solver import Solver
@@ -60,7 +61,7 @@ LOAD = tuple(name for name in Physics.model_fields if name not in (*MATERIAL, "l
 
 def read_job(
     design: object,
-    material: Material | None,
+    material: Material | str | None,
     load: Load | LoadKind | None,
     given: Mapping[str, Any],
     besides: Sequence[str] = (),
@@ -70,7 +71,7 @@ def read_job(
 
     Args:
         design: A finger, the name of a preset, or a file.
-        material: The elastic constants, if they are not among the words.
+        material: The elastic constants, if they are not among the words, or the name of a known material.
         load: The load, or its kind if its numbers are among the words.
         given: Words of `JobKeywords`.
         besides: Further words of the function, for the message on an unknown one.
@@ -90,6 +91,8 @@ def read_job(
         raise UserError(f"{next(iter(constants))} is part of the material that is given; change it there")
     if words and isinstance(load, Load):
         raise UserError(f"{next(iter(words))} is part of the load that is given; change it there")
+    if isinstance(material, str):
+        material = preset(material).material
     if material is not None and not isinstance(material, Material):
         raise UserError(f"material must be a Material, such as pr.Material(young=5), not {material!r}")
     if not isinstance(load, Load):

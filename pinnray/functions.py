@@ -91,7 +91,7 @@ def solve(
     *,
     preset: str | None = None,
     size: float | None = None,
-    material: Material | None = None,
+    material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
     progress: bool | None = None,
@@ -109,7 +109,8 @@ def solve(
             preset `pinn-std`.
         preset: Of a network: `fast`, `local`, `paper` or `trained`.
         size: Largest element in walls and ribs, mm; as the next arguments, for a design only.
-        material: The elastic constants, unless `young` and others are given.
+        material: The elastic constants, unless `young` and others are given, or a name of
+            `pr.MATERIALS`.
         load: Motion of the indenter, or its kind alone.
         measurements: Marker displacements, for a solver that assimilates them.
         progress: Whether to show the stages; if None in a notebook only.
@@ -161,7 +162,7 @@ def compare(
     truth: str = "sliding",
     size: float | None = None,
     adapt: float | None = None,
-    material: Material | None = None,
+    material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     reference: str | None = None,
     out: str | Path | None = None,
@@ -229,7 +230,7 @@ def crossval(
     out: str | Path,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
     size: float | None = None,
-    material: Material | None = None,
+    material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     progress: bool | None = None,
     **study: Any,

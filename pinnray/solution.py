@@ -11,6 +11,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.text_files import as_path
 from solvers import solution
+from solvers.finger_figures import FingerFigures, figures_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +38,15 @@ class Solution(solution.Solution):
     def von_mises(self) -> FloatArray:
         """Von Mises stress, mean over each triangle of the mesh, shape (t,), MPa; at points: see `state`."""
         return self._fields.per_triangle(self._fields.von_mises)
+
+    @cached_property
+    def figures(self) -> FingerFigures:
+        """What the finger does: force in N, tip, wrap, compliance, stress with its place, energy, mass, wall.
+
+        Raises:
+            UserError: If the problem is of a body without a depth.
+        """
+        return figures_of(self)
 
     def plot(self, quantity: Quantity = "displacement", *, scale: float = 1.0) -> "Figure":
         """A field on the deformed mesh, as a matplotlib figure that a notebook shows.

@@ -146,8 +146,10 @@ class PhysicsOptions:
     """Material and load.
 
     Attributes:
-        young: Young's modulus, MPa.
-        poisson: Poisson's ratio.
+        material: Name of a filament or silicone, whose modulus and Poisson's ratio are taken unless they are
+            given; `pinnray material` lists them. Default: none.
+        young: Young's modulus, MPa, default 11.4.
+        poisson: Poisson's ratio, default 0.45.
         plane: Plane strain, or plane stress as in the paper.
         law: Material law of the solvers that have it; default: each solver's own.
         load: Indenter. mean (default): prescribed weighted mean displacement of the contact; point: one
@@ -160,8 +162,9 @@ class PhysicsOptions:
         slide: Let the contact slide along the finger (u free).
     """
 
-    young: float = 11.4
-    poisson: float = 0.45
+    material: str | None = None
+    young: float | None = None
+    poisson: float | None = None
     plane: Literal["strain", "stress"] = "strain"
     law: LawName | None = None
     load: LoadKind | None = None
@@ -178,6 +181,13 @@ class PhysicsOptions:
     def values(self, preset: str | None = None) -> dict[str, Any]:
         """Material and load by the names of a study."""
         given = {**asdict(self), "load": self.load or job_defaults(preset).load}
+        if (name := given.pop("material")) is not None:
+            from solvers.materials.presets import preset as material_preset
+
+            known = material_preset(name).material
+            for constant in ("young", "poisson"):
+                if given[constant] is None:
+                    given[constant] = getattr(known, constant)
         return {name: value for name, value in given.items() if value is not None}
 
     def check_law(self, solvers: Sequence[Solver]) -> None:

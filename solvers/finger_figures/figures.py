@@ -112,7 +112,9 @@ class FingerFigures:
         """
         travels, forces = np.array(self.curve).T
         if not 0 <= stroke <= travels[-1] * (1 + 1e-9):
-            raise UserError(f"the force is known from 0 to {travels[-1]:.4g} mm, not at {stroke:g} mm")
+            raise UserError(
+                f"the force is known from 0 to {travels[-1]:.4g} mm, not at {stroke:g} mm; change the stroke"
+            )
         if len(travels) == 1 and not np.isclose(stroke, travels[-1]):
             raise UserError(
                 f"the force is known at {travels[-1]:.4g} mm only; fem and fem-nonlinear know the way there"

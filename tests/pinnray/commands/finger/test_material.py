@@ -2,6 +2,7 @@
 
 import pytest
 
+import pinnray as pr
 from pinnray.cli import main
 from solvers.materials import MATERIALS
 
@@ -43,3 +44,43 @@ def test_bad_input_is_one_line(tmp_path, capsys, arguments, said):
     err = capsys.readouterr().err
     assert said in err
     assert len(err.splitlines()) == 1
+
+
+def test_a_known_material_gives_modulus_and_ratio_unless_they_are_given(tmp_path, capsys):
+    """Force is in proportion to the modulus, for one ratio."""
+    forces = {}
+    arguments = {
+        "sheet": ["--material", "tpu-85a"],
+        "own modulus": ["--material", "tpu-85a", "--young", "24"],
+        "by hand": ["--young", "12", "--poisson", "0.45"],
+    }
+    for name, chosen in arguments.items():
+        out = str(tmp_path / "fields.vtu")
+        assert main(["solve", "fem", "--mesh-size", "2", "--strokes", "4", "--out", out, *chosen]) == 0
+        lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("grip force")]
+        at_four, whole = (float(line.split()[2]) for line in lines)
+        assert at_four == pytest.approx(0.4 * whole, rel=1e-3)
+        forces[name] = whole
+    assert forces["sheet"] == pytest.approx(forces["by hand"])
+    assert forces["own modulus"] == pytest.approx(2 * forces["sheet"], rel=1e-3)
+    assert main(["solve", "fem", "--material", "rubber"]) == 2
+    assert "there is no material 'rubber'; there are tpu-85a" in capsys.readouterr().err
+
+
+def test_strokes_beyond_the_load_or_no_numbers_are_one_line(tmp_path, capsys):
+    for strokes, said in (
+        ("12", "known from 0 to 10 mm, not at 12 mm"),
+        ("4,x", "--strokes x: give lengths"),
+    ):
+        arguments = ["--mesh-size", "2", "--strokes", strokes, "--out", str(tmp_path / "f.vtu")]
+        assert main(["solve", "fem", *arguments]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_a_material_is_named_in_python_too():
+    solution = pr.solve("default", material="dragon-skin-30", size=2.0)
+    assert solution.problem.material.young == pr.MATERIALS["dragon-skin-30"].material.young
+    assert solution.figures.force == pytest.approx(solution.force)
+    assert solution.figures.force_at(5.0) == pytest.approx(solution.force / 2)
+    with pytest.raises(pr.UserError, match="no material 'rubber'"):
+        pr.solve("default", material="rubber", size=2.0)
