@@ -17,6 +17,9 @@ from unicodedata import category
 
 from geometry.processes import leave_signals_alone
 
+_signals: list[int] = []
+"""The signals that asked this program to end."""
+
 BAD_INPUT, NOT_CONVERGED, INTERRUPTED, UNREAD = 2, 3, 130, 141
 
 
@@ -50,8 +53,28 @@ def ending_at_once() -> Iterator[None]:
 def interruptible() -> Iterator[None]:
     """Raise KeyboardInterrupt in the block for every signal that asks the program to end."""
     leave_signals_alone(os.environ)
-    with _handled(signal.default_int_handler):
+    _signals.clear()
+
+    def end(number: int, frame: FrameType | None) -> NoReturn:
+        _signals.append(number)
+        raise KeyboardInterrupt
+
+    with _handled(end):
         yield
+
+
+@contextmanager
+def errors_of_interruption() -> Iterator[None]:
+    """Raise KeyboardInterrupt for any error of the block after a signal that asks the program to end.
+
+    A library that waits may turn it into an error of its own, as Dask into `release unlocked lock`.
+    """
+    try:
+        yield
+    except Exception as error:
+        if _signals:
+            raise KeyboardInterrupt from error
+        raise
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from typing import Any, TextIO
 import pydantic
 from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 
-from compare.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, say
+from compare.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
 from geometry.errors import UserError
 
 EXIT_CODES = (
@@ -76,7 +76,8 @@ def _with_messages(command: Callable[[], Any]) -> int:
         warnings.showwarning = lambda message, *_, **__: say(f"warning: {message}")
         try:
             try:
-                return int(command() or 0)
+                with errors_of_interruption():
+                    return int(command() or 0)
             finally:
                 _flush(sys.stdout)
         except UnusedCliTokensError as error:

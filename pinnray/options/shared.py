@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from compare.runtime.exits import say
+from compare.runtime.exits import errors_of_interruption, say
 from compare.runtime.provenance import cores
 from geometry.cache import drawn_finger
 from geometry.drawing.description import description_beside, load_description
@@ -304,7 +304,8 @@ class StudyOptions:
 def going_on_from(folder: Path) -> Iterator[None]:
     """Tell who interrupts the work inside that the same command goes on from what a folder keeps."""
     try:
-        yield
+        with errors_of_interruption():
+            yield
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {folder} keeps") from None
 

@@ -19,8 +19,8 @@ from studies.emulator.inputs import Inputs, Numbers
 from studies.sweep.study import Study, Value, title
 from studies.sweep.sweep import Sweep
 
-FEWEST = 60
-"""Least number of converged samples."""
+FEWEST = 20
+"""Least number of converged samples: of fewer, no residual is exceeded with a probability of 5 %."""
 
 MOST = 4000
 """Largest number of samples that a process is fitted to: time grows with their cube."""
@@ -127,8 +127,17 @@ class Emulator:
         return Predictions(chosen, *whole.transpose(1, 2, 0))
 
 
-def fitted(sweep: Sweep, inputs: Inputs, stages: Stages | None = None, *, fewest: int = FEWEST) -> Emulator:
+def fitted(
+    sweep: Sweep,
+    inputs: Inputs,
+    stages: Stages | None = None,
+    *,
+    fewest: int = FEWEST,
+    quick: bool = False,
+) -> Emulator:
     """The emulator of a sweep's converged samples, of which it needs `fewest`.
+
+    With `quick` the intervals of few samples may be too narrow; see `GaussianProcess.fitted`.
 
     Raises:
         UserError: If there are too few of them.
@@ -154,7 +163,7 @@ def fitted(sweep: Sweep, inputs: Inputs, stages: Stages | None = None, *, fewest
     with (stages or Stages(quiet=True)).stage("emulator") as progress:
         for place, name in enumerate(left):
             progress(place / len(left), name)
-            learnt[name] = _learnt(known[name], name, numbers)
+            learnt[name] = _learnt(known[name], name, numbers, quick=quick)
         progress(1.0, f"{len(order)} samples")
     return Emulator(inputs, learnt, ratios, len(order))
 
@@ -175,13 +184,14 @@ def prediction_table(
     return pd.DataFrame(columns)
 
 
-def _learnt(values: FloatArray, name: str, numbers: Numbers) -> Learnt:
+def _learnt(values: FloatArray, name: str, numbers: Numbers, *, quick: bool) -> Learnt:
     good = np.isfinite(values)
     base = numbers.bases[name]
     positive = bool((values[good] > 0).all() and (base > 0).all())
     with np.errstate(divide="ignore", invalid="ignore"):
         wanted = np.log(values / base) if positive else (values - base) / numbers.units[name]
-    return Learnt(GaussianProcess.fitted(numbers.inputs[good], wanted[good]), positive)
+    process = GaussianProcess.fitted(numbers.inputs[good], wanted[good], quick=quick)
+    return Learnt(process, positive)
 
 
 def _predicted(learnt: Learnt, name: str, numbers: Numbers) -> FloatArray:

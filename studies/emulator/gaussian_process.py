@@ -1,7 +1,9 @@
 """Gaussian process of one quantity: lengths by scikit-learn on a part of the samples, weights from all.
 
 The intervals come from the residuals of the samples, each predicted from all others in closed form, in
-multiples of the process's own standard deviation from a few of the samples.
+multiples of the process's own standard deviation from a few of the samples. Where there are few samples, many
+lengths fit them so well that such residuals are too small: there a process that is fitted without a sample,
+lengths and all, predicts it, and the interval is equally wide everywhere.
 
 Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006: algorithm
 2.1, eq. 5.12 (leave-one-out).
@@ -22,6 +24,11 @@ LEARNERS = 400
 
 LANDMARKS = 300
 """Samples from which the standard deviation at a point is taken."""
+
+FEW = 200
+"""Samples below which they are left out in `FOLDS` parts, with a fit for each part."""
+
+FOLDS = 10
 
 LEVEL = 0.95
 """Probability of the intervals."""
@@ -47,8 +54,17 @@ class GaussianProcess:
     numbers: FloatArray
 
     @classmethod
-    def fitted(cls, inputs: FloatArray, values: FloatArray, *, learners: int = LEARNERS) -> Self:
-        """The process of samples in random order, inputs of shape (n, d) and values of shape (n,)."""
+    def fitted(
+        cls, inputs: FloatArray, values: FloatArray, *, learners: int = LEARNERS, quick: bool = False
+    ) -> Self:
+        """The process of samples in random order, inputs of shape (n, d) and values of shape (n,).
+
+        Args:
+            inputs: Of the samples.
+            values: Of the quantity.
+            learners: Samples from which the lengths are learnt.
+            quick: Whether the intervals of few samples may be too narrow.
+        """
         mean, spread = float(values.mean()), float(values.std()) or 1.0
         scaled = (values - mean) / spread
         signal, lengths, noise = _learnt(inputs[:learners], scaled[:learners])
@@ -61,12 +77,29 @@ class GaussianProcess:
         weights = solve_triangular(factor, half, lower=True, trans=1, check_finite=False)
         count = min(LANDMARKS, len(inputs) // 2)
         inner = np.linalg.inv(factor[:count, :count])
-        inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
-        residuals = np.abs(weights / np.diag(inverse))
+        if folded := len(inputs) < FEW and not quick:
+            inner = np.zeros((1, 1))  # the deviation of a few samples is no guide to where they err more
         made = cls(near, weights * spread, inner, lengths, np.array([mean, spread, noise, 1.0]))
-        ratios = np.sort(residuals[count:] * spread / made.deviation(inputs[count:]))
+        if folded:
+            ratios = cls._left_out(inputs, values) / made.deviation(inputs)
+        else:
+            inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
+            residuals = np.abs(weights / np.diag(inverse))
+            ratios = residuals[count:] * spread / made.deviation(inputs[count:])
+        ratios = np.sort(ratios)
         rank = min(int(np.ceil(LEVEL * (len(ratios) + 1))), len(ratios)) - 1
         return cls(near, made.weights, inner, lengths, np.array([mean, spread, noise, float(ratios[rank])]))
+
+    @classmethod
+    def _left_out(cls, inputs: FloatArray, values: FloatArray) -> FloatArray:
+        """Residuals of samples, each from a process that is fitted without it, shape (n,)."""
+        residuals = np.empty(len(values))
+        part = np.arange(len(values)) % FOLDS
+        for number in range(FOLDS):
+            out = part == number
+            process = cls.fitted(inputs[~out], values[~out], quick=True)
+            residuals[out] = np.abs(values[out] - process.predict(inputs[out])[0])
+        return residuals
 
     @cached_property
     def squares(self) -> FloatArray:

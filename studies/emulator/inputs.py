@@ -15,6 +15,7 @@ from geometry.finger.validation import broken_rule
 from solvers.finger_figures import QUANTITIES
 from solvers.problem import Load, Material
 from studies.emulator.frame import BeamFrame
+from studies.sweep.job import LEAST_MARKERS
 from studies.sweep.study import PHYSICS, WHOLE, Range, Study, Value, physics_of, unit_of
 
 WIDE = 1.8
@@ -60,7 +61,8 @@ class Inputs:
                 "sweep a design, or solve the drawing itself"
             )
         self.study = study
-        self.base = {name: value for name, value in base.items() if name in Parameters.model_fields}
+        own = {name: value for name, value in base.items() if name in Parameters.model_fields}
+        self.base = own | {name: least for name, least in LEAST_MARKERS.items() if name not in study.varied}
 
     def read(self, settings: Mapping[str, str]) -> dict[str, Value]:
         """A finger from texts.

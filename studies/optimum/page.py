@@ -11,25 +11,38 @@ from compare.runtime.tables import TextTable
 from geometry.atomic import write_text
 from geometry.cache import finger_mesh
 from geometry.drawing.drawn_finger import finger_from
-from geometry.errors import UserError
-from geometry.finger.design import Design
 from solvers.finger_figures import QUANTITIES, heading
 from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
 from solvers.solver import solved, with_law
+from studies.optimum.designs import COMMAND, write_designs
 from studies.optimum.pictures import draw_front, draw_front_fingers, draw_growth
 from studies.optimum.question import Question
 from studies.optimum.search import Optimum
 from studies.sweep.job import StudyJob, Task
-from studies.sweep.study import physics_of, title
+from studies.sweep.page import slow_sentence
+from studies.sweep.study import physics_of, title, unit_of
+from studies.sweep.sweep import Sweep
+from studies.sweep.tables import failure_grid
 
 PAGE = "front.html"
 
 FILES = (
-    "front.csv (the table), front/NN.toml (each finger of the table, in its order), question.json (the "
-    "question, versions and hashes), journal.sqlite (every run)"
+    "front.csv (both tables), front/NN.toml (each finger of the table, in its order), problems/NN.toml "
+    "(its whole problem), question.json (the question, versions and hashes), journal.sqlite (every run)"
 )
+
+CIRCLE = " Circle: the cylinder where it ends."
+
+SHARP = 0.2
+"""Radius of a tip below which it is called sharp, mm: half the line of a common nozzle."""
+
+AT_AN_END = 0.02
+"""Share of a range within which a value counts as at its end."""
+
+MOST_AT_ENDS = 2 / 3
+"""Share of a front's fingers at ends of a parameter's range from which it is told."""
 
 DRAWN = 6
 """Largest number of fingers that are drawn."""
@@ -41,6 +54,8 @@ def write_front(
     folder: Path,
     record: dict[str, Any],
     formats: Collection[str] = (),
+    *,
+    command: str = COMMAND,
 ) -> tuple[list[Path], list[Path]]:
     """Write the table, design files, pictures and page of a front.
 
@@ -50,13 +65,14 @@ def write_front(
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
         formats: Of the pictures besides PNG.
+        command: That solves the problem in a file, `{}`.
 
     Returns:
         Page, table and pictures, and a design file for each run on the front.
     """
     tasks = {run: job.task(run, optimum.fingers[run]) for run in optimum.front}
     designs = [
-        _write_design(task, folder / "front" / f"{place:02d}.toml")
+        write_designs(job, task, folder / "front" / f"{place:02d}.toml", command)
         for place, task in enumerate(tasks.values(), start=1)
     ]
     grid = front_grid(optimum)
@@ -68,7 +84,8 @@ def write_front(
         "front": (draw_front(optimum, shown), "The objectives of every run, with the Pareto front."),
         "fingers": (
             draw_front_fingers(optimum, solutions),
-            "Fingers on the front at rest and under the load, numbered as in the table.",
+            "Fingers on the front at rest and under the load, numbered as in the table."
+            f"{CIRCLE if any(each.problem.load.radius for each in solutions.values()) else ''}",
         ),
         "growth": (draw_growth(optimum), "Hypervolume of the front over the number of runs."),
     }
@@ -77,16 +94,24 @@ def write_front(
         folder / PAGE,
         "designs.html.j2",
         title=f"Front of {optimum.question.name}",
-        sentences=front_sentences(optimum),
-        tables=[grid],
+        sentences=front_sentences(
+            optimum, min(task.definition.get("tip_radius", SHARP) for task in tasks.values()), command
+        ),
+        tables=page_tables(optimum),
         pictures=pictures,
         note=f"Files beside this page: {FILES}. Started {record['started']}.",
     )
     return [page, folder / "front.csv", *pictures], designs
 
 
-def front_sentences(optimum: Optimum) -> list[str]:
-    """The search in sentences."""
+def front_sentences(optimum: Optimum, sharpest: float = SHARP, command: str = COMMAND) -> list[str]:
+    """The search in sentences.
+
+    Args:
+        optimum: The search.
+        sharpest: Least radius of the tips on the front, mm.
+        command: That solves the problem in a file, `{}`.
+    """
     question = optimum.question
     senses = " and ".join(f"{sense} {name}" for name, sense in question.objectives.items())
     limits = []
@@ -104,7 +129,43 @@ def front_sentences(optimum: Optimum) -> list[str]:
         f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are on the "
         f"front: none of them is beaten in every objective by another run.{itself} "
         "An emulator proposed fingers; all numbers here are the solver's.",
-        "front/01.toml is the design of the first finger of the table, for `compare` and `pinnray design`.",
+        *ends_sentence(optimum),
+        *tip_sentence(sharpest),
+        *slow_sentence(as_sweep(optimum)),
+        "front/01.toml is the shape of the first finger of the table, for `pinnray design`. "
+        f"`{command.format('problems/01.toml')}` solves it with load, material and solver of this search.",
+    ]
+
+
+def ends_sentence(optimum: Optimum) -> list[str]:
+    """Which parameters of the front's fingers are at ends of their ranges, in a sentence; else nothing."""
+    count, found = len(optimum.front), []
+    for name, values in optimum.question.varied.items():
+        if values.values is not None:
+            continue
+        low, high = values.ends
+        places = [(float(optimum.fingers[run][name]) - low) / (high - low) for run in optimum.front]
+        lower = sum(place <= AT_AN_END for place in places)
+        upper = sum(place >= 1 - AT_AN_END for place in places)
+        if lower + upper >= MOST_AT_ENDS * count:
+            unit = f" {unit_of(name)}".rstrip()
+            ends = ((lower, f"{low:g}{unit}"), (upper, f"{high:g}{unit}"))
+            found.append(f"{name} ({', '.join(f'{many} at {end}' for many, end in ends if many)})")
+    if not found:
+        return []
+    return [
+        f"Of the {count} fingers most lie at an end of the range of {', '.join(found)}: wider ranges would "
+        "give other fingers."
+    ]
+
+
+def tip_sentence(radius: float) -> list[str]:
+    """What to do about fingers whose tip is a sharp edge; nothing if none is."""
+    if radius >= SHARP:
+        return []
+    return [
+        f"Tips are sharp (tip_radius = {radius:g} mm), which `thinnest_wall` does not see and no printer "
+        "makes: give tip_radius = 0.5 in [fixed], say."
     ]
 
 
@@ -126,6 +187,42 @@ def front_grid(optimum: Optimum) -> TextTable:
     return TextTable("Fingers on the front", headings, rows)
 
 
+def page_tables(optimum: Optimum) -> list[TextTable]:
+    """The columns of `front_grid` in two tables, narrow enough for a page, and runs without a result."""
+    grid = front_grid(optimum)
+    split = 2 + len(optimum.question.names) + len(optimum.question.varied)
+    parts = (range(split), (0, *range(split, len(grid.headings))))
+    titles = (grid.title, "Their other quantities")
+    failures = failure_grid(as_sweep(optimum))
+    tables = [
+        TextTable(
+            title,
+            tuple(_in_lines(grid.headings[column]) for column in part),
+            [tuple(_short(row[column]) for column in part) for row in grid.rows],
+        )
+        for title, part in zip(titles, parts, strict=True)
+    ]
+    return [*tables, *([failures] if failures.rows else [])]
+
+
+def as_sweep(optimum: Optimum) -> Sweep:
+    """The runs of a search as the samples of a sweep."""
+    return Sweep(optimum.question, optimum.fingers, optimum.measurements)
+
+
+def _in_lines(heading: str) -> str:
+    """A heading with a line for each word: the columns stay narrow."""
+    return heading.replace("mm_per_N", "mm/N").replace("_", "\n")
+
+
+def _short(text: str) -> str:
+    """A number with four digits, as far as it has more."""
+    try:
+        return text if text.isdigit() else f"{float(text):.4g}"
+    except ValueError:
+        return text
+
+
 def spread(optimum: Optimum, count: int = DRAWN) -> list[int]:
     """Runs on the front at about equal distances along it, both ends among them."""
     if len(optimum.front) <= count:
@@ -144,16 +241,3 @@ def _solved(task: Task) -> Solution:
     solver = make_solver(task.solver, **task.settings)
     material, load = physics_of(task.physics)
     return solved(solver, Problem(mesh, with_law(material, solver), load, finger=finger))
-
-
-def _write_design(task: Task, path: Path) -> Path:
-    """Write the parameters of a task's finger that differ from the default ones."""
-    finger = finger_from(task.definition)
-    if not isinstance(finger, Design):
-        raise UserError("a drawing has no parameters to write")
-    plain = Design().definition()
-    changed = {name: value for name, value in finger.definition().items() if value != plain[name]}
-    changed.pop("name", None)
-    lines = [f"{name} = {value!r}" for name, value in changed.items()]
-    write_text(path, "\n".join(lines) + "\n")
-    return path

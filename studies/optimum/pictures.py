@@ -4,12 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.collections import LineCollection
+from matplotlib.patches import Circle
 
 from compare.figures.style import HALO, axes_at, write_heading
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
 from solvers.finger_figures import QUANTITIES
+from solvers.problem import Problem, contact_ends, front_points
 from solvers.solution import Solution
 from studies.optimum.search import Optimum, is_allowed
 
@@ -54,7 +56,7 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
 
 def draw_growth(optimum: Optimum) -> Figure:
     """Draw the hypervolume over the number of runs."""
-    start = len(optimum.measurements) // 3
+    start = optimum.question.samples or 0
     with figure(2.4) as drawn:
         write_heading(
             drawn, "Hypervolume over the runs", f"the first {start} runs are samples, then come proposals"
@@ -78,8 +80,13 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
         mesh = solution.problem.mesh
         moved = mesh.points + solution.displacement(mesh.points)
         shapes.append((run, mesh.points, moved, boundary_edges(mesh.triangles)))
+    ends = {run: cylinder_at_end(solution.problem) for run, solution in solutions.items()}
+    circles = {run: circle for run, circle in ends.items() if circle is not None}
     every = np.concatenate([points for _, rest, moved, _ in shapes for points in (rest, moved)])
     low, high = every.min(axis=0) - 1, every.max(axis=0) + 1
+    for circle in circles.values():  # at least its lower half
+        low = np.minimum(low, np.subtract(circle.center, circle.radius))
+        high = np.maximum(high, circle.center)
     columns = 2
     rows = -(-len(shapes) // columns)
     width = (WIDTH - 0.3) / columns
@@ -93,23 +100,41 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
             axes = axes_at(drawn, box)
             axes.add_collection(LineCollection(list(rest[edges]), colors="#b0b0b0", linewidths=0.6))
             axes.add_collection(LineCollection(list(moved[edges]), colors=INK, linewidths=0.8))
+            if run in circles:
+                axes.add_patch(circles[run])
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
             axes.set_axis_off()
             values = optimum.measurements[run].values
             text = ", ".join(
                 f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.question.objectives
             )
-            axes.text(
-                0,
-                1.03,
-                f"{optimum.place(run)}",
+            number = axes.annotate(
+                str(optimum.place(run)),
+                (0, 1.03),
+                xycoords="axes fraction",
                 size=9,
                 weight="bold",
                 color=CONTACT,
-                transform=axes.transAxes,
             )
-            axes.text(0.08, 1.03, text, size=SMALL, transform=axes.transAxes)
+            axes.annotate(
+                text,
+                (1, 0),
+                xycoords=number,
+                xytext=(7, 0),
+                textcoords="offset points",
+                size=SMALL,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},  # over a cylinder
+            )
     return drawn
+
+
+def cylinder_at_end(problem: Problem) -> Circle | None:
+    """The cylinder of the load where it ends; None for other loads."""
+    if problem.load.radius is None:
+        return None
+    middle = front_points(problem.mesh, np.array([np.mean(contact_ends(problem))]))[0]
+    centre = middle + problem.load.values + np.array([0.0, problem.load.radius])
+    return Circle((centre[0], centre[1]), problem.load.radius, fill=False, color=CONTACT, lw=0.8)
 
 
 def _axis(name: str) -> str:

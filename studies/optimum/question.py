@@ -14,8 +14,11 @@ from studies.sweep.study import Study
 
 Sense = Literal["least", "largest"]
 
-FEWEST = 40
-"""Smallest number of solver runs."""
+ENOUGH = 12
+"""Smallest number of converged runs to which the emulator is fitted, and of samples to start from."""
+
+FEWEST = 20
+"""Smallest number of solver runs: those samples, and a few proposals."""
 
 
 class Limit(CheckedModel):
@@ -114,7 +117,7 @@ def question_of(given: Mapping[str, Any]) -> Question:
         raise UserError("write constraints as NAME = {at_least = LOW, at_most = HIGH}")
     own["constraints"] = {name: _limit(name, entry) for name, entry in limits.items()}
     runs = own.get("runs", 120)
-    start = max(runs // 3, 2) if isinstance(runs, int) else 2
+    start = max(runs // 3, ENOUGH) if isinstance(runs, int) else ENOUGH
     return Question(**{**content, **own, "sampling": "sobol", "samples": start})
 
 

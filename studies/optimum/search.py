@@ -18,7 +18,7 @@ from geometry.notebook import brief
 from studies.emulator.emulator import fitted
 from studies.emulator.inputs import Inputs
 from studies.optimum.front import hypervolume, reference_point, unbeaten
-from studies.optimum.question import Question
+from studies.optimum.question import ENOUGH, Question
 from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement
 from studies.sweep.sampling import samples
@@ -31,9 +31,6 @@ QUESTION_FILE, FINGERS_FILE = "question.json", "fingers.json"
 
 ROUNDS = 8
 """Rounds of proposals."""
-
-ENOUGH = 12
-"""Smallest number of converged runs to which the emulator is fitted."""
 
 CANDIDATES = 64
 """Samples that are drawn at most for each that the search starts from, because some break a rule."""
@@ -83,7 +80,7 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
         "constraints": {name: limit.model_dump() for name, limit in question.constraints.items()},
         "runs": question.runs,
     }
-    check_resumable_folder(job.out / QUESTION_FILE, definition, job="search")
+    check_resumable_folder(job.out / QUESTION_FILE, definition, job="search", free={"study.name"})
     job.out.mkdir(parents=True, exist_ok=True)
     with (
         locked(job.out),
@@ -137,13 +134,16 @@ def starting_fingers(job: StudyJob[Question], count: int) -> list[dict[str, Valu
 def _proposed(
     job: StudyJob[Question], fingers: list[dict[str, Value]], journal: Journal, count: int
 ) -> list[dict[str, Value]]:
-    """The next fingers; random ones if the emulator has none that are apart from the others."""
+    """The next fingers; further samples where the emulator has too few runs or none apart from the others."""
     from studies.optimum.proposals import proposals
 
     question, measured = job.study, journal.measurements()
+    more = starting_fingers(job, len(fingers) + count)[len(fingers) :]
+    if sum(each.state == "done" for each in measured) < ENOUGH:
+        return more
     inputs = Inputs(question, job.task(0, fingers[0]).definition)
     with threadpool_limits(1):  # the same sums, whatever the number of cores
-        emulator = fitted(Sweep(question, fingers, measured), inputs, fewest=ENOUGH)
+        emulator = fitted(Sweep(question, fingers, measured), inputs, fewest=ENOUGH, quick=True)
         costs = _allowed_costs(question, measured)
         every = np.array([question.costs(each.values) for each in measured if each.state == "done"])
         found = proposals(
@@ -155,7 +155,6 @@ def _proposed(
             count=count,
             seed=question.seed + len(fingers),
         )
-    more = starting_fingers(job, len(fingers) + count)[len(fingers) :]
     return found + more[: count - len(found)]
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import floor
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -10,11 +11,17 @@ from compare.runtime.provenance import package_versions
 from geometry.cache import drawn_finger
 from geometry.content_hash import sources_digest
 from geometry.drawing.description import description_beside, load_description
+from geometry.finger.design import Design
 from geometry.finger.finger import Finger
+from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.presets import load_design
+from geometry.finger.rules import markers_apart, markers_fit
 from geometry.mesh.settings import MeshSettings
 from solvers.solver import check_load
 from studies.sweep.study import PHYSICS, Study, Value, physics_of
+
+LEAST_MARKERS = {name: float(parameter_info(name, "low")) for name in ("marker_diameter", "marker_height")}
+"""Markers of the fingers of a study: their size changes no quantity, so that none is refused for it."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +37,7 @@ class Task:
         settings: Its settings.
         density: Of the material, g/cm^3.
         checkpoints: Folder of a training that can be resumed; None for none.
+        time_limit: Time after which it is stopped, s; None for none.
     """
 
     number: int
@@ -40,6 +48,7 @@ class Task:
     settings: dict[str, Value]
     density: float
     checkpoints: Path | None = None
+    time_limit: float | None = None
 
 
 S = TypeVar("S", bound=Study)
@@ -81,6 +90,8 @@ class StudyJob(Generic[S]):
         values = {name: value for name, value in given.items() if not name.startswith(f"{study.solver}.")}
         shape = {name: value for name, value in values.items() if name not in PHYSICS}
         checkpoints, definition = None, {**self._base.definition(), **shape}
+        if isinstance(self._base, Design) and not study.settings_alone:
+            definition |= {key: least for key, least in LEAST_MARKERS.items() if key not in study.varied}
         if study.settings_alone:
             checkpoints = self.out / "runs" / "_".join(f"{key}-{value}" for key, value in settings.items())
         else:
@@ -94,17 +105,32 @@ class StudyJob(Generic[S]):
             {**study.settings, **settings},
             study.density,
             checkpoints,
+            study.time_limit,
         )
+
+    def marked(self, task: Task) -> dict[str, Any]:
+        """The definition of a task's finger with the markers of the study, smaller where they must be."""
+        given = {**self._base.definition(), **self.study.fixed}
+        wanted = {name: given[name] for name in LEAST_MARKERS if name not in self.study.varied}
+        least = Parameters(**task.definition)
+        if "marker_diameter" in wanted:
+            room = min(2 * markers_fit(least).margin, markers_apart(least).margin) + least.marker_diameter
+            wanted["marker_diameter"] = min(wanted["marker_diameter"], floor(100 * room + 1e-6) / 100)
+        return {**task.definition, **wanted}
 
     def definition(self, sample: Mapping[str, Value], module: str) -> dict[str, Any]:
         """The study, and everything else on which the results of a module depend."""
         study, finger = self.study, self.task(0, sample).definition
+        described = study.model_dump(
+            mode="json", by_alias=True, exclude_none=True, include=set(Study.model_fields)
+        )
+        described["fixed"] = {
+            name: value for name, value in described["fixed"].items() if name not in LEAST_MARKERS
+        }
         return {
             "schema": 1,
-            "study": study.model_dump(
-                mode="json", by_alias=True, exclude_none=True, include=set(Study.model_fields)
-            ),
-            "finger": {name: value for name, value in finger.items() if name not in study.varied},
+            "study": described,
+            "finger": {name: value for name, value in finger.items() if name not in {"name", *study.varied}},
             "versions": package_versions(),
             "program_sha256": sources_digest(module, type(study.made_solver()).__module__),
         }

@@ -21,6 +21,8 @@ from studies.sweep.job import Task
 from studies.sweep.quantities import quantities
 from studies.sweep.study import physics_of
 
+OUT_OF_TIME = "stopped at the time limit"
+
 Ending = Literal["done", "not converged", "refused", "failed"]
 """`refused`: the design breaks a rule or the solver does not take it; `failed`: an error of the program."""
 
@@ -49,6 +51,10 @@ class Measurement:
         return THROUGH_ITSELF in self.message
 
 
+class OutOfTime(UserError):
+    """The work on a sample takes too long."""
+
+
 def measured(task: Task) -> Measurement:
     """Draw, mesh and solve one sample.
 
@@ -60,6 +66,11 @@ def measured(task: Task) -> Measurement:
         words = " ".join(message.split())
         return Measurement(task.number, state, words, time.perf_counter() - started, values or {})
 
+    def progress(fraction: float, note: str) -> None:
+        spent = time.perf_counter() - started
+        if task.time_limit is not None and spent > task.time_limit and fraction < 1:
+            raise OutOfTime(f"{OUT_OF_TIME}: after {spent:.3g} s, at {note}")
+
     try:
         if "section" not in task.definition and (fault := broken_rule(Parameters(**task.definition))):
             return ended("refused", fault)
@@ -70,8 +81,8 @@ def measured(task: Task) -> Measurement:
         solver: Solver = make_solver(task.solver, **task.settings)
         if task.checkpoints and isinstance(solver, TrainedSolver):
             solver = solver.in_context(TrainingContext(task.checkpoints, resume=True))
-        solution, values = quantities(finger, problem, solver, density=task.density)
-    except TrainingDiverged as error:
+        solution, values = quantities(finger, problem, solver, density=task.density, progress=progress)
+    except (OutOfTime, TrainingDiverged) as error:
         return ended("not converged", str(error))
     except UserError as error:
         return ended("failed" if task.checkpoints else "refused", str(error))

@@ -4,6 +4,8 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from compare.runtime import html
 from studies.sweep.job import StudyJob
 from studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs, draw_sensitivity
@@ -13,6 +15,9 @@ from studies.sweep.sweep import Sweep
 from studies.sweep.tables import failure_grid, quantity_grid
 
 PAGE = "sweep.html"
+
+SLOW, SLOW_S = 10, 10
+"""A finger is told of that takes so many times the median and so many seconds."""
 
 FILES = (
     "samples.parquet and samples.csv (a row for each sample, units in the headings), sweep.json (the study, "
@@ -77,7 +82,20 @@ def sweep_sentences(sweep: Sweep) -> list[str]:
             f"{found - good} have none, for the reasons in the table below. Statistics, pictures and "
             "sensitivities are of the converged ones."
         )
-    return [*sentences, *(f"{remark}." for remark in sweep.remarks)]
+    return [*sentences, *slow_sentence(sweep), *(f"{remark}." for remark in sweep.remarks)]
+
+
+def slow_sentence(sweep: Sweep) -> list[str]:
+    """Which finger took much longer than the others, in a sentence; nothing if none did."""
+    if not sweep.measurements or sweep.study.settings_alone:
+        return []
+    slowest = max(sweep.measurements, key=lambda each: each.seconds)
+    median = float(np.median([each.seconds for each in sweep.measurements]))
+    if slowest.seconds < max(SLOW * median, SLOW_S):
+        return []
+    limit = sweep.study.time_limit
+    advice = "" if limit else "; time_limit in the file of the study stops such ones"
+    return [f"Number {slowest.number} took {slowest.seconds:.0f} s, the median {median:.2g} s{advice}."]
 
 
 def sensitivity_caption(found: dict[str, Sensitivity]) -> str:

@@ -24,6 +24,9 @@ SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
 MOST_DOTS = 2_000
 """Largest number of samples drawn in a panel."""
 
+BINS, LEAST_BINS, IN_A_BIN = 8, 3, 8
+"""Bins of the medians at most and at least, and samples for each: medians of fewer vary by chance."""
+
 WIDE = 6
 """Largest number of columns that have room for long words."""
 
@@ -32,7 +35,7 @@ COLUMNS = 3
 
 
 def draw_pairs(sweep: Sweep) -> Figure:
-    """Draw quantities over the varied parameters: a dot for each sample, and medians of eight bins."""
+    """Draw quantities over the varied parameters: a dot for each sample, and medians of bins."""
     names = [name for name in SHOWN if _varies(sweep, name)]
     parameters = list(sweep.study.varied)
     good = sweep.good[:MOST_DOTS]
@@ -40,7 +43,9 @@ def draw_pairs(sweep: Sweep) -> Figure:
     left, head, foot, gap, tall = 0.95, 0.5, 0.95, 0.12, 0.62
     width = (WIDTH - left - 0.1 - gap * (len(parameters) - 1)) / len(parameters)
     with figure(head + foot + (tall + gap) * len(names)) as drawn:
-        note = f"{len(good)} of {len(sweep.good)} samples; line: medians of eight bins"
+        bins = min(BINS, len(good) // IN_A_BIN)
+        line = f"line: medians of {bins} bins" if bins >= LEAST_BINS else "too few for a line of medians"
+        note = f"{len(good)} of {len(sweep.good)} samples; {line}"
         write_heading(drawn, f"Quantities over parameters: {sweep.study.name}", note)
         for row, name in enumerate(names):
             values = np.array([each.values[name] for each in good])
@@ -51,7 +56,7 @@ def draw_pairs(sweep: Sweep) -> Figure:
                 choices = sweep.study.varied[parameter].values
                 x = np.array([choices.index(text) if choices else text for text in texts], dtype=np.float64)
                 axes.plot(x, values, ".", ms=size, color="#0072b2", alpha=0.5, mew=0)
-                _draw_medians(axes, x, values)
+                draw_medians(axes, x, values)
                 axes.tick_params(length=2, pad=1.5)
                 axes.locator_params(axis="y", nbins=3)
                 ends = _ends(sweep, parameter)
@@ -134,13 +139,17 @@ def draw_fingers(sweep: Sweep, job: StudyJob[Study]) -> Figure:
     return drawn
 
 
-def _draw_medians(axes: Axes, x: FloatArray, values: FloatArray) -> None:
+def draw_medians(axes: Axes, x: FloatArray, values: FloatArray) -> None:
+    """Draw the medians of bins, or of levels, that hold enough samples each; nothing if they are few."""
     levels = np.unique(x)
-    edges = np.linspace(x.min(), x.max(), 9) if len(levels) > 12 else np.append(levels, np.inf)
-    bins = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
-    used = [number for number in range(len(edges) - 1) if (bins == number).any()]
-    middles = [np.median(x[bins == number]) for number in used]
-    axes.plot(middles, [np.median(values[bins == number]) for number in used], color=INK, lw=1.0)
+    bins = min(BINS, len(x) // IN_A_BIN)
+    if (len(levels) if len(levels) <= 12 else LEAST_BINS) * IN_A_BIN > len(x):
+        return
+    edges = np.linspace(x.min(), x.max(), bins + 1) if len(levels) > 12 else np.append(levels, np.inf)
+    places = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
+    used = [number for number in range(len(edges) - 1) if (places == number).any()]
+    middles = [np.median(x[places == number]) for number in used]
+    axes.plot(middles, [np.median(values[places == number]) for number in used], color=INK, lw=1.0)
 
 
 def _varies(sweep: Sweep, name: str) -> bool:

@@ -13,7 +13,7 @@ from solvers.finger_figures import QUANTITIES, Quantity, figures_at_rest, figure
 from solvers.finger_figures import heading as heading_of
 from solvers.problem import Load, Problem, contact_functional
 from solvers.solution import Solution
-from solvers.solver import Solver, TrainedSolver, solved, with_law
+from solvers.solver import Progress, Solver, TrainedSolver, silent, solved, with_law
 
 TRAINING: Mapping[str, Quantity] = {
     "rel_l2_displacement": Quantity("", "relative L2 difference of the displacement from that by fem"),
@@ -35,7 +35,7 @@ def heading(name: str) -> str:
 
 
 def quantities(
-    finger: Finger, problem: Problem, solver: Solver, *, density: float
+    finger: Finger, problem: Problem, solver: Solver, *, density: float, progress: Progress = silent
 ) -> tuple[Solution, dict[str, float]]:
     """Solve a problem and evaluate every quantity.
 
@@ -44,6 +44,7 @@ def quantities(
         problem: The problem; its material's law is replaced by one that the solver has.
         solver: The solver.
         density: Of the material, g/cm^3.
+        progress: Called by the solver; it may stop it by an exception.
 
     Returns:
         The solution, and the quantities by the names of `QUANTITIES`; NaN where the solver does not give one.
@@ -55,7 +56,8 @@ def quantities(
         prepared = plain.prepare(linear)
         solution = prepared.solve(problem.load)
     else:
-        solution = solved(solver, replace(problem, material=with_law(problem.material, solver)))
+        lawful = replace(problem, material=with_law(problem.material, solver))
+        solution = solved(solver, lawful, progress)
         prepared = plain.prepare(replace(linear, load=Load(position=problem.load.position)))
     rest = figures_at_rest(problem, density=density, prepared=prepared)
     prepared.destroy()

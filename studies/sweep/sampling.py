@@ -54,30 +54,38 @@ def places_of(study: Study, sample: Mapping[str, Value]) -> list[float]:
 
 def value_at(name: str, values: Range, place: float) -> Value:
     """The value of a parameter at a place from 0 to 1 of its range."""
-    if values.values is not None:
-        return values.values[min(int(place * len(values.values)), len(values.values) - 1)]
+    if (choices := _choices(name, values)) is not None:
+        return choices[min(int(place * len(choices)), len(choices) - 1)]
     low, high = values.ends
-    if name in WHOLE:
-        return min(int(low + place * (high - low + 1)), int(high))
     return low + place * (high - low)
 
 
 def place_of(name: str, values: Range, value: Value) -> float:
     """The place from 0 to 1 of a value in a parameter's range: the inverse of `value_at`."""
-    if values.values is not None:
-        return (values.values.index(value) + 0.5) / len(values.values)
+    if (choices := _choices(name, values)) is not None:
+        return (choices.index(value) + 0.5) / len(choices)
     low, high = values.ends
-    if name in WHOLE:
-        return (float(value) - low + 0.5) / (high - low + 1)
     return (float(value) - low) / (high - low)
 
 
 def grid_values(name: str, values: Range) -> Sequence[Value]:
     """The values of a parameter on a grid."""
+    if values.count is None and (choices := _choices(name, values)) is not None:
+        return choices
+    low, high = values.ends
+    ends = np.linspace(low, high, values.count or 2)
+    return sorted({round(value) for value in ends}) if name in WHOLE else [float(value) for value in ends]
+
+
+def _choices(name: str, values: Range) -> Sequence[Value] | None:
+    """The values that a parameter can have, if they are listed, whole or steps apart; else None."""
     if values.values is not None:
         return values.values
+    step = values.step or (1 if name in WHOLE else None)
+    if step is None:
+        return None
     low, high = values.ends
+    steps = range(int((high - low) / step + 1e-9) + 1)
     if name in WHOLE:
-        count = values.count or int(high - low) + 1
-        return sorted({round(value) for value in np.linspace(low, high, count)})
-    return [float(value) for value in np.linspace(low, high, values.count or 2)]
+        return [int(low + number * step) for number in steps]
+    return [round(low + number * step, 9) for number in steps]  # 0.95, not 0.9500000000000001

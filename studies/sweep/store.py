@@ -47,10 +47,12 @@ class Journal:
                 "insert into samples values (?, ?, ?, ?, ?)", (*row, json.dumps(measurement.values))
             )
 
-    def forget(self, state: str) -> int:
-        """Remove the samples that ended in a state, and return how many there were."""
+    def forget(self, state: str, message: str = "") -> int:
+        """Remove the samples that ended in a state, with a message that starts so; return their number."""
         with self._connection:
-            return self._connection.execute("delete from samples where state = ?", (state,)).rowcount
+            return self._connection.execute(
+                "delete from samples where state = ? and message like ?", (state, f"{message}%")
+            ).rowcount
 
     def numbers(self) -> set[int]:
         """Numbers of the samples that have a result."""

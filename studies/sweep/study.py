@@ -43,12 +43,14 @@ class Range(CheckedModel):
     Attributes:
         low: Smallest value (`from` in the file).
         high: Largest value (`to`).
+        step: Distance of the values, counted from `low`, such as that of a printer; None leaves any value.
         count: Number of values on a grid, evenly spaced; None on no grid.
         values: The choices instead.
     """
 
     low: float | None = Field(default=None, alias="from")
     high: float | None = Field(default=None, alias="to")
+    step: float | None = Field(default=None, gt=0)
     count: int | None = bounded(None, 2, MOST, "", "", "Number of values on a grid")
     values: tuple[Value, ...] | None = Field(default=None, min_length=1)
 
@@ -62,7 +64,7 @@ class Range(CheckedModel):
     def _one_kind(self) -> Self:
         ends = (self.low, self.high)
         if self.values is not None:
-            if ends != (None, None) or self.count is not None:
+            if ends != (None, None) or self.count is not None or self.step is not None:
                 raise ValueError("give either values, or from and to")
             if len(set(map(repr, self.values))) < len(self.values):
                 raise ValueError("a value is given twice")
@@ -70,6 +72,8 @@ class Range(CheckedModel):
             raise ValueError("give from and to, or values")
         elif self.low >= self.high:
             raise ValueError(f"from = {self.low:g} must be below to = {self.high:g}")
+        elif self.step is not None and not 1 <= (self.high - self.low) / self.step <= MOST:
+            raise ValueError(f"step = {self.step:g} must be shorter than the range, and not 0")
         return self
 
 
@@ -83,6 +87,7 @@ class Study(CheckedModel):
         settings: Its settings that differ from the default.
         mesh_size: Element size in walls and ribs, mm.
         density: Of the material, g/cm^3; the default is that of a printed polyurethane.
+        time_limit: Time after which the work on a finger is stopped, s; None means no limit.
         sampling: `grid`: every combination; `latin`: a Latin hypercube; `sobol`: a scrambled Sobol sequence,
             which can be continued.
         samples: Number of samples, unless on a grid.
@@ -98,11 +103,12 @@ class Study(CheckedModel):
     settings: dict[str, Value] = Field(default_factory=dict)
     mesh_size: float = bounded(0.5, 0.02, 20, "mm", "", "Largest element in the walls and ribs")
     density: float = bounded(1.2, 1e-3, 30, "g/cm^3", "", "Density of the material")
+    time_limit: float | None = bounded(None, 0.1, 1e6, "s", "", "Longest time for a finger")
     sampling: Literal["grid", "latin", "sobol"] = "sobol"
     samples: int | None = bounded(None, 1, MOST, "", "", "Number of samples")
     seed: int = bounded(0, 0, 2**32 - 1, "", "", "Seed of the samples")
     fixed: dict[str, Value] = Field(default_factory=dict)
-    varied: dict[str, Range] = Field(min_length=1)
+    varied: dict[str, Range]
 
     @model_validator(mode="before")
     @classmethod
@@ -115,15 +121,11 @@ class Study(CheckedModel):
             if not isinstance(entries, Mapping):
                 raise ValueError(f"[{group}] must be a table of parameters")
             read[group] = {SYMBOLS.get(name, name): entry for name, entry in entries.items()}
-        for name, entry in read["varied"].items():
-            if not isinstance(entry, Mapping | Range):
-                raise ValueError(
-                    f"varied.{name}: write {{from = LOW, to = HIGH}} or {{values = [...]}}, not {entry!r}"
-                )
-            try:
-                read["varied"][name] = entry if isinstance(entry, Range) else Range(**entry)
-            except UserError as error:
-                raise ValueError(f"varied.{name}: {error}") from None
+        if not read["varied"]:
+            raise ValueError(
+                "nothing is varied; give a table [varied], such as rib_count = {from = 2, to = 6}"
+            )
+        read["varied"] = {name: _range(name, entry) for name, entry in read["varied"].items()}
         return read
 
     @model_validator(mode="after")
@@ -196,6 +198,25 @@ def unit_of(name: str) -> str:
     return str(parameter_info(name, "unit") or parameter_info(name, "unit", Physics))
 
 
+def _range(name: str, entry: Any) -> Range:
+    """The values of a varied parameter as a file gives them."""
+    if isinstance(entry, Range):
+        return entry
+    if not isinstance(entry, Mapping):
+        raise ValueError(
+            f"varied.{name}: write {{from = LOW, to = HIGH}} or {{values = [...]}}, not {entry!r}"
+        )
+    keys = [field.alias or key for key, field in Range.model_fields.items()]
+    if unknown := [key for key in entry if key not in keys]:
+        meant = {"min": "from", "low": "from", "max": "to", "high": "to"}.get(unknown[0])
+        said = f"did you mean {meant}?" if meant else f"there are {', '.join(keys)}"
+        raise ValueError(f"varied.{name}: unknown key {unknown[0]!r}; {said}")
+    try:
+        return Range(**entry)
+    except UserError as error:
+        raise ValueError(f"varied.{name}: {error}") from None
+
+
 def _check_name(name: str, *, drawn: bool) -> None:
     """Refuse a parameter that the study cannot change."""
     if name in PHYSICS or name == "section":
@@ -219,14 +240,15 @@ def _check_range(name: str, values: Range, sampling: str) -> None:
                 raise ValueError(
                     f"{name} = {end:g} is outside its range, {low:g} to {high:g} {unit_of(name)}"
                 )
-        if sampling == "grid" and values.count is None and name not in WHOLE:
+        if sampling == "grid" and not (values.count or values.step or name in WHOLE):
             raise ValueError(f"{name}: a grid needs the number of values, such as count = 5")
         if sampling != "grid" and values.count is not None:
             raise ValueError(f"{name}: count belongs to sampling = 'grid'")
-        if name in WHOLE and not (
-            float(values.low or 0).is_integer() and float(values.high or 0).is_integer()
-        ):
-            raise ValueError(f"{name} is a whole number; give whole ends")
+        if sampling == "grid" and values.step is not None and values.count is not None:
+            raise ValueError(f"{name}: give either count or step")
+        numbers = (values.low or 0, values.high or 0, values.step or 1)
+        if name in WHOLE and not all(float(number).is_integer() for number in numbers):
+            raise ValueError(f"{name} is a whole number; give whole ends and steps")
 
 
 def parameter_limits(name: str) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from geometry.errors import UserError
 from geometry.text_files import read_json
 from solvers.solver import Progress, silent
 from studies.sweep.job import StudyJob, Task
-from studies.sweep.measurement import Measurement
+from studies.sweep.measurement import OUT_OF_TIME, Measurement
 from studies.sweep.sampling import samples
 from studies.sweep.store import Journal, opened
 from studies.sweep.study import Study, Value
@@ -70,17 +70,22 @@ def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
     all_samples = samples(job.study)
     tasks = {number: job.task(number, sample) for number, sample in enumerate(all_samples)}
     definition = {**job.definition(all_samples[0], __name__), "mesh": job.mesh and job.mesh.model_dump()}
-    free = {"study.samples"} if job.study.sampling == "sobol" else set()  # which may be continued
+    free = {"study.name", "study.time_limit"}  # on which no result depends
+    if job.study.sampling == "sobol":
+        free.add("study.samples")  # which may be continued
     if trainings := job.study.settings_alone:
-        free = {"study.varied"}  # the trainings of another grid go on from their checkpoints
+        free.add("study.varied")  # the trainings of another grid go on from their checkpoints
     check_resumable_folder(job.out / STUDY_FILE, definition, job=job.kind, free=free)
     job.out.mkdir(parents=True, exist_ok=True)
     with locked(job.out), ExitStack() as stack:
-        if trainings and (job.out / JOURNAL).exists() and _study_in(job.out).varied != job.study.varied:
+        before = _study_in(job.out) if (job.out / JOURNAL).exists() else job.study
+        if trainings and before.varied != job.study.varied:
             (job.out / JOURNAL).unlink()
         write_json(job.out / STUDY_FILE, definition)  # first: a folder without it is taken for someone's
         journal = stack.enter_context(opened(job.out / JOURNAL))
         journal.forget("failed")
+        if before.time_limit != job.study.time_limit:
+            journal.forget("not converged", OUT_OF_TIME)
         with stages.stage("samples") as progress, Workers(job.processes, job.scheduler) as workers:
             finish(tasks, journal, workers, progress)
         found = [each for each in journal.measurements() if each.number in tasks]

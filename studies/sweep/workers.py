@@ -9,12 +9,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from itertools import islice, zip_longest
+from math import inf
 from typing import TYPE_CHECKING, Self
 
 from geometry.errors import UserError
 from geometry.processes import Pool, ProcessFailed
 from studies.sweep.job import Task
-from studies.sweep.measurement import Measurement, measured
+from studies.sweep.measurement import OUT_OF_TIME, Measurement, measured
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -25,6 +26,10 @@ DEATHS = 8
 Samples that wait for a dying worker of a scheduler count too: where one is killed at random every three
 seconds, one of 10,000 samples has eight by chance with a probability below 1e-3.
 """
+
+GRACE, GRACE_S = 1.5, 10.0
+"""A worker whose sample does not stop at its limit of time is ended after so many times the limit and so many
+seconds more, for what it has to load first."""
 
 WAIT_S = 20
 """Time to reach a scheduler, s."""
@@ -69,8 +74,15 @@ class Workers:
         yield from run(dict(islice(tasks.items(), first, None)))
 
     def _here(self, tasks: Mapping[int, Task]) -> Iterator[Measurement]:
-        for number, answer in self._pool.answers(_measured, tasks, deaths=DEATHS):
-            yield _failed(number) if isinstance(answer, ProcessFailed) else answer
+        limit = next((task.time_limit for task in tasks.values()), None)
+        hard = inf if limit is None else GRACE * limit + GRACE_S
+        for number, answer in self._pool.answers(_measured, tasks, deaths=DEATHS, timeout_s=hard):
+            if not isinstance(answer, ProcessFailed):
+                yield answer
+            elif answer.exit_code is None:
+                yield Measurement(number, "not converged", f"{OUT_OF_TIME}: after {hard:.3g} s", hard)
+            else:
+                yield _failed(number)
 
     def _at_scheduler(self, tasks: Mapping[int, Task]) -> Iterator[Measurement]:
         from distributed import KilledWorker, as_completed

@@ -32,7 +32,9 @@ def optimise(
     with going_on_from(job.out), Stages() as stages:
         found = search_front(job, stages)
         with stages.stage("pictures"):
-            paths, designs = write_front(found, job, job.out, stages.record(), formats)
+            paths, designs = write_front(
+                found, job, job.out, stages.record(), formats, command="compare --from {}"
+            )
     grid = front_grid(found)
     columns = [0, *range(2, 2 + len(read.objectives))]  # the table in the file is too wide for a terminal
     rows = [[row[column] for column in columns] for row in grid.rows]

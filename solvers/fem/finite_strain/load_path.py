@@ -93,6 +93,9 @@ class LoadPath:
                 step /= 2
                 if step < self._min_step:
                     return
+                progress(
+                    self.points[-1].fraction, f"{fraction:.1%} of the load, for which no equilibrium is found"
+                )
                 continue
             point = self._stable(point)
             self.points.append(point)

@@ -205,8 +205,8 @@ def test_more_samples_fit_it_again(tmp_path: Path) -> None:
 
 
 def test_too_few_samples_are_told(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="has 20 converged samples, and an emulator needs at least 60"):
-        emulator_of(solved_sweep(tmp_path / "s", count=20))
+    with pytest.raises(UserError, match="has 19 converged samples, and an emulator needs at least 20"):
+        emulator_of(solved_sweep(tmp_path / "s", count=19))
 
 
 @pytest.fixture

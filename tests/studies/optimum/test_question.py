@@ -58,7 +58,7 @@ REFUSED = {
         "samples = 4\n" + GOOD,
         "samples belongs to a study; the search",
     ),
-    "too few runs": (GOOD.replace("runs = 40", "runs = 4"), "runs = 4 is outside its range, 40 to"),
+    "too few runs": (GOOD.replace("runs = 40", "runs = 4"), "runs = 4 is outside its range, 20 to"),
     "study's own faults": (GOOD.replace("to = 2.5", "to = 0.1"), "from = 0.6 must be below to = 0.1"),
 }
 

@@ -1,6 +1,8 @@
 """The search on a law with a known front, its repetition, and the command on real fingers."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from json import loads
 from pathlib import Path
 
 import numpy as np
@@ -8,17 +10,22 @@ import pytest
 
 from compare.evaluation.deformed_body import THROUGH_ITSELF
 from compare.runtime.stages import Stages
+from geometry.cache import finger_mesh
+from geometry.drawing.drawn_finger import finger_from
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
 from pinnray.cli import main
 from solvers.finger_figures import QUANTITIES
-from studies.optimum.page import front_grid, front_sentences, spread
+from solvers.problem import Problem
+from studies.optimum.designs import write_designs
+from studies.optimum.page import ends_sentence, front_grid, front_sentences, page_tables, spread, tip_sentence
+from studies.optimum.pictures import cylinder_at_end
 from studies.optimum.question import Limit, Question
 from studies.optimum.search import Optimum, search_front
 from studies.sweep.job import StudyJob, Task
-from studies.sweep.measurement import Measurement
+from studies.sweep.measurement import Measurement, measured
 from studies.sweep.store import Journal
-from studies.sweep.study import Range
+from studies.sweep.study import Range, physics_of
 
 VARIED = {
     "rib_count": {"from": 2, "to": 6},
@@ -170,3 +177,89 @@ def test_the_command_writes_the_front(tmp_path, capsys, monkeypatch):
         assert design.rib_thickness + 0.1 * design.rib_count <= 2.0
     rows = (out / "front.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + len(designs)
+    problems = sorted((out / "problems").glob("*.toml"))
+    assert [each.name for each in problems] == [each.name for each in designs]
+
+
+def test_the_problem_of_a_finger_gives_the_number_of_the_front(tmp_path, capsys):
+    """The load was lost: the design alone had another force by a factor of two."""
+    physics = {"load": "cylinder", "radius": 8.0, "stroke": 3.0, "young": 3.0, "law": "neo-hookean"}
+    asked = QUESTION.model_copy(
+        update={
+            "solver": "fem-nonlinear",
+            "settings": {"degree": 1},
+            "mesh_size": 3.0,
+            "fixed": {"contact_position": 35.0, **physics},
+        }
+    )
+    job = StudyJob(asked, Path(), tmp_path / "search")
+    task = job.task(7, {"rib_count": 3, "rib_thickness": 1.9, "front_thickness": 0.9})
+    found = measured(task)
+    assert found.state == "done"
+    write_designs(job, task, tmp_path / "search" / "front" / "01.toml")
+    problem = tmp_path / "search" / "problems" / "01.toml"
+    assert main(["compare", "--from", str(problem), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    metrics = loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    force = metrics["solvers"]["fem-nonlinear"]["figures"]["values"]["force_N"]
+    assert force == pytest.approx(found.values["force"], rel=1e-9)
+    assert metrics["solvers"]["fem-nonlinear"]["figures"]["values"]["wrap_deg"] == pytest.approx(
+        found.values["wrap"], rel=1e-9
+    )
+
+
+def test_thin_walls_are_not_refused_for_their_markers(tmp_path: Path) -> None:
+    asked = QUESTION.model_copy(update={"fixed": {"marker_diameter": 1.6}, "mesh_size": 3.0})
+    job = StudyJob(asked, Path(), tmp_path / "out")
+    task = job.task(0, {"rib_count": 3, "rib_thickness": 0.8, "front_thickness": 0.8})
+    assert measured(task).state == "done"
+    path = write_designs(job, task, tmp_path / "front" / "01.toml")
+    assert 0.1 < load_design(path).marker_diameter <= 0.7  # which fits, and can be printed
+
+
+def test_a_search_with_few_converged_runs_takes_further_samples(tmp_path, monkeypatch):
+    def hard(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
+        for number in sorted(tasks.keys() - journal.numbers()):
+            state = "done" if number % 3 == 0 else "not converged"
+            values = judged(tasks[number]) if state == "done" else {}
+            journal.add(Measurement(number, state, "", 0.0, values))
+
+    monkeypatch.setattr("studies.optimum.search.finish", hard)
+    asked = QUESTION.model_copy(update={"runs": 20, "samples": 12})
+    found = search_front(StudyJob(asked, Path(), tmp_path / "out", 1))
+    assert len(found.measurements) == 20
+
+
+def test_the_tables_of_the_page_are_narrow_and_complete(found: Optimum) -> None:
+    tables, grid = page_tables(found), front_grid(found)
+    headings = [heading for table in tables for heading in table.headings]
+    assert {heading.replace("\n", "_").replace("mm/N", "mm_per_N") for heading in headings} == {
+        *grid.headings
+    }
+    letters = [sum(max(map(len, heading.split("\n"))) + 2 for heading in table.headings) for table in tables]
+    assert max(letters) < 130  # of the 140 that 62 rem hold
+
+
+def test_parameters_at_the_ends_of_their_ranges_are_told(found: Optimum) -> None:
+    fingers = [{**each, "front_thickness": 2.5} for each in found.fingers]
+    (sentence,) = ends_sentence(replace(found, fingers=fingers))
+    count = len(found.front)
+    assert f"front_thickness ({count} at 2.5 mm)" in sentence
+    assert "rib_thickness" not in sentence
+
+
+def test_sharp_tips_are_told() -> None:
+    assert "tip_radius = 0 mm" in tip_sentence(0.0)[0]
+    assert tip_sentence(0.5) == []
+
+
+def test_the_cylinder_is_drawn_where_it_ends(tmp_path: Path) -> None:
+    fixed = {"load": "cylinder", "radius": 8.0, "stroke": 3.0, "contact_position": 35.0}
+    asked = QUESTION.model_copy(update={"solver": "fem-nonlinear", "mesh_size": 3.0, "fixed": fixed})
+    task = StudyJob(asked, Path(), tmp_path).task(
+        0, {"rib_count": 3, "rib_thickness": 2, "front_thickness": 2}
+    )
+    mesh = finger_mesh(finger_from(task.definition), settings=task.mesh)
+    circle = cylinder_at_end(Problem(mesh, *physics_of(task.physics)))
+    assert circle is not None
+    assert (*circle.center, circle.radius) == pytest.approx((35.0, 5.0, 8.0))
+    assert cylinder_at_end(Problem(mesh)) is None

@@ -19,7 +19,20 @@ def written(folder: Path, text: str) -> Path:
 
 
 REFUSED = {
-    "no parameter": ("samples = 4\n", "varied"),
+    "no parameter": ("samples = 4\n", r"nothing is varied; give a table \[varied\]"),
+    "an empty table": ("samples = 4\n[varied]\n", r"nothing is varied; give a table \[varied\]"),
+    "another word for an end": (
+        "samples = 4\n[varied]\nheight = {min = 80, to = 90}\n",
+        r"varied.height: unknown key 'min'; did you mean from\?",
+    ),
+    "a key that no range has": (
+        "samples = 4\n[varied]\nheight = {from = 80, to = 90, scale = 2}\n",
+        "varied.height: unknown key 'scale'; there are from, to, step, count, values",
+    ),
+    "a step beyond the range": (
+        "samples = 4\n[varied]\nheight = {from = 80, to = 90, step = 20}\n",
+        "step = 20 must be shorter than the range",
+    ),
     "unknown parameter": (
         "samples = 4\n[varied]\nrib_thick = {from = 1, to = 2}\n",
         r"unknown parameter 'rib_thick'; did you mean rib_thickness",

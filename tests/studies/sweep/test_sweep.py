@@ -14,16 +14,21 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from compare.figures.style import axes_at
 from geometry.cache import cad_files
 from geometry.errors import UserError
+from geometry.figure import figure
 from geometry.finger.design import Design
 from pinnray.cli import main
 from solvers.solution import Solution
 from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement, measured
+from studies.sweep.page import slow_sentence
+from studies.sweep.pictures import draw_medians
 from studies.sweep.quantities import quantities
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
@@ -172,6 +177,56 @@ def test_a_second_start_goes_on_and_does_nothing_twice(swept: Path, tmp_path: Pa
     assert [each.number for each in after] == list(range(8))
 
 
+def test_another_name_or_marker_does_the_same_study(swept: Path, tmp_path: Path) -> None:
+    """Nothing of a result depends on them."""
+    out = tmp_path / "out"
+    shutil.copytree(swept / "out", out)
+    study = load_study(study_file(tmp_path, 6))
+    fixed = {**study.fixed, "marker_diameter": 0.3, "marker_height": 0.2}
+    study = study.model_copy(update={"name": "renamed", "fixed": fixed, "time_limit": 100.0})
+    after = run_sweep(StudyJob(study, tmp_path, out, 1)).measurements
+    assert after == load_sweep(swept / "out").measurements
+
+
+def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path, 1))
+    study = study.model_copy(update={"solver": "fem-nonlinear", "time_limit": 1e-3})
+    job = StudyJob(study, tmp_path, tmp_path / "out", 1)
+    sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
+    found = measured(job.task(0, sample))
+    assert (found.state, found.message.partition(":")[0]) == ("not converged", "stopped at the time limit")
+    sweep = Sweep(study, [sample], [found])
+    assert failure_grid(sweep).rows == [("not converged", "1", "stopped at the time limit", "0")]
+
+
+def test_a_hanging_worker_is_ended_after_the_time_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr("studies.sweep.workers._measured", hang_at_one)
+    monkeypatch.setattr("studies.sweep.workers.GRACE_S", 1.0)
+    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": 4.0})
+    sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
+    assert [each.state for each in sweep.measurements] == ["done", "not converged", "done"]
+    monkeypatch.setattr("studies.sweep.workers._measured", answered)
+    longer = study.model_copy(update={"time_limit": 5.0})
+    again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
+    assert {each.state for each in again.measurements} == {"done"}
+
+
+def test_a_finger_that_takes_much_longer_than_the_others_is_told(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path, 3))
+    found = [Measurement(number, "done", "", 64.0 if number == 2 else 0.6) for number in range(3)]
+    (sentence,) = slow_sentence(Sweep(study, [{}] * 3, found))
+    assert sentence.startswith("Number 2 took 64 s, the median 0.6 s; time_limit")
+
+
+def test_medians_are_drawn_of_enough_samples_alone() -> None:
+    with figure(2.0) as drawn:
+        axes = axes_at(drawn, (1, 1, 1, 1))
+        for count, lines in ((16, 0), (64, 1)):
+            places = np.linspace(0, 1, count)
+            draw_medians(axes, places, places)
+            assert len(axes.lines) == lines
+
+
 def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
     path = tmp_path / "ribs.toml"
     path.write_text(STUDY.format(samples=6).replace("mesh_size = 2.0", "mesh_size = 1.9"), encoding="utf-8")
@@ -227,6 +282,12 @@ def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(monk
 def die_at_one(task: object, report: object) -> Measurement:
     if getattr(task, "number", None) == 1:
         os.kill(os.getpid(), signal.SIGKILL)
+    return answered(task, report)
+
+
+def hang_at_one(task: object, report: object) -> Measurement:
+    if getattr(task, "number", None) == 1:
+        time.sleep(600)
     return answered(task, report)
 
 
