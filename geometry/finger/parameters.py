@@ -281,7 +281,7 @@ def _sentence(problem: ErrorDetails, model: type[CheckedModel]) -> str:
     if kind in ("float_parsing", "float_type", "finite_number"):
         return f"{titled} is not a finite number{_advice(name, model)}"
     if kind == "string_pattern_mismatch":
-        return f"{titled} must be a letter or digit, then only letters, digits, '.', '_', '-'"
+        return f"{titled} must be a letter or digit, then only letters (A to Z), digits, '.', '_', '-'"
     return f"{titled}: {context['error'] if kind == 'value_error' else problem['msg'].lower()}"
 
 

@@ -17,6 +17,7 @@ from geometry.drawing.description import description_beside, load_description
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.finger import Finger
+from geometry.finger.parameters import SYMBOLS, symbols
 from geometry.finger.presets import load_design, parse_overrides
 from geometry.mesh.settings import MeshSettings
 from geometry.text_files import parse_toml
@@ -99,6 +100,12 @@ class FingerOptions:
         for option in ("clamp", "contact", "markers"):
             if getattr(self, option) is not None:
                 raise UserError(f"--{option} belongs to a drawing; give it by --section FILE")
+        for key in (setting.partition("=")[0].strip() for setting in self.set):
+            name = symbols(Physics).get(key, key)
+            if key not in {*SYMBOLS, *Design.model_fields} and name in Physics.model_fields:
+                raise UserError(
+                    f"{key} is no parameter of the finger, but of material and load: give --{name}"
+                )
         changes = parse_overrides(self.set)
         design = load_design(self.design, changes)
         if changes and "name" not in changes:  # so that it has its own output folder

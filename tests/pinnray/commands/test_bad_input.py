@@ -87,6 +87,12 @@ BAD = [
     ("compare --set height=9999", "outside its range, 10 to 500 mm"),
     ("compare --set contact_position=200", "contact"),  # beyond the tip
     ("compare --set name=../up", "must be a letter or digit"),  # would leave the output folder
+    ("compare --set name=finger\u00f6", "then only letters .A to Z., digits"),
+    ("compare --set E=3", "E is no parameter of the finger, but of material and load: give --young"),
+    (
+        "design --set stroke=3",
+        "stroke is no parameter of the finger, but of material and load: give --stroke",
+    ),
     ("compare --mesh-size 0", "--mesh-size = 0 mm is outside its range"),
     ("compare --mesh-size nan", "--mesh-size = nan is not a finite number"),
     ("compare --mesh-size fine", 'unable to convert "fine" into float'),
