@@ -37,7 +37,7 @@ CONTACT = "#d55e00"
 MEASURED = "#d1006c"
 """Colour of measurements: occurs in none of the colour maps and for no solver."""
 
-_RC: "dict[RcKeyType, Any]" = {
+SETTINGS: "dict[RcKeyType, Any]" = {
     # A matplotlibrc of others in the working folder could have LaTeX read any file.
     **{name: value for name, value in mpl.rcParamsDefault.items() if not name.startswith("backend")},
     "font.family": "DejaVu Sans",
@@ -85,7 +85,7 @@ class Figure(MplFigure):
 
     def draw(self, renderer: RendererBase) -> None:
         """Draw with the project's settings, whatever settings the process has."""
-        with mpl.rc_context(_RC):
+        with mpl.rc_context(SETTINGS):
             super().draw(renderer)
 
     def save(self, path: Path, formats: Collection[str] = ()) -> Path:
@@ -95,7 +95,7 @@ class Figure(MplFigure):
             path: Where to write, in the format of its suffix.
             formats: Others in which it is written beside it: `svg` or `pdf`.
         """
-        with mpl.rc_context(_RC):
+        with mpl.rc_context(SETTINGS):
             for file in (path, *(path.with_suffix(f".{name}") for name in formats)):
                 buffer = BytesIO()
                 self.savefig(buffer, format=file.suffix.removeprefix("."), **OPTIONS.get(file.suffix, {}))
@@ -105,7 +105,7 @@ class Figure(MplFigure):
     def _repr_png_(self) -> bytes:
         """The picture in a notebook."""
         buffer = BytesIO()
-        with mpl.rc_context(_RC):
+        with mpl.rc_context(SETTINGS):
             self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
         return buffer.getvalue()
 
@@ -113,7 +113,7 @@ class Figure(MplFigure):
 @contextmanager
 def figure(height: float) -> Iterator[Figure]:
     """A new figure of a height in inches, to be filled in the block with the project's settings."""
-    with mpl.rc_context(_RC):
+    with mpl.rc_context(SETTINGS):
         yield Figure(height)
 
 

@@ -1,5 +1,6 @@
 """A comparison that draws, reports and shows itself."""
 
+from collections.abc import Collection
 from dataclasses import fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -35,19 +36,22 @@ class Comparison(comparison.Results):
         """Give a finished comparison its pictures and report."""
         return cls(**{each.name: getattr(finished, each.name) for each in fields(finished)})
 
-    def plot(self, picture: str = "overlay") -> "Figure":
+    def plot(self, picture: str = "overlay", solvers: Collection[str] = ()) -> "Figure":
         """A picture of the report, as a figure that a notebook shows; `figure.save(path)` keeps it.
 
         Args:
             picture: `overlay`, `marker_errors`, `von_mises`, `strain_principal`, `strain_xx`, `strain_yy`,
-                `strain_xy`, `force_displacement`, `excess`, `energy`, `losses`, `design` or `mesh`.
+                `strain_xy`, `differences`, `force_displacement`, `excess`, `energy`, `convergence`, `losses`,
+                `design` or `mesh`.
+            solvers: Names of those whose fields are drawn, for a picture of fields; all that a page has room
+                for if empty.
 
         Raises:
-            UserError: If there is no such picture, or nothing to draw in it.
+            UserError: If there is no such picture or solver, or nothing to draw in it.
         """
         from compare.figures.gallery import draw
 
-        return draw(self, picture).figure
+        return draw(self, picture, solvers).figure
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one HTML file that holds its pictures, and return its path."""

@@ -41,11 +41,15 @@ def draw_all(
 ) -> list[Picture]:
     """Write every picture of a comparison as PNG, and in other `FORMATS`, in the order of a report.
 
+    With `pdf` there is also `all.pdf`: a page for each picture, with its caption below.
+
     `progress` is called before every picture with the share done, from 0 to 1, and what comes next.
     """
     from compare.figures.gallery import GALLERY
+    from compare.figures.pages import write_pages
 
     pictures: list[Picture] = []
+    drawings = []
     # Figures have so many objects that a tenth of the time went into collecting garbage among older ones.
     gc.freeze()
     try:
@@ -55,6 +59,9 @@ def draw_all(
                 if drawing := draw(comparison):
                     path = drawing.figure.save(folder / f"{name}.png", formats)
                     pictures.append(Picture(path, drawing.title, drawing.caption, drawing.alt))
+                    drawings.append((drawing.figure, drawing.title, drawing.caption))
+        if "pdf" in formats:
+            write_pages(folder / "all.pdf", drawings)
     finally:
         gc.unfreeze()
     progress(1.0, "pictures drawn")

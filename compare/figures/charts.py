@@ -1,13 +1,13 @@
 """Charts: errors at the markers, force of the indenter, energy and losses on the way to a solution."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, NullLocator
 
 from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
@@ -19,6 +19,7 @@ from compare.figures.style import (
     legend_height,
     solver_colour,
     write_heading,
+    write_letter,
 )
 from geometry.arrays import BoolArray, FloatArray
 from geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
@@ -52,12 +53,30 @@ def approaches_reference(group: Group) -> bool:
 
 
 def draw_energy(comparison: Results) -> Figure | None:
-    """Draw every solver's record, a row for each kind; beside it the distance from the reference's energy.
+    """Draw every record of another kind than energies of one problem, a lettered panel for each kind.
 
-    None without a record.
+    Along a load that grows, or over factors of the markers' weight. None without a record.
     """
+    groups = records_by_kind(comparison.evaluations)
+    chosen = {group: members for group, members in groups.items() if not approaches_reference(group)}
+    return _draw_kinds(comparison, chosen, "Energy along the load and over the markers’ weight")
+
+
+def draw_convergence(comparison: Results) -> Figure | None:
+    """Draw energies on the way to the solution; beside them their distances from the reference's energy.
+
+    None without such a record.
+    """
+    groups = records_by_kind(comparison.evaluations)
+    chosen = {group: members for group, members in groups.items() if approaches_reference(group)}
+    return _draw_kinds(comparison, chosen, "Energy on the way to the solution")
+
+
+def _draw_kinds(
+    comparison: Results, groups: Mapping[Group, Sequence[Evaluation]], heading: str
+) -> Figure | None:
+    """Lettered panels in rows, one for each kind of record; None if there is none."""
     evaluations, reference = comparison.evaluations, comparison.reference
-    groups = records_by_kind(evaluations)
     if not groups:
         return None
     colours = {evaluation.solver: solver_colour(number) for number, evaluation in enumerate(evaluations)}
@@ -68,7 +87,7 @@ def draw_energy(comparison: Results) -> Figure | None:
         for group, members in groups.items()
     ]
     with figure(HEAD + sum(heights) + len(groups) * (height + foot)) as drawn:
-        write_heading(drawn, "Energy on the way to the solution")
+        write_heading(drawn, heading)
         for row, (group, members) in enumerate(groups.items()):
             others = [each for each in members if each is not reference and not each.in_sample]
             compared = others if approaches_reference(group) else []
@@ -87,6 +106,8 @@ def draw_energy(comparison: Results) -> Figure | None:
                 _draw_records(beside, group, compared, away, colours, [None] * len(compared))
                 beside.set_ylabel(f"distance from {reference.solver}, %")
             legend_above(axes)
+        for number, axes in enumerate(drawn.axes if len(drawn.axes) > 1 else []):
+            write_letter(axes, number)
     return drawn
 
 
@@ -173,16 +194,27 @@ def draw_losses(comparison: Results) -> Figure | None:
 
 
 def draw_force_displacement(
-    curves: Sequence[ForceCurve], *, depth: float, truth: ForceCurve | None = None
+    curves: Sequence[ForceCurve],
+    *,
+    depth: float,
+    truth: ForceCurve | None = None,
+    identified: Mapping[int, Evaluation] | None = None,
 ) -> Figure:
     """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
 
-    A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line. A cross
-    is the end of the simulated finger's curve.
+    A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line. The
+    simulated finger's curve ends in a cross. A force that was identified from the markers, by the number of
+    its solver in the run, is a square with its interval of 95 % at the end of the travel.
     """
     labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
     true_label = [_end_label(truth, "truth, simulated")] if truth else []
-    top, height, left = 0.3 + legend_height([*labels, *true_label]), 2.4, 0.75  # inches
+    found = {
+        number: (each, each.identified.size)
+        for number, each in (identified or {}).items()
+        if each.identified is not None
+    }
+    more = [f"{each.label}, {size[0]:.3g} N/mm, identified" for each, size in found.values()]
+    top, height, left = 0.3 + legend_height([*labels, *true_label, *more]), 2.4, 0.75  # inches
     with figure(top + height + 0.45) as drawn:
         write_heading(drawn, "Force of the indenter along its travel")
         axes = axes_at(drawn, (left, top, WIDTH - left - 0.65, height))
@@ -205,9 +237,25 @@ def draw_force_displacement(
         if truth:
             end = truth.travel[-1:], truth.force[-1:]
             axes.plot(*end, "x", ms=7, mew=1.8, color=MEASURED, label=true_label[0], zorder=4)
+            axes.plot(truth.travel, truth.force, color=MEASURED, lw=1.3, zorder=3)
+        reach = (truth or curves[0]).travel[-1]
+        for place, (number, label) in enumerate(zip(found, more, strict=True)):
+            value, low, high = found[number][1]
+            # Beside each other: the intervals of several solvers would hide each other.
+            x, apart = reach * (1 - 0.02 * (place + 1)), [[value - low], [high - value]]
+            style: dict[str, Any] = {
+                "ms": 4.5,
+                "capsize": 2.5,
+                "lw": 1.2,
+                "color": solver_colour(number),
+                "zorder": 5,
+            }
+            axes.errorbar([x], [value], yerr=apart, fmt="s", label=label, **style)
         every = [*curves, truth] if truth else curves
         axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))
-        forces = np.concatenate([curve.force for curve in every])
+        forces = np.concatenate(
+            [curve.force for curve in every] + [np.array(size) for _, size in found.values()]
+        )
         axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
         axes.set_xlabel("travel of the indenter, mm")
         axes.set_ylabel("force, N per mm of depth")
@@ -263,15 +311,15 @@ CIRCLE: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3.2, "mfc": "white", "m
 
 
 def draw_marker_errors(comparison: Results) -> Figure:
-    """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one scale.
+    """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one logarithmic scale.
 
     Bars: at markers that the solver was not given. Circles: at markers that it was given.
     """
     evaluations, observations = comparison.evaluations, comparison.observations
-    head, title, height, gap, foot = 0.62, 0.19, 0.42, 0.09, 0.4  # inches: with legend; a solver's name; ...
-    left, step = 0.56, title + height + gap
-    width = WIDTH / 2 - left - 1.08  # where the means stand
-    ceiling = _ceiling(evaluations, observations)
+    head, title, height, gap, foot = 0.62, 0.19, 0.5, 0.1, 0.4  # inches: with legend; a solver's name; ...
+    left, step = 0.72, title + height + gap
+    width = WIDTH / 2 - left - 1.02  # where the means stand
+    span = _span(evaluations, observations)
     with figure(head + len(evaluations) * step + foot) as drawn:
         write_heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
         fitted = any(evaluation.in_sample for evaluation in evaluations)
@@ -285,8 +333,8 @@ def draw_marker_errors(comparison: Results) -> Figure:
             given = marker_errors(evaluation, observations) if evaluation.in_sample else None
             for column, symbol in enumerate("uv"):
                 axes = axes_at(drawn, (left + column * WIDTH / 2, head + title + row * step, width, height))
-                _draw_errors(axes, symbol, held_out, given, solver_colour(row))
-                _set_scales(axes, observations.visible, ceiling)
+                _draw_errors(axes, symbol, held_out, given, solver_colour(row), span[0])
+                _set_scales(axes, observations.visible, span)
                 axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=SMALL)
                 if row == 0:
                     axes.text(1.03, 1.06, "mean, mm", size=SMALL, color=INK, transform=axes.transAxes)
@@ -299,25 +347,42 @@ def draw_marker_errors(comparison: Results) -> Figure:
     return drawn
 
 
-def _ceiling(evaluations: Sequence[Evaluation], observations: Observations) -> float:
-    """The largest error of a solver that converged (or of any), mm."""
+DECADES = 4
+"""Powers of ten below the largest error at which the scale of errors ends at the latest."""
+
+SMALLEST = 1e-6
+"""Errors below this, mm, are those of rounding."""
+
+
+def _span(evaluations: Sequence[Evaluation], observations: Observations) -> tuple[float, float]:
+    """Powers of ten around the errors of the solvers that converged (or of any), mm."""
     chosen = [evaluation for evaluation in evaluations if evaluation.converged] or evaluations
     errors = [
         error(evaluation, observations) for evaluation in chosen for error in (marker_errors, held_out_errors)
     ]
-    found = [np.nanmax([error.ae_u, error.ae_v]) for error in errors if error is not None]
-    return float(max(found)) or 1.0
+    found = np.concatenate([np.append(each.ae_u, each.ae_v) for each in errors if each is not None])
+    found = found[np.isfinite(found) & (found > SMALLEST)]
+    if not len(found):
+        return SMALLEST, 1e3 * SMALLEST
+    high = float(np.ceil(np.log10(found.max()) - 1e-9))
+    low = max(float(np.floor(np.log10(found.min()))), high - DECADES)
+    return 10 ** min(low, high - 1), 10**high
 
 
 def _draw_errors(
-    axes: Axes, symbol: str, held_out: MarkerErrors | None, given: MarkerErrors | None, colour: str
+    axes: Axes,
+    symbol: str,
+    held_out: MarkerErrors | None,
+    given: MarkerErrors | None,
+    colour: str,
+    floor: float,
 ) -> None:
-    """The bars and circles of one solver and component, and their means beside."""
+    """The bars and circles of one solver and component, and their means beside; none is below the floor."""
     words = []
     for errors, kind in ((held_out, "held out"), (given, "training")):
         if errors is None:
             continue
-        values = getattr(errors, f"ae_{symbol}")
+        values = np.maximum(getattr(errors, f"ae_{symbol}"), floor)  # a scale of powers has no zero
         marker = np.arange(1, len(values) + 1)
         seen = np.isfinite(values)
         if errors is given:
@@ -328,15 +393,17 @@ def _draw_errors(
     axes.text(1.03, 0.5, "\n".join(words), size=SMALL, va="center", color=MUTED, transform=axes.transAxes)
 
 
-def _set_scales(axes: Axes, visible: BoolArray, ceiling: float) -> None:
+def _set_scales(axes: Axes, visible: BoolArray, span: tuple[float, float]) -> None:
     count = len(visible)
     for marker in np.flatnonzero(~visible) + 1:
         place = axes.get_xaxis_transform()
         axes.text(marker, 0.04, "×", size=SMALL, color=MUTED, ha="center", transform=place)
     axes.set_xticks(range(1, count + 1) if count <= 12 else range(1, count + 1, 5))
     axes.set_xlim(0.4, count + 0.6)
-    axes.set_ylim(0, 1.04 * ceiling)
-    axes.yaxis.set_major_locator(MaxNLocator(2))
+    axes.set_ylim(*span)  # first: a scale of powers cannot find limits for bars that are all at one height
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(numticks=4))
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_formatter("{x:g}")
     axes.tick_params(labelsize=SMALL)
     axes.grid(axis="y")

@@ -181,6 +181,7 @@ def _sheet(
         body.prepare(axes, extent)
         draw_section(axes, finger.section)
         pen = Draughtsman(axes, em)
+        _directions(pen, extent)
         _clamp(pen, finger.section)
         _contact(pen, finger)
         yield drawn, pen
@@ -204,6 +205,19 @@ def _page(bounds: FloatArray, room: Sequence[float]) -> tuple[Extent, float]:
     em = float(across * POINT)
     start = middle - (across + (left - right) * em) / 2
     return Extent(start, start + across, bounds[0, 1] - below * em, bounds[1, 1] + above * em), em
+
+
+def _directions(pen: Draughtsman, extent: Extent) -> None:
+    """The directions of x and y, and so of u and v, at the lower right, below the finger."""
+    em = pen.em
+    corner = np.array([extent.right - 4.4 * em, extent.bottom + 0.7 * em])
+    for way, word in ((np.array([1.0, 0.0]), "x, u"), (np.array([0.0, 1.0]), "y, v")):
+        arrow(
+            pen.axes, corner, corner + 2.0 * em * way, style="-|>,head_width=0.12,head_length=0.3", width=0.8
+        )
+        pen.text(
+            corner + 3.2 * em * way if way[0] else corner + 2.6 * em * way, word, size=SMALL, va="center"
+        )
 
 
 def _clamp(pen: Draughtsman, section: Section) -> None:

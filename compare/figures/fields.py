@@ -1,6 +1,6 @@
 """Fields of every solver on one colour scale: quantities with their differences, and the excess energy."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import matplotlib as mpl
@@ -15,6 +15,7 @@ from compare.figures.canvas import Canvas
 from compare.figures.style import axes_at, write_heading
 from compare.runtime.tables import percent, significant
 from geometry.arrays import FloatArray
+from geometry.errors import UserError
 from geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh
 
@@ -98,13 +99,42 @@ def difference_scale(
     return symmetric([difference], mesh.areas)
 
 
-def draw_field(comparison: Results, quantity: FieldQuantity) -> Figure:
-    """Draw a quantity on the undeformed body: a row a solver, its difference from the reference beside it.
+TALLEST = 9.0
+"""Height that a picture of fields has at most, inches: that of a page of a journal."""
 
-    The last row is the truth where the markers are simulated.
+
+def compared_with(comparison: Results) -> Evaluation:
+    """The field from which differences are drawn: the truth where it is known, else the reference."""
+    return next((each for each in comparison.shown_fields if each.solver == TRUTH), comparison.reference)
+
+
+def drawn_solvers(comparison: Results, solvers: Collection[str] = ()) -> list[Evaluation]:
+    """The fields that a picture has room for: what they are compared with, the reference, then the others.
+
+    Those that converged come before those that did not, and `solvers` are the chosen ones, all if empty.
+
+    Raises:
+        UserError: If one of them is no solver of the comparison.
     """
-    mesh, reference = comparison.mesh, comparison.reference
-    ordered = [reference, *(each for each in comparison.shown_fields if each is not reference)]
+    base, reference = compared_with(comparison), comparison.reference
+    known = {each.solver: each for each in comparison.shown_fields if each.solver != base.solver}
+    if unknown := [name for name in solvers if name not in known and name != base.solver]:
+        raise UserError(f"no field of this comparison is called {unknown[0]!r}; it has {', '.join(known)}")
+    chosen = [each for each in known.values() if not solvers or each.solver in solvers]
+    chosen.sort(key=lambda each: (each.solver != reference.solver, not each.converged))
+    extent = body.field_extent(comparison.mesh, width := (WIDTH - 3 * MARGIN) / 2)
+    rows = int((TALLEST - HEAD - FOOT) / (PANEL_TITLE + width * extent.height / extent.width))
+    return [base, *chosen][: max(rows, 2)]
+
+
+def draw_field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str] = ()) -> Figure:
+    """Draw a quantity on the undeformed body: a row a solver, beside it its difference from the first row.
+
+    The first row is the truth where the markers are simulated, else the reference. See `drawn_solvers` for
+    the others.
+    """
+    mesh, ordered = comparison.mesh, drawn_solvers(comparison, solvers)
+    reference = ordered[0]
     columns = 1 if len(ordered) == 1 else 2
     width = (WIDTH - MARGIN * (columns + 1)) / columns
     extent = body.field_extent(mesh, width)
@@ -121,7 +151,7 @@ def draw_field(comparison: Results, quantity: FieldQuantity) -> Figure:
             axes = axes_at(drawn, (MARGIN, top, width, height))
             values = quantity.values(evaluation)
             means = evaluation.per_triangle(values)
-            name = f"{evaluation.label}, simulated" if evaluation.solver == TRUTH else evaluation.label
+            name = _name(evaluation)
             note = f"{largest} {significant(np.abs(means).max(), 3)} {quantity.unit}"
             body.panel(axes, canvas, mesh, scale.paint(means), name, note)
             beside = (2 * MARGIN + width, top, width, height)
@@ -150,13 +180,52 @@ def draw_field(comparison: Results, quantity: FieldQuantity) -> Figure:
     return drawn
 
 
+def _name(evaluation: Evaluation) -> str:
+    return f"{evaluation.label}, simulated" if evaluation.solver == TRUTH else evaluation.label
+
+
+def draw_differences(
+    comparison: Results, quantity: FieldQuantity = QUANTITIES[0], solvers: Collection[str] = ()
+) -> Figure | None:
+    """Draw every solver's difference from the truth, or the reference, on one scale; None if there is none.
+
+    The scale ends where that of the solver in the middle does: beside one that is far off all others would
+    be blank.
+    """
+    mesh, (base, *others) = comparison.mesh, drawn_solvers(comparison, solvers)
+    if not others:
+        return None
+    columns = min(len(others), 2)
+    rows = -(-len(others) // columns)
+    width = (WIDTH - MARGIN * (columns + 1)) / columns
+    extent = body.field_extent(mesh, width)
+    height = width * extent.height / extent.width
+    values = [triangle_values(quantity, each) - triangle_values(quantity, base) for each in others]
+    sizes = sorted(symmetric([each], mesh.areas).high for each in values)
+    scale = Scale(-(high := sizes[len(sizes) // 2]), high, diverging())
+    total = HEAD + rows * (PANEL_TITLE + height) + FOOT
+    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
+        write_heading(drawn, f"{quantity.title} minus {_name(base)}, one scale for all")
+        for number, (each, difference) in enumerate(zip(others, values, strict=True)):
+            row, column = divmod(number, columns)
+            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
+            axes = axes_at(drawn, (MARGIN + column * (width + MARGIN), top, width, height))
+            distance = field_difference(quantity.values(each), quantity.values(base), base.weights).rel_l2
+            note = f"rel. L² {percent(distance)}"
+            body.panel(axes, canvas, mesh, scale.paint(difference), each.label, note)
+        body.scale_bar(axes, extent)
+        bar = axes_at(drawn, (0.2 * WIDTH, total - FOOT + 0.1, 0.6 * WIDTH, 0.09))
+        body.colour_bar(bar, scale, f"difference of ${quantity.symbol}$, {quantity.unit}", extend="both")
+    return drawn
+
+
 def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: Evaluation) -> None:
     axes = axes_at(drawn, box)
     axes.set_axis_off()
     text = (
-        f"Reference: {reference.label}\n"
+        f"Compared with: {_name(reference)}\n"
         f"Scales end at the {PERCENT:g} % point of the area:\n"
-        "left of the reference, right of each\ndifference, where ± above a panel is its\n"
+        "left of this field, right of each\ndifference, where ± above a panel is its\n"
         "end. Values beyond have the end colours.\nLargest: of triangles’ means."
     )
     axes.text(0.02, 0.95, text, va="top", size=SMALL, color=MUTED, linespacing=1.35, transform=axes.transAxes)

@@ -1,6 +1,6 @@
 """The pictures of a comparison by name, in the order of the report, with their captions."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from typing import NamedTuple
 
@@ -11,13 +11,22 @@ from compare.evaluation.evaluation import IN_SAMPLE, Evaluation
 from compare.evaluation.metrics import ForceCurve, force_curves, held_out_errors
 from compare.figures.body import PERCENT
 from compare.figures.charts import (
+    draw_convergence,
     draw_energy,
     draw_force_displacement,
     draw_losses,
     draw_marker_errors,
 )
 from compare.figures.design_drawing import draw_design
-from compare.figures.fields import DECADES, QUANTITIES, FieldQuantity, draw_excess, draw_field
+from compare.figures.fields import (
+    DECADES,
+    QUANTITIES,
+    FieldQuantity,
+    draw_differences,
+    draw_excess,
+    draw_field,
+    drawn_solvers,
+)
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
 from geometry.errors import UserError
@@ -37,6 +46,10 @@ def _overlay(comparison: Results) -> Illustration:
     observations = comparison.observations
     cylinder = "" if comparison.load.radius is None else " Grey circle: the cylinder where it ends."
     circles = f"Circles: {observations.label} marker positions. " if observations.known else ""
+    if observations.known:
+        circles += (
+            "Pink arrows: errors there, times the factor above the panel, of held-out markers if known. "
+        )
     return Illustration(
         draw_overlay(comparison),
         "Deformed finger",
@@ -65,8 +78,9 @@ def _marker_errors(comparison: Results) -> Illustration | None:
         draw_marker_errors(comparison),
         "Errors at the markers",
         f"Absolute difference between each solver’s displacement and the {observations.label} one, "
-        f"for both components, on one scale, which a solver that did not converge may exceed; markers "
-        f"are numbered as in the drawing of the design. Bars: at a marker that the solver was "
+        f"for both components, on one logarithmic scale, which a solver that did not converge may exceed "
+        f"and at whose lower end are all smaller errors; markers are numbered as in the drawing of the "
+        f"design. Bars: at a marker that the solver was "
         f"not given, predicted from all others if it was given those. Circles: training errors."
         f"{unseen} {_given(comparison)}{_simulated(comparison)}",
         each_of(
@@ -77,8 +91,9 @@ def _marker_errors(comparison: Results) -> Illustration | None:
     )
 
 
-def _field(comparison: Results, quantity: FieldQuantity) -> Illustration:
-    reference = comparison.reference.label
+def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str] = ()) -> Illustration:
+    drawn = drawn_solvers(comparison, solvers)
+    reference = drawn[0].label
     mixed = (
         " The solvers have different laws: strain is Green-Lagrange where it is finite, stress is Cauchy."
         if len({evaluation.law for evaluation in comparison.shown_fields}) > 1
@@ -92,8 +107,11 @@ def _field(comparison: Results, quantity: FieldQuantity) -> Illustration:
     )
     if comparison.truth is not None:
         beside += " Truth: the simulated finger of the markers."
+    names = {each.solver for each in drawn}
+    if absent := [each.label for each in comparison.shown_fields if each.solver not in names]:
+        beside += f" Not drawn, as a page has no more room or others were chosen: {', '.join(absent)}."
     return Illustration(
-        draw_field(comparison, quantity),
+        draw_field(comparison, quantity, solvers),
         quantity.title,
         f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
         f"mean. One scale for all: {PERCENT:g} % of the area of {reference} lie "
@@ -107,6 +125,27 @@ def _field(comparison: Results, quantity: FieldQuantity) -> Illustration:
     )
 
 
+def _differences(comparison: Results, solvers: Collection[str] = ()) -> Illustration | None:
+    quantity = QUANTITIES[0]
+    if (figure := draw_differences(comparison, quantity, solvers)) is None:
+        return None
+    base, *others = drawn_solvers(comparison, solvers)
+    return Illustration(
+        figure,
+        "Differences on one scale",
+        f"{quantity.title} of every solver minus that of {base.label}, on one scale: it ends where that of "
+        f"the solver in the middle does, and values beyond have the end colours. Beside the fields each "
+        f"difference has a scale of its own.",
+        each_of(
+            f"Mean size of the difference, {quantity.unit}",
+            others,
+            lambda each: float(
+                np.average(np.abs(quantity.values(each) - quantity.values(base)), weights=each.weights)
+            ),
+        ),
+    )
+
+
 def _force_displacement(comparison: Results) -> Illustration | None:
     depth = comparison.design.depth
     if not (curves := force_curves(comparison.evaluations, comparison.load)):
@@ -114,14 +153,16 @@ def _force_displacement(comparison: Results) -> Illustration | None:
     truth, cross = None, ""
     if comparison.truth is not None:
         truth = ForceCurve.of(comparison.truth, comparison.load)
-        cross = " Cross: the force on the simulated finger, the truth that the solvers should reach."
+        cross = " Pink: the force on the simulated finger, the truth that the solvers should reach."
+    found = {n: each for n, each in enumerate(comparison.evaluations) if each.identified}
+    squares = " Squares: forces identified from the markers, with intervals of 95 %." if found else ""
     return Illustration(
-        draw_force_displacement(curves, depth=depth, truth=truth),
+        draw_force_displacement(curves, depth=depth, truth=truth, identified=found),
         "Force over displacement",
         f"Force of the indenter along its travel: per mm of depth (left), and for the finger’s "
         f"{depth:g} mm (right). A point is an equilibrium that a solver found as the load "
-        f"grew; a linear solver’s line (dashed) is straight by its law. Solvers that were given the "
-        f"markers are left out: the markers pull too.{cross}",
+        f"grew; a linear solver’s line (dashed) is straight by its law. Other solvers that were given "
+        f"the markers are left out: the markers pull too.{cross}{squares}",
         each_of(
             f"Force at the end of the travel, N per mm, after {curves[0].travel[-1]:g} mm",
             [curve.evaluation for curve in curves],
@@ -155,10 +196,21 @@ def _energy(comparison: Results) -> Illustration | None:
     return Illustration(
         figure,
         "Energy",
+        "Elastic energy per unit depth along the load of each solver that follows it; over factors of the "
+        "markers’ weight, the energy that they add: assimilation never lowers the least energy.",
+        each_of("Energy at the end, N mm per mm", comparison.evaluations, lambda each: each.energy),
+    )
+
+
+def _convergence(comparison: Results) -> Illustration | None:
+    if (figure := draw_convergence(comparison)) is None:
+        return None
+    return Illustration(
+        figure,
+        "Convergence",
         f"Elastic energy per unit depth as each solver went on and, beside it, its relative distance "
         f"from that of {comparison.reference.label} (dashed line). A solver that solves directly "
-        f"keeps no record. One that was given the markers pays energy for them: assimilation never "
-        f"lowers the least energy. Over factors of the markers’ weight: the energy that they add.",
+        f"keeps no record. One that was given the markers pays energy for them.",
         each_of("Energy at the end, N mm per mm", comparison.evaluations, lambda each: each.energy),
     )
 
@@ -206,13 +258,18 @@ def _mesh(comparison: Results) -> Illustration:
     )
 
 
-GALLERY: dict[str, tuple[str, Callable[[Results], Illustration | None]]] = {
+CHOOSING = (*(each.name for each in QUANTITIES), "differences")
+"""Pictures in which solvers can be chosen."""
+
+GALLERY: dict[str, tuple[str, Callable[..., Illustration | None]]] = {
     "overlay": ("picture of the deformed finger", _overlay),
     "marker_errors": ("chart of the errors at the markers", _marker_errors),
     **{each.name: (f"picture of {each.name}", partial(_field, quantity=each)) for each in QUANTITIES},
+    "differences": ("picture of the differences on one scale", _differences),
     "force_displacement": ("chart of force over displacement", _force_displacement),
     "excess": ("picture of the excess energy", _excess),
     "energy": ("chart of the energy", _energy),
+    "convergence": ("chart of the energy on the way to the solution", _convergence),
     "losses": ("chart of the losses", _losses),
     "design": ("drawing of the design", _design),
     "mesh": ("picture of the mesh", _mesh),
@@ -220,16 +277,18 @@ GALLERY: dict[str, tuple[str, Callable[[Results], Illustration | None]]] = {
 """By file name: words for the progress line, and the function; it gives None if there is nothing to draw."""
 
 
-def draw(comparison: Results, name: str) -> Illustration:
-    """One picture of a comparison by its name.
+def draw(comparison: Results, name: str, solvers: Collection[str] = ()) -> Illustration:
+    """One picture of a comparison by its name; a picture of fields may have chosen solvers only.
 
     Raises:
-        UserError: If there is no such picture, or nothing to draw in it.
+        UserError: If there is no such picture or solver, or nothing to draw in it.
     """
     if name not in GALLERY:
         raise UserError(f"there is no picture {name!r}; there are {', '.join(GALLERY)}")
     what, make = GALLERY[name]
-    if (drawing := make(comparison)) is None:
+    if solvers and name not in CHOOSING:
+        raise UserError(f"the {what} has all solvers; chosen ones are for {', '.join(CHOOSING)}")
+    if (drawing := make(comparison, solvers=solvers) if solvers else make(comparison)) is None:
         raise UserError(f"{name}: no solver of this comparison has data for the {what}")
     return drawing
 

@@ -1,5 +1,7 @@
 """The deformed finger of every solver, with its markers and those that were seen."""
 
+from typing import Any
+
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +16,7 @@ from compare.figures.body import Scale
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
 from geometry.arrays import FloatArray
-from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
+from geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 
@@ -35,10 +37,13 @@ def draw_overlay(comparison: Results) -> Figure:
     height = width * extent.height / extent.width
     high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
     scale = Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
-    given = ""
+    notes = []
     if any(evaluation.in_sample for evaluation in evaluations):
-        given = "† was given these markers and meets them; held out: each predicted from the others"
-    head = HEAD + LEGEND_LINE * bool(given)
+        notes.append("† was given these markers and meets them; held out: each predicted from the others")
+    if comparison.observations.known:
+        notes.append("pink arrows: errors at the markers, held out if known, × the factor above the panel")
+    given = "\n".join(notes)
+    head = HEAD + LEGEND_LINE * len(notes)
     total = head + rows * (PANEL_TITLE + height) + FOOT
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
         write_heading(drawn, "Deformed finger, true scale")
@@ -106,8 +111,38 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Results, evalua
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
     axes.set_title(evaluation.label_at_markers, size=9, pad=3, y=1.0, weight="bold")
     if observations.known:
+        _error_vectors(axes, observed, evaluation, observations)
         frame = "" if evaluation.shown is None else "; the frame it found is taken off the markers"
         body.write_note(axes, canvas.extent, errors_note(evaluation, observations) + frame)
+
+
+FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+"""Magnifications of the errors at the markers."""
+
+
+def _error_vectors(
+    axes: Axes, observed: FloatArray, evaluation: Evaluation, observations: Observations
+) -> None:
+    """The error at each marker that was seen, from where it was seen, shape (k, 2), mm, and magnified.
+
+    Held out where the solver has such predictions. The longest is a tenth of the panel at most.
+    """
+    told = evaluation.left_out if evaluation.in_sample else None
+    predicted = evaluation.shown_displacement if told is None else told
+    error = (predicted - observations.displacements)[observations.visible]
+    longest = float(np.linalg.norm(error, axis=1).max())
+    room = 0.1 * float(np.ptp(axes.get_xlim()))
+    factor = max((each for each in FACTORS if each * longest <= room), default=1)
+    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": MEASURED, "zorder": 6}
+    shape: dict[str, Any] = {
+        "units": "inches",
+        "width": 0.014,
+        "headwidth": 4,
+        "headlength": 4.5,
+        "headaxislength": 4,
+    }
+    axes.quiver(*observed.T, *(factor * error).T, **style, **shape, minlength=0.1)
+    axes.set_title(f"×{factor}", loc="right", size=SMALL, pad=3, y=1.0, color=MEASURED)
 
 
 def errors_note(evaluation: Evaluation, observations: Observations) -> str:

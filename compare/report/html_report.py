@@ -218,7 +218,7 @@ def report_html(
     numbers = metrics(comparison) if numbers is None else numbers
     design = comparison.design
     certificates = [each.certificate for each in comparison.evaluations if each.certificate]
-    fields = {quantity.name for quantity in QUANTITIES}
+    fields = {*(quantity.name for quantity in QUANTITIES), "differences"}
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,

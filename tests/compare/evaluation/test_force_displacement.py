@@ -10,7 +10,9 @@ import pytest
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import ForceCurve, force_curves, write_force_displacement
 from compare.figures.charts import draw_force_displacement
+from geometry.figure import MEASURED
 from solvers.problem import Load
+from solvers.solution import Estimated, IdentifiedForce
 from tests.compare.figures.drawn_pages import page_of
 
 STEPS = np.array([0.0, 0.5, 1.0])
@@ -81,3 +83,20 @@ def test_the_force_on_the_simulated_finger_is_a_cross(followed, fem):
     assert "truth, simulated, 0.5 N/mm at 10 mm" in page.text
     (cross,) = [line for line in page.figure.axes[0].lines if line.get_marker() == "x"]
     assert (cross.get_xdata(), cross.get_ydata()) == (pytest.approx([10.0]), pytest.approx([0.5]))
+
+
+def test_the_whole_curve_of_the_simulated_finger_and_an_identified_force_are_drawn(followed, fem):
+    size = Estimated(0.6, 0.5, 0.8)
+    found = replace(fem, solver="fem-id", in_sample=True, identified=IdentifiedForce(size, None))
+    truth = replace(followed, solver="truth")
+    curves = force_curves([fem, followed], Load())
+    page = page_of(
+        draw_force_displacement(curves, depth=20.0, truth=ForceCurve.of(truth, Load()), identified={2: found})
+    )
+    axes = page.figure.axes[0]
+    pink = [line for line in axes.lines if line.get_color() == MEASURED and line.get_marker() == "None"]
+    np.testing.assert_allclose(pink[0].get_ydata(), 3.0 * STEPS**2)
+    assert "fem-id, 0.6 N/mm, identified" in page.text
+    (interval,) = axes.containers[0].lines[2]
+    np.testing.assert_allclose(interval.get_segments()[0][:, 1], [0.5, 0.8])
+    assert (page.cut_off(), page.overlaps()) == ([], [])

@@ -31,6 +31,7 @@ def test_a_drawing_has_every_dimension_and_none_overlaps(design: Design) -> None
     ]
     if design.rib_count:
         expected += [rf"$t_\mathrm{{rib}}$ = {design.rib_thickness:.4g} mm", r"$L_\mathrm{angle}$"]
+    expected += ["x, u", "y, v"]
     assert [dimension for dimension in expected if dimension not in page.text] == []
     assert page.cut_off() == []
     assert page.overlaps() == []

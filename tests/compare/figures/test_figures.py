@@ -63,7 +63,7 @@ def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, 
         for folder in (tmp_path / "first", tmp_path / "second")
         if draw_all(folder, comparison, formats=[kind])
     )
-    assert len(first) == 2
+    assert len(first) == 2 + (kind == "pdf")  # one file of all
     assert first == second
     assert all((b"/FontFile2" if kind == "pdf" else b"<path") in content for content in first)
 
@@ -78,7 +78,10 @@ def test_every_picture_is_told_in_numbers_to_those_who_cannot_see_it(drawings, c
 
 
 FIELDS = tuple(quantity.name for quantity in QUANTITIES)
-ALL = ("overlay", "marker_errors", *FIELDS, "force_displacement", "excess", "energy", "design", "mesh")
+ALL = (
+    *("overlay", "marker_errors", *FIELDS, "differences", "force_displacement", "excess", "energy"),
+    *("convergence", "design", "mesh"),
+)
 
 
 def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawings, tmp_path):
@@ -133,7 +136,7 @@ def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     more += [replace(told, solver="gp"), replace(told, solver="statfem", converged=False)]
     eight = compared(fem, pinn, failed, *more)
-    for name in ("overlay", "marker_errors", "von_mises", "excess", "energy"):
+    for name in ("overlay", "marker_errors", "von_mises", "excess", "convergence", "differences"):
         page = page_of(draw(eight, name).figure)
         assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
 
@@ -171,7 +174,8 @@ def test_a_circle_shows_a_training_error_that_vanishes(fem, pinn, observations, 
     figure = draw(compared(fem, met), "marker_errors").figure
     (circles,) = figure.axes[2].lines
     assert circles.get_marker() == "o"
-    np.testing.assert_array_equal(circles.get_ydata(), 0.0)
+    assert figure.axes[2].get_yscale() == "log"  # which has no zero: the circle is at the lower end
+    np.testing.assert_array_equal(circles.get_ydata(), figure.axes[2].get_ylim()[0])
 
 
 def test_a_difference_has_its_scale_beside_its_name(pages: dict[str, Page]) -> None:
@@ -217,7 +221,7 @@ def test_the_overlay_shows_the_whole_of_every_solution_that_converged(mesh, pinn
 
 
 def test_the_reference_energy_is_a_line(pages: dict[str, Page]) -> None:
-    energies, distances, *_ = pages["energy"].figure.axes
+    energies, distances, *_ = pages["convergence"].figure.axes
     assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
     np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [4400.0, 100.0, 21.0])
 
@@ -249,7 +253,7 @@ def test_ticks_of_six_characters_leave_room_for_the_labels(fem, pinn, compared):
     history = {"units": np.array([3200.0, 8000.0]), "energy": np.array([1.1015, 1.0881])}
     followed = {"load_fraction": np.array([0.0, 1.0]), "reaction_x": np.zeros(2), "reaction_y": [0, -0.0021]}
     near = replace(fem, energy=1.0924)
-    assert page_of(draw(compared(near, replace(pinn, history=history)), "energy").figure).cut_off() == []
+    assert page_of(draw(compared(near, replace(pinn, history=history)), "convergence").figure).cut_off() == []
     follower = replace(pinn, history=followed, reaction=np.array([0.0, -0.0021]))
     assert page_of(draw(compared(follower), "force_displacement").figure).cut_off() == []
 
@@ -260,3 +264,70 @@ def test_the_field_of_the_truth_is_drawn_where_it_is_known(fem, pinn, compared):
     )
     assert "truth" in with_truth
     assert "truth" not in without
+
+
+def test_errors_of_solvers_that_are_far_apart_are_all_seen(fem, pinn, compared, observations):
+    """A hundredth of another solver's error still has a bar to be seen."""
+    near = replace(pinn, marker_displacement=observations.displacements + np.array([0.003, -0.004]))
+    figure = draw(compared(fem, near), "marker_errors").figure
+    heights = []
+    for axes in (figure.axes[0], figure.axes[2]):
+        low, high = np.log10(axes.get_ylim())
+        heights.append((np.log10(axes.patches[0].get_height()) - low) / (high - low))
+    assert min(heights) > 0.1
+
+
+def test_energy_and_convergence_are_two_pictures_with_letters(pages: dict[str, Page]) -> None:
+    assert "share of the load" in pages["energy"].text
+    assert "hidden units of the network" not in pages["energy"].text
+    assert "share of the load" not in pages["convergence"].text
+    words = [word for word, _ in pages["convergence"].words]
+    assert ("(a)" in words, "(b)" in words, "(a)" in [word for word, _ in pages["energy"].words]) == (
+        *(True, True),
+        False,  # one panel needs none
+    )
+
+
+def test_differences_are_from_the_truth_where_it_is_known(fem, pinn, evaluate, compared):
+    known = compared(fem, pinn, truth=evaluate("fem-nonlinear", 1.05))
+    text = page_of(draw(known, "von_mises").figure).text
+    assert (text.count("minus truth"), text.count("minus fem")) == (2, 0)
+    distances = [float(found) for found in re.findall(r"rel. L² ([\d.]+)\s%", text)]
+    assert distances == pytest.approx([100 * 0.05 / 1.05] * 2, rel=0.01)  # 1 and 1.1 from 1.05
+    assert "truth, simulated" in text.splitlines()[1:4]
+    shared = page_of(draw(known, "differences").figure)
+    assert "one scale for all" in shared.text
+    assert shared.text.count("rel. L²") == 2
+
+
+def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, compared, evaluate):
+    many = [replace(pinn, solver=f"solver-{n}", converged=n != 1) for n in range(14)]
+    comparison = compared(fem, *many)
+    drawing = draw(comparison, "von_mises")
+    assert drawing.figure.get_size_inches()[1] <= 9
+    assert "Not drawn" in drawing.caption
+    assert "solver-1 (not converged)" in drawing.caption.split("Not drawn")[1]
+    chosen = page_of(draw(comparison, "von_mises", ["solver-13", "solver-12"]).figure)
+    assert [word for word, _ in chosen.words if word.startswith("solver-")] == ["solver-12", "solver-13"]
+    with pytest.raises(UserError, match="no field of this comparison is called 'gp'"):
+        draw(comparison, "von_mises", ["gp"])
+    with pytest.raises(UserError, match="chart of the errors at the markers has all solvers"):
+        draw(comparison, "marker_errors", ["fem"])
+
+
+def test_all_pictures_are_pages_of_one_file_with_their_captions(comparison, tmp_path, monkeypatch):
+    chosen = {name: GALLERY[name] for name in ("marker_errors", "mesh")}
+    monkeypatch.setattr("compare.figures.gallery.GALLERY", chosen)
+    draw_all(tmp_path / "first", comparison, formats=["pdf"])
+    draw_all(tmp_path / "second", comparison, formats=["pdf"])
+    content = (tmp_path / "first" / "all.pdf").read_bytes()
+    assert content == (tmp_path / "second" / "all.pdf").read_bytes()
+    sizes = [
+        [float(number) / 72 for number in found.split()]
+        for found in re.findall(rb"/MediaBox \[([^\]]*)\]", content)
+    ]
+    assert [size[2] for size in sizes] == pytest.approx([WIDTH] * 2)
+    for name, size in zip(chosen, sizes, strict=True):
+        assert size[3] > draw(comparison, name).figure.get_figheight() + 0.3  # its caption
+    draw_all(tmp_path / "third", comparison)
+    assert not (tmp_path / "third" / "all.pdf").exists()

@@ -5,6 +5,7 @@ import pytest
 
 from compare.figures.charts import (
     approaches_reference,
+    draw_convergence,
     draw_energy,
     draw_losses,
     readable,
@@ -26,7 +27,7 @@ def test_records_are_grouped_by_their_first_column(fem, pinn, evaluate):
 
 
 def test_without_a_record_there_is_no_chart_of_energy(fem, compared):
-    assert draw_energy(compared(fem)) is None
+    assert draw_energy(compared(fem)) is draw_convergence(compared(fem)) is None
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def test_a_growing_load_does_not_approach_the_reference() -> None:
 
 
 def test_axes_name_what_a_record_is_over(fem, pinn, compared):
-    drawn = draw_energy(compared(fem, pinn))
+    drawn = draw_convergence(compared(fem, pinn))
     assert drawn is not None
     assert drawn.axes[0].get_xlabel() == "hidden units of the network"
     assert drawn.axes[1].get_ylabel() == "distance from fem, %"
@@ -59,7 +60,7 @@ def test_axes_name_what_a_record_is_over(fem, pinn, compared):
 
 def test_two_results_are_joined_by_dots_and_no_curve(fem, pinn, compared):
     short = {name: column[:2] for name, column in pinn.history.items()}
-    drawn = draw_energy(compared(fem, replace(pinn, history=short)))
+    drawn = draw_convergence(compared(fem, replace(pinn, history=short)))
     assert drawn is not None
     assert drawn.axes[0].lines[0].get_linestyle() == ":"
 

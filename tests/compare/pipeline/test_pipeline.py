@@ -88,8 +88,8 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 def test_every_file_of_the_design_is_there(finished):
     pictures = (
-        "design energy force_displacement marker_errors mesh overlay strain_principal strain_xx strain_xy "
-        "strain_yy von_mises"
+        "design differences energy force_displacement marker_errors mesh overlay strain_principal strain_xx "
+        "strain_xy strain_yy von_mises"
     )
     others = (
         "report.html metrics.json run.json markers.csv summary.csv observations.csv table1.csv "
