@@ -41,7 +41,7 @@ def test_intervals_of_few_samples_hold_though_many_lengths_fit_them() -> None:
         values = np.sin(inputs[:, 0]) + 0.5 * inputs[:, 1] * inputs[:, 2] + 0.2 * np.cos(2 * inputs[:, 3])
         middle, width = GaussianProcess.fitted(inputs[:30], values[:30]).predict(inputs[30:])
         held.append(np.mean(np.abs(middle - values[30:]) <= width))
-    assert np.mean(held) > 0.9  # 0.65 where the lengths are learnt from the sample that is left out, too
+    assert np.mean(held) > 0.9  # 0.72 where the lengths are learnt from the sample that is left out, too
 
 
 def test_intervals_are_wider_away_from_the_samples() -> None:
