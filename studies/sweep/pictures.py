@@ -39,8 +39,8 @@ def draw_pairs(sweep: Sweep) -> Figure:
     names = [name for name in SHOWN if _varies(sweep, name)]
     parameters = list(sweep.study.varied)
     good = sweep.good[:MOST_DOTS]
-    size = float(np.clip(60 / np.sqrt(len(good)), 1.2, 4.0))
-    left, head, foot, gap, tall = 0.95, 0.5, 0.95, 0.12, 0.62
+    size = float(np.clip(30 / np.sqrt(len(good)), 1.0, 3.5))
+    left, head, foot, gap, tall = 1.1, 0.5, 0.95, 0.12, 0.62
     width = (WIDTH - left - 0.1 - gap * (len(parameters) - 1)) / len(parameters)
     with figure(head + foot + (tall + gap) * len(names)) as drawn:
         bins = min(BINS, len(good) // IN_A_BIN)
@@ -55,13 +55,16 @@ def draw_pairs(sweep: Sweep) -> Figure:
                 texts = [sweep.samples[each.number][parameter] for each in good]
                 choices = sweep.study.varied[parameter].values
                 x = np.array([choices.index(text) if choices else text for text in texts], dtype=np.float64)
-                axes.plot(x, values, ".", ms=size, color="#0072b2", alpha=0.5, mew=0)
+                axes.plot(x, values, "o", ms=size, color="#0072b2", alpha=0.7, mew=0, clip_on=False, zorder=3)
                 draw_medians(axes, x, values)
                 axes.tick_params(length=2, pad=1.5)
                 axes.locator_params(axis="y", nbins=3)
                 ends = _ends(sweep, parameter)
-                axes.set_xticks([0, len(choices) - 1] if choices else [float(end) for end in ends])
-                axes.margins(0.08)
+                ticks = [0.0, len(choices) - 1.0] if choices else [float(end) for end in ends]
+                room = 0.06 * (ticks[1] - ticks[0] or 1.0)
+                axes.set_xlim(ticks[0] - room, ticks[1] + room)  # both ends have their numbers
+                axes.set_xticks(ticks)
+                axes.margins(y=0.1)
                 if column:
                     axes.set_yticklabels([])
                 else:
@@ -113,18 +116,22 @@ def draw_fingers(sweep: Sweep, job: StudyJob[Study]) -> Figure:
     chosen = []
     for name in names:
         ranked = sorted(sweep.good, key=lambda each: each.values[name])
-        for each in (ranked[0], ranked[len(ranked) // 2], ranked[-1]):
+        for each in [ranked[0], ranked[len(ranked) // 2], ranked[-1]] if len(ranked) > 2 else ranked:
             finger = finger_from(job.task(each.number, sweep.samples[each.number]).definition)
             chosen.append((finger, each.number, name, each.values[name]))
     low = np.min([finger.section.bounds[0] for finger, *_ in chosen], axis=0)
     high = np.max([finger.section.bounds[1] for finger, *_ in chosen], axis=0)
     width = (WIDTH - 0.2) / COLUMNS
     height = (width - 0.1) * (high[1] - low[1]) / (high[0] - low[0])
-    head, label = 0.38, 0.4
-    with figure(head + (height + label) * len(names)) as drawn:
-        write_heading(drawn, "Fingers with the least, the median and the largest value", "all to one scale")
+    head, label, foot = 0.38, 0.4, 0.1
+    columns = min(COLUMNS, len(sweep.good))
+    which = (
+        "the least, the median and the largest value" if columns > 2 else "the least and the largest value"
+    )
+    with figure(head + (height + label) * len(names) + foot) as drawn:
+        write_heading(drawn, f"Fingers with {which}", "all to one scale")
         for place, (finger, number, name, value) in enumerate(chosen):
-            row, column = divmod(place, COLUMNS)
+            row, column = divmod(place, columns)
             box = (0.1 + column * width, head + row * (height + label) + label, width - 0.1, height)
             axes = axes_at(drawn, box)
             draw_section(axes, finger.section)
