@@ -133,7 +133,7 @@
   }
 
   // A table that is wider than its window says so, and can be scrolled by keys.
-  const measured = new ResizeObserver((found) => {
+  const widths = new ResizeObserver((found) => {
     for (const { target } of found) {
       const cut = target.scrollWidth > target.clientWidth + 1;
       target.classList.toggle("cut", cut);
@@ -141,7 +141,7 @@
       else target.removeAttribute("tabindex");
     }
   });
-  for (const window of document.querySelectorAll(".scroll")) measured.observe(window);
+  for (const window of document.querySelectorAll(".scroll")) widths.observe(window);
 
   for (const image of document.querySelectorAll(".pictures img")) {
     image.addEventListener("click", () => image.parentElement.classList.toggle("wide"));

@@ -86,6 +86,12 @@ def test_a_shell_completes_commands_and_options(tmp_path):
 
 
 def test_options_of_material_and_load_have_the_names_and_the_defaults_of_the_schema() -> None:
-    """But for law and load, whose default is the solver's or the preset's."""
+    """But for law and load, which solvers and presets choose, and the constants, which a material may give."""
     own = {field.name: field.default for field in fields(PhysicsOptions)}
-    assert own | {"law": "linear", "load": "mean"} == Physics().model_dump()
+    assert own.pop("material") is own.pop("young") is own.pop("poisson") is None
+    schema = Physics().model_dump()
+    assert own | {"law": "linear", "load": "mean"} == {name: schema[name] for name in own}
+    assert PhysicsOptions().values().keys() == own.keys() - {"law", "radius"}
+    text = PhysicsOptions.__doc__
+    assert f"default {schema['young']:g}." in text
+    assert f"default {schema['poisson']:g}." in text
