@@ -86,7 +86,7 @@ def test_a_shell_completes_commands_and_options(tmp_path):
 
 
 def test_options_of_material_and_load_have_the_names_and_the_defaults_of_the_schema() -> None:
-    """But for law and load, which solvers and presets choose, and the constants, which a material may give."""
+    """But for law, load and the elastic constants: solver, preset and material may give these."""
     own = {field.name: field.default for field in fields(PhysicsOptions)}
     assert own.pop("material") is own.pop("young") is own.pop("poisson") is None
     schema = Physics().model_dump()
