@@ -43,7 +43,8 @@ def test_the_end_is_the_equilibrium_of_the_path_on_fine_elements(kind):
     away = np.abs(nested.displacement(nodes) - plain.displacement(nodes)).max()
     assert away < (5e-5 if kind == "cylinder" else 1e-6)
     assert nested.energy == pytest.approx(plain.energy, rel=1e-5 if kind == "cylinder" else 1e-9)
-    np.testing.assert_allclose(nested.reaction, plain.reaction, atol=1e-5 * np.abs(plain.reaction).max())
+    off = (1e-4 if kind == "cylinder" else 1e-5) * np.abs(plain.reaction).max()
+    np.testing.assert_allclose(nested.reaction, plain.reaction, atol=off)
     # Elements of 1 mm are up to 1 % off on the way.
     for column in ("energy", "reaction_y"):
         at = np.array([0.3, 0.6, 0.9])
