@@ -1,4 +1,4 @@
-"""How objects show themselves: HTML in a notebook, and one line elsewhere."""
+"""Representations of objects: HTML in a notebook, one line elsewhere."""
 
 import base64
 from collections.abc import Mapping, Sequence

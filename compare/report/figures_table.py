@@ -1,4 +1,4 @@
-"""What a finger does, as lines for the terminal."""
+"""Lines for the terminal with the figures of a finger."""
 
 from collections.abc import Sequence
 

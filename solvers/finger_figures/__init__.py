@@ -1,4 +1,4 @@
-"""What a finger does under its load, in its designer's units: force, tip, wrap, stress, compliance, mass."""
+"""Figures of a finger under its load, in its designer's units: force, tip, wrap, stress, compliance, mass."""
 
 from solvers.finger_figures.figures import (
     FRACTIONS,

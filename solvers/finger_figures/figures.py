@@ -95,6 +95,11 @@ class FingerFigures:
         return self.curve[-1][0] if self.curve else float("nan")
 
     @property
+    def density(self) -> float:
+        """Density of the material that the mass is of, g/cm^3."""
+        return 1000 * self.mass / (self.area * self.depth)
+
+    @property
     def tip(self) -> float:
         """How far the tip moves, mm."""
         return float(np.hypot(self.tip_u, self.tip_v))
@@ -154,7 +159,11 @@ class FingerFigures:
             ("von Mises stress", self._said("von_mises", "MPa"), self._where("von_mises")),
             ("principal strain", f"{self.principal_strain:.2%}", self._where("principal_strain")),
             ("strain energy", f"{self.strain_energy:.4g} mJ", ""),
-            ("mass", f"{self.mass:.3g} g", f"{self.area:.4g} mm2 of section, {self.depth:g} mm deep"),
+            (
+                "mass",
+                f"{self.mass:.3g} g",
+                f"at {self.density:.3g} g/cm3, {self.area:.4g} mm2 by {self.depth:g} mm",
+            ),
             ("smallest wall", f"{self.thinnest_wall:.3g} mm", f"narrowest gap {self.narrowest_gap:.3g} mm"),
         ]
         return [row for row in rows if not row[1].startswith("nan")]

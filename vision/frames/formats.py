@@ -1,4 +1,4 @@
-"""What a picture file holds: a format that is not read, and the numbers of its pages."""
+"""Formats of picture files: those that are not read, and the numbers of pages."""
 
 import re
 from collections.abc import Sequence

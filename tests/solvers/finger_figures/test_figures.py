@@ -135,6 +135,7 @@ def test_figures_are_said_in_newtons_with_the_place_of_the_largest_stress() -> N
     rows = {name: (value, remark) for name, value, remark in found.rows() if name}
     assert rows["grip force"] == (f"{found.force:.4g} N", f"at 10 mm, {found.force / FINGER.depth:.4g} N/mm")
     assert "largest at (" in rows["von Mises stress"][1]
+    assert rows["mass"][1].startswith("at 1.2 g/cm3")
     x, y = found.places["von_mises"]
     away = largest_away_from_corners(FemSolver(estimate=False).solve(PROBLEM))[0]
     assert (x, y) == pytest.approx(tuple(away.place))
