@@ -9,7 +9,7 @@ from typing import Generic, NamedTuple, Self, TypeVar
 import numpy as np
 from rich.table import Table
 
-from compare.figures.charts import draw_force_track
+from compare.figures.force_charts import draw_force_track
 from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.settings import MeshSettings

@@ -10,13 +10,6 @@ from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import IN_SAMPLE, Evaluation
 from compare.evaluation.metrics import ForceCurve, force_curves, held_out_errors
 from compare.figures.body import PERCENT
-from compare.figures.charts import (
-    draw_convergence,
-    draw_energy,
-    draw_force_displacement,
-    draw_losses,
-    draw_marker_errors,
-)
 from compare.figures.design_drawing import draw_design
 from compare.figures.fields import (
     DECADES,
@@ -27,8 +20,11 @@ from compare.figures.fields import (
     draw_field,
     drawn_solvers,
 )
+from compare.figures.force_charts import draw_force_displacement
+from compare.figures.marker_charts import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
+from compare.figures.record_charts import draw_convergence, draw_energy, draw_losses
 from geometry.errors import UserError
 from geometry.figure import Figure
 

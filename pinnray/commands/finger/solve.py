@@ -40,7 +40,7 @@ def solve(
     from compare.evaluation.deformed_body import with_body_checks
     from compare.evaluation.metrics import evaluated, force_curves, write_force_displacement
     from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
-    from compare.figures.charts import draw_force_displacement
+    from compare.figures.force_charts import draw_force_displacement
     from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached
     from compare.report.figures_table import figures_lines
     from compare.report.output_files import write_vtu

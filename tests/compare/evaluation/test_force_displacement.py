@@ -9,7 +9,7 @@ import pytest
 
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import ForceCurve, force_curves, write_force_displacement
-from compare.figures.charts import draw_force_displacement
+from compare.figures.force_charts import draw_force_displacement
 from geometry.figure import MEASURED
 from solvers.problem import Load
 from solvers.solution import Estimated, IdentifiedForce

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.figures.charts import (
+from compare.figures.record_charts import (
     approaches_reference,
     draw_convergence,
     draw_energy,

@@ -1,0 +1,131 @@
+"""Charts of the indenter's force: over its travel by every solver, over time by the markers."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import ForceCurve, follows_load
+from compare.figures.style import (
+    axes_at,
+    legend_above,
+    legend_height,
+    solver_colour,
+    write_heading,
+)
+from geometry.arrays import FloatArray
+from geometry.figure import INK, MEASURED, WIDTH, Figure, figure
+
+
+def draw_force_displacement(
+    curves: Sequence[ForceCurve],
+    *,
+    depth: float,
+    truth: ForceCurve | None = None,
+    identified: Mapping[int, Evaluation] | None = None,
+) -> Figure:
+    """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
+
+    A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line. The
+    simulated finger's curve ends in a cross. A force that was identified from the markers, by the number of
+    its solver in the run, is a square with its interval of 95 % at the end of the travel.
+    """
+    labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
+    true_label = [_end_label(truth, "truth, simulated")] if truth else []
+    found = {
+        number: (each, each.identified.size)
+        for number, each in (identified or {}).items()
+        if each.identified is not None
+    }
+    more = [f"{each.label}, {size[0]:.3g} N/mm, identified" for each, size in found.values()]
+    top, height, left = 0.3 + legend_height([*labels, *true_label, *more]), 2.4, 0.75  # inches
+    with figure(top + height + 0.45) as drawn:
+        write_heading(drawn, "Force of the indenter along its travel")
+        axes = axes_at(drawn, (left, top, WIDTH - left - 0.65, height))
+        straight = sum(not follows_load(curve.evaluation) for curve in curves)
+        for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
+            followed = follows_load(curve.evaluation)
+            straight -= not followed
+            axes.plot(
+                curve.travel,
+                curve.force,
+                color=solver_colour(number),
+                linestyle="-" if followed else (0, (3, 2)),
+                # Straight lines often coincide: the later ones are narrower.
+                linewidth=1.3 if followed else 1.2 + 1.4 * straight,
+                marker="o" if followed or len(curve.travel) == 1 else "",
+                markersize=3.2,
+                label=label,
+                zorder=3 if followed else 2,
+            )
+        if truth:
+            end = truth.travel[-1:], truth.force[-1:]
+            axes.plot(*end, "x", ms=7, mew=1.8, color=MEASURED, label=true_label[0], zorder=4)
+            axes.plot(truth.travel, truth.force, color=MEASURED, lw=1.3, zorder=3)
+        reach = (truth or curves[0]).travel[-1]
+        for place, (number, label) in enumerate(zip(found, more, strict=True)):
+            value, low, high = found[number][1]
+            # Beside each other: the intervals of several solvers would hide each other.
+            x, apart = reach * (1 - 0.02 * (place + 1)), [[value - low], [high - value]]
+            style: dict[str, Any] = {
+                "ms": 4.5,
+                "capsize": 2.5,
+                "lw": 1.2,
+                "color": solver_colour(number),
+                "zorder": 5,
+            }
+            axes.errorbar([x], [value], yerr=apart, fmt="s", label=label, **style)
+        every = [*curves, truth] if truth else curves
+        axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))
+        forces = np.concatenate(
+            [curve.force for curve in every] + [np.array(size) for _, size in found.values()]
+        )
+        axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
+        axes.set_xlabel("travel of the indenter, mm")
+        axes.set_ylabel("force, N per mm of depth")
+        axes.grid()
+        whole = axes.secondary_yaxis(
+            "right",
+            functions=(lambda force: np.asarray(force) * depth, lambda force: np.asarray(force) / depth),
+        )
+        whole.set_ylabel(f"force for {depth:g} mm of depth, N")
+        whole.spines["right"].set(visible=True, color=INK)
+        legend_above(axes)
+    return drawn
+
+
+def _end_label(curve: ForceCurve, name: str) -> str:
+    return f"{name}, {curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
+
+
+def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, *, depth: float) -> Figure:
+    """Draw the force over time, and its place where there is at least a tenth of the largest force.
+
+    Args:
+        times: Shape (f,), s.
+        forces: Force and the ends of its interval, shape (f, 3), N; nan and inf where it is not known.
+        places: Abscissa of the contact and the ends of its interval, shape (f, 3), mm.
+        depth: Of the finger, mm.
+    """
+    known = np.isfinite(forces).all(axis=1)
+    top = float(forces[known, 2].max(initial=0.0)) or 1.0
+    pressed = known & (forces[:, 0] > 0.1 * forces[known, 0].max(initial=0.0))
+    head, height, gap, left = 0.5, 1.9, 0.25, 0.75  # inches
+    with figure(head + 2 * height + gap + 0.45) as drawn:
+        note = f"for a depth of {depth:g} mm; bands: intervals of 95 %"
+        write_heading(drawn, "Force of the indenter, by the markers", note)
+        rows = ((forces, known, "force, N"), (places, pressed, "contact, x in mm"))
+        for row, (values, shown, label) in enumerate(rows):
+            axes = axes_at(drawn, (left, head + row * (height + gap), WIDTH - left - 0.15, height))
+            value, low, high = np.where(shown[:, None], values, np.nan).T
+            axes.fill_between(times, low, high, color=solver_colour(0), alpha=0.25, linewidth=0)
+            axes.plot(times, value, color=solver_colour(0), linewidth=1.2)
+            axes.set_ylabel(label)
+            axes.grid()
+            axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-3))
+            if row == 0:
+                axes.set_ylim(0, 1.05 * top)
+                axes.tick_params(labelbottom=False)
+        axes.set_xlabel("time, s")
+    return drawn
