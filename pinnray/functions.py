@@ -121,7 +121,7 @@ def solve(
         UserError: If the solver does not support the problem, or the measurements cannot be of it.
     """
     from compare.evaluation.deformed_body import DeformedBody
-    from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+    from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
     from compare.runtime.stages import shown_stages
 
     chosen = read_solver(solver, preset)
@@ -138,7 +138,7 @@ def solve(
                 "a Problem has its own mesh, material, load and observations; give a design to choose them"
             )
         problem = replace(problem, material=with_law(problem.material, chosen))
-        remarks = [] if problem.finger is None else unit_remarks(problem)  # a closed form has any unit
+        remarks = [] if problem.finger is None else problem_remarks(problem)  # a closed form has any unit
         if (seen := problem.observations) is not None:
             check_positions(seen, problem.mesh)
             remarks += displacement_remarks(seen, problem)

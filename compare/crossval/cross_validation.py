@@ -12,7 +12,7 @@ from compare.crossval.result import Case, CaseResult, CrossvalResult
 from compare.crossval.solver_folds import SWEPT, SolverTask, run_folds, sweep_weights
 from compare.crossval.study import CrossvalStudy, visible_markers
 from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
-from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
 from compare.evaluation.truths import experiment_source
 from compare.runtime.output_folder import check_resumable_folder, locked
 from compare.runtime.stages import Stages, in_stages
@@ -53,7 +53,7 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
             check_positions(given, mesh)
         problem = Problem(mesh, study.material, study.load)
         remarks = displacement_remarks(given, problem) if given else []
-        for remark in [*unit_remarks(problem), *remarks]:
+        for remark in [*problem_remarks(problem), *remarks]:
             warnings.warn(remark, stacklevel=2)
     load_cases = load_cases_of(problem, others=LOAD in study.schemes and given is None)
     study.out.mkdir(parents=True, exist_ok=True)

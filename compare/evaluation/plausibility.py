@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import shapely
 
+from compare.evaluation.thin_walls import wall_remarks
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import OutsideBodyError, UserError
 from geometry.mesh.boundary import boundary_edges
@@ -82,8 +83,8 @@ def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
             )
 
 
-def unit_remarks(problem: Problem) -> list[str]:
-    """Remarks on a load or a material that looks like another unit, a line each."""
+def problem_remarks(problem: Problem) -> list[str]:
+    """Remarks on a load or a material that looks like another unit, and on a thin wall, a line each."""
     load, young, length = problem.load, problem.material.young, _length(problem)
     remarks = [
         f"the {name} of {size:g} mm is {size / length:.1g} of the finger's length; {LOOKS_LIKE} metres, "
@@ -96,7 +97,7 @@ def unit_remarks(problem: Problem) -> list[str]:
         remarks.append(
             f"Young's modulus of {young:g} MPa is no rubber's or plastic's; {LOOKS_LIKE} {unit}, give MPa"
         )
-    return remarks
+    return [*remarks, *wall_remarks(problem)]
 
 
 def displacement_remarks(observations: Observations, problem: Problem) -> list[str]:

@@ -14,7 +14,7 @@ from compare.evaluation.comparison import Results, supported_solvers
 from compare.evaluation.deformed_body import with_body_checks
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_curves, pick_reference, write_force_displacement
-from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
 from compare.evaluation.truths import (
     TRUTHS,
     UnfinishedExperimentError,
@@ -128,7 +128,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Results:
         failed={name: _with_traceback(folder, name, reason) for name, reason in outcome.failed.items()},
         warnings=[
             *(f"{each.solver}: {text}" for each in evaluations for text in each.warnings),
-            *(*unit_remarks(problem), *remarks, *_unframed(evaluations, observations)),
+            *(*problem_remarks(problem), *remarks, *_unframed(evaluations, observations)),
             *(*impossible, *branches),
         ],
     )

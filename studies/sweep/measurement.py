@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from compare.evaluation.deformed_body import THROUGH_ITSELF, DeformedBody
-from compare.evaluation.plausibility import unit_remarks
+from compare.evaluation.plausibility import problem_remarks
 from geometry.cache import finger_mesh
 from geometry.drawing.drawn_finger import finger_from
 from geometry.errors import UserError
@@ -89,7 +89,7 @@ def measured(task: Task) -> Measurement:
     except Exception as error:
         return ended("failed", f"{type(error).__name__}: {error}")
     status, _ = DeformedBody(mesh).status(solution)
-    said = "; ".join([status.message, *unit_remarks(problem)])
+    said = "; ".join([status.message, *problem_remarks(problem)])
     if unknown := [name for name, value in values.items() if np.isnan(value) and name not in FRACTIONS]:
         return ended("not converged", f"{', '.join(unknown)} cannot be computed; {said}", values)
     return ended("done" if status.converged else "not converged", said, values)

@@ -39,7 +39,7 @@ def solve(
     from compare.evaluation.certification import with_certificates
     from compare.evaluation.deformed_body import with_body_checks
     from compare.evaluation.metrics import evaluated, force_curves, write_force_displacement
-    from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+    from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
     from compare.figures.force_charts import draw_force_displacement
     from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached
     from compare.report.figures_table import figures_lines
@@ -84,7 +84,7 @@ def solve(
         with stages.stage(made.name) as progress:
             problem = Problem(triangles, with_law(material, made), load, given, chosen)
             measured = displacement_remarks(given, problem) if given else []
-            for remark in [*unit_remarks(problem), *measured]:
+            for remark in [*problem_remarks(problem), *measured]:
                 say(f"warning: {remark}")
             solution = solved(made, problem, progress)
         with stages.stage("certificate"):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
 from compare.evaluation.truths import virtual_experiment
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -39,7 +39,7 @@ def measured(problem: Problem) -> Observations:
     ],
 )
 def test_a_load_or_a_material_in_other_units_is_warned_of(load, young, said, coarse_mesh):
-    (remark,) = unit_remarks(Problem(coarse_mesh, Material(young=young), Load(**load)))
+    (remark,) = problem_remarks(Problem(coarse_mesh, Material(young=young), Load(**load)))
     assert re.search(said, remark)
 
 
@@ -52,7 +52,7 @@ def test_a_load_or_a_material_in_other_units_is_warned_of(load, young, said, coa
     ],
 )
 def test_a_usual_load_and_material_are_not_warned_of(load, young, coarse_mesh):
-    assert unit_remarks(Problem(coarse_mesh, Material(young=young), Load(**load))) == []
+    assert problem_remarks(Problem(coarse_mesh, Material(young=young), Load(**load))) == []
 
 
 def test_a_finger_at_finite_strain_is_plausible(measured, problem):
