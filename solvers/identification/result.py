@@ -31,6 +31,9 @@ NORMAL = float(norm.ppf((1 + LEVEL) / 2))
 WRAPPED = 0.5
 """Width of a contact over the front's extent from which its force is not believed: on a printed finger that
 wraps around a cylinder with friction it was half of the forward one, with a contact of nine tenths."""
+MISSED = 1.5
+"""φ from which a misfit is more than chance: with the ten degrees of freedom that nine markers leave, noise
+alone exceeds it once in a hundred times."""
 PROBABLE = 0.01
 """Least probability of a law whose field is kept."""
 
@@ -170,7 +173,11 @@ class Identified:
             status=Status(
                 best.estimate.converged and best.exact and not unstable,
                 f"{unstable_phrase(unstable)}; {sentence}" if unstable else sentence,
-                [*(f"{said}, and was left out" for said in self._contradictions()), *self._wrapped()],
+                [
+                    *(f"{said}, and was left out" for said in self._contradictions()),
+                    *self._unexplained(),
+                    *self._wrapped(),
+                ],
             ),
             stats={**stats, **self.stats(), "unstable_directions": unstable},
             left_out=leave_one_out_displacements(problem, left_out),
@@ -202,6 +209,18 @@ class Identified:
         return [
             f"MARKER {number + 1} of those seen CONTRADICTS the others by {np.linalg.norm(off):.2g} mm"
             for number, off in self.doubtful.items()
+        ]
+
+    def _unexplained(self) -> list[str]:
+        """A sentence on markers that no values of the unknowns explain within their deviations."""
+        off = self.best.estimate.inflation
+        if off < MISSED:
+            return []
+        return [
+            f"THE MARKERS ARE {off:.2g} TIMES AS FAR FROM ANY FINGER OF THIS DRAWING AS THEY ARE KNOWN, "
+            "which chance does once in a hundred times: see the clamp, the camera and its plane, the scale "
+            "and the stated deviations; force and walls make up for what is wrong, in intervals that are as "
+            "much wider"
         ]
 
     def _wrapped(self) -> list[str]:

@@ -28,10 +28,13 @@ NAMES = (*DEFAULT, "young")
 """Everything that can be found."""
 
 
-LAW_ODDS: Mapping[LawName, float] = {"neo-hookean": 3.0, "st-venant-kirchhoff": 1.0}
-"""The laws of finite strain to choose from, with their odds before the markers are seen. Rubbers follow the
+LAW_ODDS: Mapping[LawName, float] = {"neo-hookean": 150.0, "st-venant-kirchhoff": 1.0}
+"""The laws of finite strain to choose from, with their odds before the markers are seen. Very strong evidence
+(R. E. Kass, A. E. Raftery, Bayes factors, J. Am. Stat. Assoc. 90, 1995, 773-795: 150 to 1) is asked for a law
+that no polymer follows: that of St Venant and Kirchhoff gives way in compression. Rubbers follow the
 neo-Hookean law up to strains of 0.3 (L. R. G. Treloar, The physics of rubber elasticity, 3rd ed., 1975,
-chapter 5); that of St Venant and Kirchhoff gives way in compression, as none of them does."""
+chapter 5), and in plane strain so does every incompressible body of Mooney and Rivlin, whose two invariants
+are one there. With odds of 3 to 1, noise decided, and the force of a film was 12 % off."""
 LAWS = tuple(LAW_ODDS)
 
 
