@@ -100,6 +100,13 @@ class IdentifiedForce(NamedTuple):
         return said if self.position is None else f"{said}, at x = {_interval(*self.position)} mm"
 
 
+class LateralStiffness(NamedTuple):
+    """Stiffness of a finger at rest against what its plane does not see, at the contact."""
+
+    sideways: float  #: Force along the depth per displacement along it, N/mm
+    torsional: float  #: Torque about the finger's axis per turn about it, N mm/rad
+
+
 @dataclasses.dataclass(frozen=True)
 class Status:
     """Outcome of a solve."""
@@ -165,6 +172,7 @@ class Solution:
     #: Where the indenter presses, from a solver of finite strain; None if it does not touch
     contact: Contact | None = None
     identified: IdentifiedForce | None = None  #: The force, from a solver that identifies it
+    lateral: LateralStiffness | None = None  #: From a solver in space, where it was asked for
     pictures: Pictures | None = None  #: Frames of the observations' pictures, from a solver that finds them
 
     def displacement(self, points: ArrayLike | LocatedPoints) -> FloatArray:

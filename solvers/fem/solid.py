@@ -17,6 +17,7 @@ from solvers.extrusion import ExtrudedSpace
 from solvers.fem.equilibrium import LoadState
 from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.lateral import lateral_stiffness
 from solvers.fem.linear_solvers import LinearSolver
 from solvers.fem.ranks import communicator, on_all_ranks
 from solvers.problem import Problem
@@ -151,6 +152,7 @@ class Fem3dSolver(FieldSettings):
     # "direct" (MUMPS), "iterative" (conjugate gradients with algebraic multigrid) or "auto", which is direct
     # where memory allows it
     linear_solver: LinearSolver = "auto"
+    lateral: bool = False  # Whether to find the sideways and torsional stiffness, by one factorisation more
     max_step: float = 1.0  # Largest fraction of the load in one step, at finite strain
     min_step: float = 1e-2  # Fraction of the load below which the solver gives up
     tolerance: float = 1e-8  # Largest residual force over the largest internal force
@@ -175,6 +177,8 @@ class Fem3dSolver(FieldSettings):
         ):
             if value not in known:
                 raise UserError(f"fem-3d has {said} {', '.join(known)}, not {value!r}")
+        if self.lateral and self.sides == "held":
+            raise UserError("fem-3d has no sideways stiffness between held sides; take sides=free")
         if not 0 < self.min_step <= self.max_step <= 1:
             raise UserError("fem-3d needs 0 < min_step <= max_step <= 1")
         check_tolerance(self.name, self.tolerance)
@@ -214,6 +218,10 @@ class Fem3dSolver(FieldSettings):
         unstable = 0 if linear else path.equilibrium.unstable
         region, abscissa = path.region(last), path.force_abscissa(last)
         path.close()
+        lateral = None
+        if self.lateral:
+            progress(1.0, "sideways and torsional stiffness")
+            lateral = lateral_stiffness(problem, space, iterative=cost.iterative)
         return Solution(
             solver=self.name,
             problem=problem,
@@ -238,6 +246,7 @@ class Fem3dSolver(FieldSettings):
             history=history,
             states=[FaceField(space, point.nodal, self.face) for point in path.points],
             contact=contact_of(problem, abscissa, region),
+            lateral=lateral,
         )
 
     def _status(

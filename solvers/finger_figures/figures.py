@@ -19,7 +19,7 @@ from solvers.finger_figures.measures import (
 )
 from solvers.problem import Load, Material, Problem
 from solvers.shared_work import shared
-from solvers.solution import Solution
+from solvers.solution import LateralStiffness, Solution
 
 if TYPE_CHECKING:
     from solvers.fem.linear import FactorisedProblem
@@ -54,6 +54,9 @@ class FingerFigures:
         curve: Travel of the indenter, mm, and its force along it, N, from rest on; one pair where the way to
             the end is not known.
         depth: Of the finger, mm.
+        sideways_stiffness: Force along the depth per displacement of the contact along it, at rest, N/mm;
+            this and the next by `fem-3d` with its setting `lateral`.
+        torsional_stiffness: Torque about the finger's axis per turn of the contact, at rest, N mm/rad.
         strain_energy: Elastic energy of the whole finger, mJ.
     """
 
@@ -78,6 +81,8 @@ class FingerFigures:
     mass: float = _figure("g", "mass of the body")
     thinnest_wall: float = _figure("mm", "thinnest wall or rib")
     narrowest_gap: float = _figure("mm", "narrowest clear width of a cavity")
+    sideways_stiffness: float = float("nan")
+    torsional_stiffness: float = float("nan")
     strain_energy: float = float("nan")
     depth: float = float("nan")
     intervals: Mapping[str, Interval] = field(default_factory=dict)
@@ -138,6 +143,11 @@ class FingerFigures:
             found[f"{name}{unit}"] = value
             for end, bound in zip(("low", "high"), self.intervals.get(name, ()), strict=False):
                 found[f"{name}_{end}{unit}"] = bound
+        asked = {
+            "sideways_stiffness_N_per_mm": self.sideways_stiffness,
+            "torsional_stiffness_N_mm_per_rad": self.torsional_stiffness,
+        }
+        found |= {name: value for name, value in asked.items() if np.isfinite(value)}
         return found | {"strain_energy_mJ": self.strain_energy}
 
     def rows(self) -> list[tuple[str, str, str]]:
@@ -156,6 +166,12 @@ class FingerFigures:
             ("wrap", f"{self.wrap:.3g} deg", "fold of the front face around the indenter"),
             ("compliance across", f"{self.compliance_across:.4g} mm/N", "of the contact, at rest"),
             ("compliance along", f"{self.compliance_along:.4g} mm/N", "of the contact, at rest"),
+            ("sideways stiffness", f"{self.sideways_stiffness:.4g} N/mm", "of the contact, at rest"),
+            (
+                "torsional stiffness",
+                f"{self.torsional_stiffness:.4g} N mm/rad",
+                "of the contact about the finger's axis, at rest",
+            ),
             ("von Mises stress", self._said("von_mises", "MPa"), self._where("von_mises")),
             ("principal strain", f"{self.principal_strain:.2%}", self._where("principal_strain")),
             ("strain energy", f"{self.strain_energy:.4g} mJ", ""),
@@ -213,6 +229,7 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
     }
     tip_u, tip_v = solution.displacement(front_ends(problem)[1:])[0]
     stress, strain = largest_away_from_corners(solution)
+    lateral = solution.lateral or LateralStiffness(float("nan"), float("nan"))
     return FingerFigures(
         force=float(force),
         **ways,
@@ -222,6 +239,8 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
         von_mises=stress.value,
         principal_strain=strain.value,
         **(figures_at_rest(problem) if rest is None else rest),
+        sideways_stiffness=lateral.sideways,
+        torsional_stiffness=lateral.torsional,
         strain_energy=float(solution.energy) * depth,
         depth=depth,
         intervals=_intervals(solution, depth, stress),
