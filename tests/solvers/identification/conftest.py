@@ -26,6 +26,6 @@ def markers(problem, model):
 
 @pytest.fixture(scope="module")
 def identified(problem):
-    """A twin of the St Venant-Kirchhoff law, and what is found from its markers with noise."""
-    observed, true = twin(problem, "st-venant-kirchhoff", TRUE)
+    """A twin of the neo-Hookean law, and what is found from its markers with noise."""
+    observed, true = twin(problem, "neo-hookean", TRUE)
     return observed, true, FemIdSolver(degree=1).solve(replace(problem, observations=observed))
