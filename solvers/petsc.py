@@ -2,9 +2,31 @@
 
 A `.petscrc` of others in the working folder could make it load a library or write any file. The variable
 `PETSC_OPTIONS` counts.
+
+The wheels of DOLFINx do not find the MPI that the wheel `mpich` has put into the environment: it is loaded
+for them.
 """
 
+import ctypes
+import sys
+from pathlib import Path
+
 import petsc4py
+
+
+def wheels_mpi(prefix: Path, package: Path) -> Path | None:
+    """The MPI library of an environment whose PETSc is a wheel, too; None for a distribution's PETSc.
+
+    Args:
+        prefix: Folder of the environment.
+        package: A file of petsc4py.
+    """
+    library = prefix / "lib" / "libmpi.so.12"
+    return library if package.is_relative_to(prefix) and library.is_file() else None
+
+
+if (mpi := wheels_mpi(Path(sys.prefix), Path(petsc4py.__file__))) is not None:
+    ctypes.CDLL(str(mpi), mode=ctypes.RTLD_GLOBAL)
 
 petsc4py.init(["", "-skip_petscrc"])
 

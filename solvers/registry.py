@@ -51,6 +51,13 @@ BUILT_IN = {
 }
 
 
+DOLFINX = {"dolfinx", "petsc4py", "mpi4py", "ufl", "ffcx", "basix"}
+"""Modules that come with DOLFINx."""
+DOLFINX_WAYS = (
+    '; DOLFINx is set up by make or conda, or by pip install "pinn-ray[fem]" with Python 3.12 or newer'
+)
+
+
 class MissingLibraryError(UserError):
     """A library that a solver needs is missing."""
 
@@ -96,7 +103,8 @@ def make_solver(name: str, **settings: Any) -> Solver:
         try:
             factory = getattr(import_module(module), attribute)
         except ImportError as error:
-            raise MissingLibraryError(f"solver {name!r} cannot be loaded: {error}") from error
+            way = DOLFINX_WAYS if (error.name or "").partition(".")[0] in DOLFINX else ""
+            raise MissingLibraryError(f"solver {name!r} cannot be loaded: {error}{way}") from error
     else:
         found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
         if not found:

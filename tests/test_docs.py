@@ -199,10 +199,18 @@ def test_command_lines_parse(page, line):
     finger = given.get("finger")
     if finger is not None and finger.section is not None:
         assert (ROOT / finger.section).is_file()
+    if "/" in str(given.get("measurements", "")):  # a file of this repository
+        assert (ROOT / given["measurements"]).is_file()
     elif finger is not None and not finger.design.endswith(".toml"):
         finger.read()
     if "physics" in given:
         given["physics"].read()
+
+
+def test_no_command_has_a_placeholder_that_a_shell_takes_for_a_file():
+    lines = [line for block in ALL_BLOCKS if block.language == "sh" for line in block.text.splitlines()]
+    lines += re.findall(r"^    (\S.*)$", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert [line for line in lines if re.search(r"<[\w ]+>", line)] == []
 
 
 def test_command_lines_are_found():

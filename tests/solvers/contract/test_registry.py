@@ -95,6 +95,17 @@ def test_a_missing_library_is_said_and_the_other_solvers_work(monkeypatch):
         assert "pinn-std" in usable_solvers()
 
 
+def test_a_missing_dolfinx_is_said_with_the_ways_to_it(monkeypatch):
+    monkeypatch.delitem(sys.modules, "solvers.petsc", raising=False)
+    for module in [name for name in sys.modules if name.startswith("solvers.fem")]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "petsc4py", None)
+    with pytest.raises(
+        MissingLibraryError, match=r'petsc4py.*pip install "pinn-ray\[fem\]" with Python 3.12'
+    ):
+        make_solver("fem")
+
+
 @pytest.fixture
 def offer(tmp_path, monkeypatch):
     """`offer(name, place)`: a package that offers a solver by an entry point."""

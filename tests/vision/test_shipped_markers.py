@@ -1,0 +1,30 @@
+"""The markers that the first pages use: they say that they are simulated, and how."""
+
+import numpy as np
+import pytest
+
+from geometry.finger.presets import load_design
+from geometry.finger.section import marker_positions
+from tests.test_docs import ROOT
+from vision.measurements import read_measurements
+
+FILE = ROOT / "examples" / "markers.csv"
+
+
+def test_the_shipped_markers_are_those_of_the_default_finger_and_simulated():
+    seen = read_measurements(FILE, marker_radius=0.8)
+    assert seen.label == "simulated"
+    np.testing.assert_allclose(seen.points, marker_positions(load_design()), atol=0.0005)
+    assert (seen.standard_deviations == 0.02).all()
+
+
+@pytest.mark.slow
+def test_the_shipped_markers_are_made_as_their_file_says():
+    from pinnray import compare
+
+    made = [line.strip("# \n") for line in FILE.read_text(encoding="utf-8").splitlines() if "#     " in line]
+    names = {"pr": type("pr", (), {"compare": staticmethod(compare)}), "np": np}
+    exec(made[0], names)
+    np.testing.assert_allclose(
+        read_measurements(FILE, marker_radius=0.8).displacements, eval(made[1], names), atol=0.001
+    )
