@@ -35,6 +35,7 @@ def finger_mesh(
     finger: Finger,
     *,
     settings: MeshSettings | None = None,
+    across: int | None = None,
     cache_dir: Path | None = None,
     timeout_s: float = TIMEOUT_S,
     keep: bool = True,
@@ -46,6 +47,7 @@ def finger_mesh(
     Args:
         finger: The finger.
         settings: Element sizes.
+        across: Least number of elements through a wall; None means that of the mesher, 3.
         cache_dir: Folder of the cache; by default `cache_folder()`.
         timeout_s: Time limit, s.
         keep: Whether the cache keeps the mesh.
@@ -61,6 +63,7 @@ def finger_mesh(
         "what": f"meshing design {finger.name!r}",
         "finger": finger.definition(),
         "settings": settings.model_dump(),
+        **({} if across is None else {"across": across}),
     }
     entry = _entry(task, finger.digest, ".npz", cache_dir)
     return _cached(entry, task, timeout_s, TriangleMesh.load, TriangleMesh.save if keep else None)

@@ -17,9 +17,9 @@ def run_task(task: Mapping[str, Any], timeout_s: float) -> Any:
     """Run a task in this process's worker, wait for it and return its result.
 
     Args:
-        task: `kind`, and `what` as its description in messages; for a "mesh" also `finger` as its definition
-            and `settings` as a dictionary, for "cad" `finger` and `formats`, for a "drawing" its `file` and
-            `description`.
+        task: `kind`, and `what` as its description in messages; for a "mesh" also `finger` as its definition,
+            `settings` as a dictionary and perhaps `across`, for "cad" `finger` and `formats`, for a "drawing"
+            its `file` and `description`.
         timeout_s: Time limit, s.
     """
     what, memory_gb = str(task["what"]), 0.9 * free_memory_gb()
@@ -72,10 +72,12 @@ def _work(kind: str) -> Callable[[Mapping[str, Any]], Any]:
     from geometry.drawing.drawn_finger import finger_from
 
     if kind == "mesh":
-        from geometry.mesh.mesher import build_mesh
+        from geometry.mesh.mesher import MIN_ELEMENTS, build_mesh
         from geometry.mesh.settings import MeshSettings
 
-        return lambda task: build_mesh(finger_from(task["finger"]), MeshSettings(**task["settings"]))
+        return lambda task: build_mesh(
+            finger_from(task["finger"]), MeshSettings(**task["settings"]), task.get("across", MIN_ELEMENTS)
+        )
     from geometry.cad import cad_contents
 
     return lambda task: cad_contents(finger_from(task["finger"]), task["formats"])

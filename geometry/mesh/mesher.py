@@ -37,21 +37,22 @@ class Triangulation(NamedTuple):
     edges: Mapping[str, IntArray]
 
 
-def build_mesh(finger: Finger, settings: MeshSettings) -> TriangleMesh:
+def build_mesh(finger: Finger, settings: MeshSettings, across: int = MIN_ELEMENTS) -> TriangleMesh:
     """Mesh the section of a finger.
 
     The contact's ends and middle are nodes of the front face and every marker is a node. Boundary edges have
-    the body on their left. The result depends on the arguments and on Gmsh's version only.
+    the body on their left. The result depends on the arguments and on Gmsh's version only. Every wall and rib
+    gets at least `across` elements through its thickness.
 
     Returns:
         The mesh with the boundaries `base`, `front`, `contact` and every other name of the outline's pieces.
     """
     for elements in TRIES:
-        mesh = _named(finger, _triangulation(finger, settings, elements))
-        if (least := elements_through_thickness(mesh)) >= MIN_ELEMENTS:
+        mesh = _named(finger, _triangulation(finger, settings, elements * across / MIN_ELEMENTS))
+        if (least := elements_through_thickness(mesh)) >= across:
             return mesh
     raise UserError(
-        f"the mesh has only {least} elements through the thinnest wall or rib, {MIN_ELEMENTS} are "
+        f"the mesh has only {least} elements through the thinnest wall or rib, {across} are "
         f"needed; lower the mesh size below {settings.size:g} mm"
     )
 

@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
-from solvers.cylinder_contact import ContactRegion
+from solvers.cylinder_contact import ContactRegion, CylinderContact
 from solvers.extrusion import NodalSpace
 from solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
 from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
@@ -25,6 +25,11 @@ BESIDE = 0.05
 further away is of another branch."""
 PENETRATION = 1e-5
 """Largest gap of a node in contact and penetration of any node, mm."""
+SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
+"""A finger whose contact is so many times stiffer than itself takes a step first with a contact that is only
+SOFTEST times as stiff, which is hardened by factors of at most HARDER. For a node leaves the contact within
+Newton's method where the cylinder recedes by its force over that stiffness: of a strip of steel by some
+nanometres, so that nodes would come and go for ever. A finger whose walls bend as solids has 10^3 to 10^4."""
 
 
 def check_tolerance(solver: str, tolerance: float) -> None:
@@ -70,6 +75,7 @@ class LoadPath:
         self._newton = self._begin()
         contact = self.equilibrium.contact
         self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
+        self._contacts = [contact] if contact is None else self._ever_harder(contact)
         self.points = [self.equilibrium.rest]
         self.left = 0  # Number of unstable equilibria that were left for a stable one
         self._halved = self._iterations = 0  # Failed steps; Newton iterations of all steps
@@ -198,21 +204,32 @@ class LoadPath:
 
     def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
         """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""
-        contact, hardest = self.equilibrium.contact, 0
-        for _ in range(30):
-            result = self._newton.solve(guess)
-            self._iterations += result.iterations
-            hardest = max(hardest, result.iterations)
-            if not result.converged:
-                self._reason = f"SNES: {result.reason}"
-                return None, hardest
-            if contact is None:
-                return result.state, hardest
-            guess, off = contact.settled(result.state)
-            if off <= PENETRATION:
-                return guess, hardest
+        hardest, final = 0, self._contacts[-1]
+        for contact in self._contacts:
+            self.equilibrium.contact = contact
+            for _ in range(30 if contact is final else 1):
+                result = self._newton.solve(guess)
+                self._iterations += result.iterations
+                hardest = max(hardest, result.iterations)
+                if not result.converged:
+                    self._reason, self.equilibrium.contact = f"SNES: {result.reason}", final
+                    return None, hardest
+                if contact is None:
+                    return result.state, hardest
+                guess, off = contact.settled(result.state)
+                if contact is final and off <= PENETRATION:
+                    return guess, hardest
         self._reason = "the contact does not settle"
         return None, hardest
+
+    def _ever_harder(self, contact: CylinderContact) -> list[CylinderContact]:
+        """The contacts of a step's solves: of a slender finger the hard one comes last."""
+        own = self.equilibrium.stiffness_to_cylinder
+        if contact.stiffness <= SLENDER * own:
+            return [contact]
+        count = math.ceil(math.log(contact.stiffness / (SOFTEST * own), HARDER)) + 1
+        soft = np.geomspace(SOFTEST * own, contact.stiffness, count)[:-1]
+        return [*(replace(contact, stiffness=float(each)) for each in soft), contact]
 
     def _guess(self, fraction: float) -> LoadState:
         """The state at a fraction of the load, by the guide or by extrapolation of the last ones."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.cache import finger_mesh
+from geometry.errors import UserError
 from geometry.mesh.settings import MeshSettings
 from solvers.cylinder_contact import ContactRegion
 from solvers.fem.finite_strain.load_path import LoadPath
@@ -16,13 +17,17 @@ COARSE, FINE = 1.0, 4000
 
 
 def coarser(problem: Problem) -> Problem | None:
-    """The problem on elements of the size `COARSE`.
+    """The problem on elements of the size `COARSE`; through walls that are thin for it, on one element.
 
     None where its own mesh has not many more, or is of another body.
     """
     if problem.finger is None or len(problem.mesh.triangles) < FINE:
         return None
-    mesh = finger_mesh(problem.finger, settings=MeshSettings(size=COARSE))
+    settings = MeshSettings(size=COARSE)
+    try:
+        mesh = finger_mesh(problem.finger, settings=settings)
+    except UserError:  # a wall is too thin for three elements of such a mesh
+        mesh = finger_mesh(problem.finger, settings=settings, across=1)
     same_body = np.isclose(mesh.areas.sum(), problem.mesh.areas.sum(), rtol=1e-2)
     fewer = 2 * len(mesh.triangles) < len(problem.mesh.triangles)
     return replace(problem, mesh=mesh) if same_body and fewer else None
