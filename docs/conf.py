@@ -1,8 +1,11 @@
 """The documentation site: `make docs` builds it into build/docs. Warnings are errors."""
 
+import json
 import os
 import re
+import tomllib
 from importlib.util import find_spec
+from pathlib import Path
 
 from pydantic import BaseModel
 from pygments.lexers.special import TextLexer
@@ -11,6 +14,9 @@ from sphinx.directives.code import CodeBlock
 from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 project = "pinn-ray"
+version = release = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text("utf-8"))[
+    "project"
+]["version"]
 copyright = "pinn-ray contributors, MIT licence"
 language = "en"
 smartquotes = False  # two hyphens begin an option
@@ -21,7 +27,9 @@ NOTEBOOKS_RUN = find_spec("myst_nb") is not None and os.environ.get("NOTEBOOKS")
 extensions = [
     "myst_nb" if NOTEBOOKS_RUN else "myst_parser",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
     "cyclopts.sphinx_ext",
 ]
 exclude_patterns = ["examples"]
@@ -56,7 +64,8 @@ nitpick_ignore_regex = [
 ]
 
 html_theme = "pydata_sphinx_theme"
-html_title = "pinn-ray"
+html_title = f"pinn-ray {version}"
+html_logo = html_favicon = "static/logo.svg"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = html_show_sourcelink = False
@@ -68,7 +77,12 @@ html_theme_options = {
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],
+    "logo": {"text": html_title},
 }
+if repository := os.environ.get("REPOSITORY"):  # its address, where the site is built for others
+    html_theme_options["icon_links"] = [
+        {"name": "Repository", "url": repository, "icon": "fa-solid fa-code-branch"}
+    ]
 
 linkcheck_timeout = 20
 linkcheck_retries = 2
@@ -98,6 +112,48 @@ def is_hidden(_app: Sphinx, _what: str, name: str, _value: object, skipped: bool
     return skipped or name.isupper()
 
 
+def cells_of(text: str) -> list[dict[str, object]]:
+    """The cells of a notebook: code of a page that Python or IPython runs, and the text between."""
+    cells: list[dict[str, object]] = []
+    body = re.sub(r"\A---\n.*?\n---\n", "", text, flags=re.DOTALL)
+    for number, part in enumerate(re.split(r"^```(.*?)\n(.*?)^```$", body, flags=re.DOTALL | re.MULTILINE)):
+        if number % 3 == 1:
+            language = part
+        elif number % 3 == 2 and language in ("python", "{code-cell} python"):
+            cells.append(
+                {
+                    "cell_type": "code",
+                    "source": part.strip(),
+                    "metadata": {},
+                    "outputs": [],
+                    "execution_count": None,
+                }
+            )
+        elif number % 3 == 2:
+            cells.append({"cell_type": "markdown", "source": f"```{language}\n{part}```", "metadata": {}})
+        elif said := re.sub(r"^:::.*\n?|!?\[(.*?)\]\([^)]*\)", r"\1", part, flags=re.MULTILINE).strip():
+            cells.append({"cell_type": "markdown", "source": said, "metadata": {}})
+    return [{**cell, "id": str(place)} for place, cell in enumerate(cells)]
+
+
+def offer_notebook(app: Sphinx, page: str, _template: str, context: dict[str, str], _tree: object) -> None:
+    """Put a link to its notebook on top of a page that is one, and write the file beside the page."""
+    if page != "gallery" and not page.startswith("notebooks/"):
+        return
+    cells = cells_of(app.env.doc2path(page).read_text("utf-8"))
+    file = Path(app.outdir) / f"{page}.ipynb"
+    file.parent.mkdir(exist_ok=True)
+    whole = {
+        "cells": cells,
+        "metadata": {"language_info": {"name": "python"}},
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
+    file.write_text(json.dumps(whole, indent=1), "utf-8")
+    link = f'<p><a href="{file.name}" download>Download as a notebook</a></p>'
+    context["body"] = context["body"].replace("</h1>", f"</h1>{link}", 1)
+
+
 def setup(app: Sphinx) -> None:
     """Show the code of notebooks where the packages that run them are missing."""
     if not NOTEBOOKS_RUN:
@@ -105,5 +161,6 @@ def setup(app: Sphinx) -> None:
     app.add_lexer("csv", TextLexer)
     app.connect("autodoc-process-signature", shorten)
     app.connect("autodoc-skip-member", is_hidden)
+    app.connect("html-page-context", offer_notebook)
     # The sentence below a constant may have a colon; what stands before it is no type.
     GoogleDocstring._parse_attribute_docstring = GoogleDocstring._consume_to_end

@@ -95,8 +95,8 @@ def table(page: Path, first_column: str, after: str = "") -> list[list[str]]:
 
 
 def names(rows: list[list[str]]) -> list[str]:
-    """The first column without its backquotes."""
-    return [row[0].strip("`") for row in rows]
+    """The first column without its links and backquotes."""
+    return [re.sub(r"^\[(.+)\]\(.+\)$", r"\1", row[0]).strip("`") for row in rows]
 
 
 def assert_same(documented: list[str], actual: list[str]) -> None:
@@ -395,6 +395,41 @@ def test_the_docs_have_every_solver_with_its_loads():
     assert names(rows) == list(BUILT_IN)
     for name, row in zip(names(rows), rows, strict=True):
         assert re.findall(r"`(\w+)`", row[2]) == list(make_solver(name).loads), name
+
+
+def test_every_solver_has_a_page_that_says_when_to_use_it_its_cost_and_its_limits():
+    from solvers.registry import BUILT_IN, make_solver
+    from solvers.solver import Traits
+
+    for name in BUILT_IN:
+        text = (DOCS / "solvers" / f"{name}.md").read_text(encoding="utf-8")
+        solver, traits = make_solver(name), Traits.of(make_solver(name))
+        assert re.findall("^## (.+)$", text, re.MULTILINE) == ["When to use it", "Cost", "Limits"], name
+        facts = dict(re.findall(r"^\| ([a-z ]+) \| (.+) \|$", text, re.MULTILINE))
+        assert facts == {
+            "family": traits.family,
+            "laws": ", ".join(f"`{law}`" for law in solver.laws),
+            "loads": ", ".join(f"`{load}`" for load in solver.loads),
+            "is given the markers": "yes" if traits.assimilates else "no",
+        }, name
+    listed = (DOCS / "solvers" / "index.md").read_text(encoding="utf-8").splitlines()
+    assert [name for name in BUILT_IN if name not in listed] == []
+
+
+def test_the_page_of_the_python_interface_has_every_name():
+    import pinnray as pr
+
+    text = (REFERENCE / "python" / "pinnray.md").read_text(encoding="utf-8")
+    summary = text.split("## Summary")[0]
+    assert [name for name in dir(pr) if f"`{name}`" not in summary] == []
+
+
+@pytest.mark.parametrize(
+    ("word", "page"),
+    [("export", "reference/files"), ("parallel", "how-to/cluster"), ("abaqus", "how-to/mesh")],
+)
+def test_a_search_finds_what_people_look_for(word, page):
+    assert word in (DOCS / f"{page}.md").read_text(encoding="utf-8").lower()
 
 
 def test_the_docs_have_every_column_of_measurements():

@@ -1,5 +1,6 @@
 """The documentation site: it builds without a warning, and its notebooks run."""
 
+import json
 import os
 import subprocess
 import sys
@@ -25,6 +26,12 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert (built.returncode, built.stderr) == (0, "")
     pages = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md")}
     assert {page for page in pages if not (tmp_path / "html" / page).is_file()} == set()
+    for page in [DOCS / "gallery.md", *NOTEBOOKS]:
+        file = (tmp_path / "html" / page.relative_to(DOCS)).with_suffix(".ipynb")
+        code = [cell for cell in json.loads(file.read_text())["cells"] if cell["cell_type"] == "code"]
+        assert len(code) == sum(block.language in (CELL, "python") for block in blocks(page)) > 0
+        for cell in code:
+            compile(cell["source"], str(file), "exec")
 
 
 @pytest.mark.slow
