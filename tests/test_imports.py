@@ -36,3 +36,14 @@ def test_only_the_front_door_names_an_option_of_the_command_line():
             if isinstance(node.value, str) and re.search(r"(?<![\w-])--[a-z]", node.value)
         ]
     assert [place for place in found if not place.startswith("pinnray/")] == []
+
+
+def test_quantiles_come_without_the_distributions_of_scipy():
+    """scipy.stats takes a second of processor to import, and only designs are sampled by it."""
+    importing = [
+        path.relative_to(ROOT).as_posix()
+        for package in PROGRAM
+        for path in (ROOT / package).rglob("*.py")
+        if re.search(r"^\s*(from|import) scipy\.stats", path.read_text(encoding="utf-8"), re.MULTILINE)
+    ]
+    assert importing == ["studies/sweep/sampling.py"]

@@ -6,7 +6,7 @@ from math import nan, sqrt
 from typing import Self
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from compare.crossval.folds import FoldResult, SeedResults
 from geometry.arrays import FloatArray
@@ -37,7 +37,7 @@ class Interval:
         mean = float(np.mean(values))
         if len(values) < 2:
             return cls(mean, nan, nan)
-        half = t.ppf((1 + LEVEL) / 2, len(values) - 1) * float(np.std(values, ddof=1)) / sqrt(len(values))
+        half = stdtrit(len(values) - 1, (1 + LEVEL) / 2) * float(np.std(values, ddof=1)) / sqrt(len(values))
         return cls(mean, mean - float(half), mean + float(half))
 
 
@@ -112,7 +112,7 @@ def of_scheme(results: SeedResults, scheme: str) -> list[list[FoldResult]]:
 def score(results: SeedResults) -> Score:
     """The score of a solver from its results in one scheme."""
     ratios = np.concatenate([found.ratios for seed in results for found in seed])
-    inside = np.abs(ratios) <= norm.ppf((1 + LEVEL) / 2)
+    inside = np.abs(ratios) <= ndtri((1 + LEVEL) / 2)
     return Score(
         in_sample=_errors(results, lambda found: found.in_sample),
         held_out=_errors(results, lambda found: found.held_out),

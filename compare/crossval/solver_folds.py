@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 from pydantic_core import to_jsonable_python
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from compare.crossval.folds import ALL, Fold, FoldResult, LoadCase, hide_markers
 from compare.crossval.scores import FIELDS, LEVEL
@@ -201,7 +201,7 @@ class FoldRunner:
         if solution.uncertainty and (stated := solution.uncertainty.von_mises):
             inside = self.sampler.inside_of(solution, self.problem.mesh)
             errors = sampled.state(solution.problem).von_mises - truth.sampled.state(self._true_law).von_mises
-            within = np.abs(errors) <= norm.ppf((1 + LEVEL) / 2) * stated(inside)
+            within = np.abs(errors) <= ndtri((1 + LEVEL) / 2) * stated(inside)
             found["von_mises_coverage"] = float(np.average(within, weights=self.sampler.weights))
         return found
 

@@ -21,7 +21,7 @@ from math import log
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2, norm, t
+from scipy.special import chdtri, ndtri, stdtrit
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
 
@@ -258,10 +258,10 @@ def _linear_inflation(residuals: FloatArray, derivatives: FloatArray, z: FloatAr
 def quantile_of(inflation: float, freedom: float) -> float:
     """Half an interval of `LEVEL` over the standard deviation; Student's where φ was estimated."""
     upper = (1 + LEVEL) / 2
-    return float(norm.ppf(upper) if inflation == 1 else t.ppf(upper, freedom))
+    return float(ndtri(upper) if inflation == 1 else stdtrit(freedom, upper))
 
 
 def inflation_of(residuals: FloatArray, freedom: float) -> float:
     """φ: one where noise explains the residuals."""
     misfit = float(residuals @ residuals)
-    return 1.0 if misfit <= chi2.ppf(LEVEL, freedom) else float(np.sqrt(misfit / freedom))
+    return 1.0 if misfit <= chdtri(freedom, 1 - LEVEL) else float(np.sqrt(misfit / freedom))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from geometry.arrays import FloatArray
 from geometry.observations import Observations
@@ -155,7 +155,7 @@ class FreePictures:
         """What was found, for tables: each value with its standard deviation and 95 % interval."""
         values, slopes = values_of(self.parameters, z)
         deviations = np.abs(slopes) * np.sqrt(np.diagonal(covariance))
-        half = float(norm.ppf((1 + LEVEL) / 2)) * deviations
+        half = float(ndtri((1 + LEVEL) / 2)) * deviations
         numbers: dict[str, float] = {}
         for parameter, value, deviation, width in zip(self.parameters, values, deviations, half, strict=True):
             numbers |= {parameter.name: float(value), f"{parameter.name}_deviation": float(deviation)}

@@ -26,7 +26,7 @@ from solvers.identification.body import Linearised
 from solvers.identification.contradiction import with_doubts
 from solvers.identification.model import ResponseModel
 from solvers.identification.result import Fit, Identified
-from solvers.identification.search import IMPROBABLE, Identifier
+from solvers.identification.search import Identifier
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.tracker import ForceTracker, LawTracker
 from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
@@ -163,6 +163,11 @@ class FemBody:
         return self._sampled[key]
 
 
+IMPROBABLE = 8.0
+"""Logarithm of the ratio of probabilities on a coarse mesh from which on a law is not carried to a fine one:
+the fine mesh changed it by up to 3.5, and a law of one in a hundred has no weight."""
+
+
 class NestedSearch:
     """Finds the unknowns on a coarse mesh and carries them to a fine one; see `Identifier`.
 
@@ -178,15 +183,14 @@ class NestedSearch:
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
         """The unknowns under every law, and the laws' probabilities; see `Identifier`."""
         found = self._coarse.identify(observations, progress)
-        least = found.best.log_posterior - IMPROBABLE
-        fits = [self._carried(fit) for fit in found.fits]
-        polished = [
-            self._fine.polished(fit, observations) if fit.log_posterior > least else fit for fit in fits
-        ]
+        polished = [self._polished(found.best, observations)]
+        least = min(found.best.log_posterior, polished[0].log_posterior) - IMPROBABLE
+        for fit in found.fits[1:]:
+            polished.append(self._polished(fit, observations) if fit.log_posterior > least else fit)
         return Identified.ranked(polished, found.doubtful, found.lost)
 
-    def _carried(self, fit: Fit) -> Fit:
-        """A coarse fit, whose response is interpolated at the fine nodes."""
+    def _polished(self, fit: Fit, observations: Observations) -> Fit:
+        """A coarse fit, whose response is interpolated at the fine nodes and made exact there."""
         model, response = self._fine.models[fit.law], fit.response
         here, there = fit.model.body, model.body
         if not (isinstance(here, FemBody) and isinstance(there, FemBody)):
@@ -197,7 +201,7 @@ class NestedSearch:
             )
         slopes = np.stack([self._weights @ slope for slope in response.slopes])
         carried = replace(response, state=self._weights @ response.state, slopes=slopes)
-        return fit._replace(model=model, response=carried)
+        return self._fine.polished(fit._replace(model=model, response=carried), observations)
 
 
 def _both_components(values: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from geometry.arrays import FloatArray
 from geometry.mesh.boundary import mean_thickness
@@ -26,7 +26,7 @@ from solvers.identification.unknowns import doubt_of_the_plane, log_prior
 from solvers.problem import Problem
 from solvers.solution import Estimated, IdentifiedForce, Solution, Status, Uncertainty, unstable_phrase
 
-NORMAL = float(norm.ppf((1 + LEVEL) / 2))
+NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
 WRAPPED = 0.5
 """Width of a contact over the front's extent from which its force is not believed: on a printed finger that

@@ -8,14 +8,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.observations import Observations
-from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Estimate, Parameter, Prediction, estimate
+from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Estimate
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
-from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
+from solvers.identification.law_fits import LawFits, LawModels
+from solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
 from solvers.identification.result import Fit, Identified
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.unknowns import LAWS, Unknowns
@@ -31,17 +32,11 @@ WIDE = (2.0, 4.0)
 POLISHES, POLISHED = 6, 0.02
 """Steps of first order on a finer mesh at most, and their last size over the standard deviations."""
 
-HELD = 1e-3
-"""Factor of the standard deviation of a parameter that is held."""
-
 IMPROBABLE = 15.0
-"""Logarithm of the ratio of evidences from which on a law is not fitted to the end."""
+"""Logarithm of the ratio of probabilities from which on a law is not fitted to the end."""
 
 HOPELESS = 100.0
 """φ from which neither a wide contact nor another law explains the markers: another order or finger does."""
-
-MOST_LOST = 8
-"""Hypotheses without equilibrium at which a search ends: near a limit load there are ever more of them."""
 
 
 class Identifier:
@@ -64,16 +59,20 @@ class Identifier:
         laws: Sequence[LawName] | None = None,
         cost_change: float = COST_CHANGE,
     ) -> None:
-        self._settings, self._mesh, self._cost_change = settings, problem.mesh, cost_change
-        self._progress: Progress = silent
-        self.models: dict[LawName, ResponseModel] = {}
-        for law in laws or (LAWS if settings.law == "evidence" else (problem.material.law,)):
+        self._settings, self._mesh = settings, problem.mesh
+
+        def model(law: LawName) -> ResponseModel:
             own = replace(problem, material=problem.material.model_copy(update={"law": law}))
             unknowns = Unknowns(own, settings.unknowns)
-            self.models[law] = ResponseModel(body(unknowns), unknowns)
-        first = next(iter(self.models.values()))
+            return ResponseModel(body(unknowns), unknowns)
+
+        if laws is None:
+            laws = LAWS if settings.law == "evidence" else (problem.material.law,)
+        self.models = LawModels(laws, model)
+        first = self.models[laws[0]]
         self._names = first.unknowns.names
         self.parameters = first.unknowns.parameters(first.flexibility(), settings.prior)
+        self._fits = LawFits(self.models, self.parameters, cost_change)
         self._feet = first.unknowns.feet.names
         self._known: dict[LawName, Fit] = {}
 
@@ -100,7 +99,7 @@ class Identifier:
         Raises:
             UserError: If there are no markers, or the finger has no equilibrium near rest.
         """
-        self._progress = progress
+        self._fits.progress = progress
         rough = self._rough(self.measurement(observations))
         lost = [law for law in self.models if law not in {each.law for each in rough}]
         for best in sorted(rough, key=lambda fit: -fit.log_posterior):
@@ -130,9 +129,9 @@ class Identifier:
             fit: By the best law.
             quick: A few steps from there, if they were made already.
         """
-        other = quick or self._fit(law, fit.measurement, fit, rounds=1, steps=QUICK)
-        if self._shifted(other, fit.measurement).log_posterior > fit.log_posterior - IMPROBABLE:
-            other = self._fit(law, fit.measurement, other)
+        other = quick or self._fits.fit(law, fit.measurement, fit, rounds=1, steps=QUICK)
+        if self._fits.shifted(other, fit.measurement).log_posterior > fit.log_posterior - IMPROBABLE:
+            other = self._fits.fit(law, fit.measurement, other)
         return other
 
     def start_from(self, fit: Fit) -> None:
@@ -169,7 +168,7 @@ class Identifier:
             return None
         about = fit._replace(model=model, response=response, coarser=None)
         measurement = self.measurement(observations).only(fit.measurement.kept)
-        return self._shifted(about, measurement)._replace(coarser=fit)
+        return self._fits.shifted(about, measurement)._replace(coarser=fit)
 
     def polished(self, fit: Fit, observations: Observations) -> Fit:
         """A fit whose response is near equilibrium, after some steps of first order; see `refined`.
@@ -190,25 +189,7 @@ class Identifier:
     def updated(self, found: Identified, observations: Observations) -> Identified:
         """The unknowns for observations near those of fits, to first order: no equilibrium is solved."""
         measurement = self.measurement(observations)
-        return Identified.ranked([self._shifted(fit, measurement) for fit in found.fits], {}, found.lost)
-
-    def _shifted(self, fit: Fit, measurement: MarkerData) -> Fit:
-        """The fit to a measurement, to first order about another fit."""
-        about = fit.response
-        predicted, slopes = MarkerModel(fit.model, measurement).predicted(about)
-        found = estimate(
-            lambda values: (predicted + slopes @ (values - about.values), slopes),
-            measurement.observed,
-            measurement.noise,
-            self.parameters,
-            fit.estimate.z,
-        )
-        return fit._replace(
-            estimate=found,
-            response=fit.model.extrapolated(about, found.values),
-            measurement=measurement,
-            coarser=fit.coarser and self._shifted(fit.coarser, measurement),
-        )
+        return Identified.ranked([self._fits.shifted(fit, measurement) for fit in found.fits], {}, found.lost)
 
     def _rough(self, measurement: MarkerData) -> list[Fit]:
         """A fit of every law with φ = 1: the first one to its end, the others in a few steps from it.
@@ -220,7 +201,7 @@ class Identifier:
             steps = QUICK if found else MAX_STEPS
             near = self._known.get(law, found[0] if found else None)
             try:
-                found.append(self._fit(law, measurement, near, held=self._loose, rounds=1, steps=steps))
+                found.append(self._fits.fit(law, measurement, near, held=self._loose, rounds=1, steps=steps))
             except NoSolutionError as error:
                 reason = error
         if not found:
@@ -233,18 +214,18 @@ class Identifier:
         The feet are held till then: they would turn far to make up for a contact that is not found yet.
         """
         best = self._of_contacts(rough)
-        return self._fit(rough.law, rough.measurement, best) if self._loose else best
+        return self._fits.fit(rough.law, rough.measurement, best) if self._loose else best
 
     def _of_contacts(self, rough: Fit) -> Fit:
         if rough.estimate.converged:
             return rough
-        best = self._fit(rough.law, rough.measurement, rough, held=self._loose)
+        best = self._fits.fit(rough.law, rough.measurement, rough, held=self._loose)
         if best.estimate.inflation == 1 or self._known:
             return best
         for start in self._elsewhere(best.estimate):
             try:
                 if start @ self._is_width:
-                    held = self._fit(
+                    held = self._fits.fit(
                         rough.law,
                         rough.measurement,
                         None,
@@ -254,7 +235,7 @@ class Identifier:
                         steps=QUICK,
                     )
                     start = np.where(self._is_width, start, held.estimate.z)
-                other = self._fit(rough.law, rough.measurement, None, start, held=self._loose)
+                other = self._fits.fit(rough.law, rough.measurement, None, start, held=self._loose)
             except NoSolutionError:
                 continue
             best = max(best, other, key=lambda fit: fit.log_evidence)
@@ -285,88 +266,6 @@ class Identifier:
         """Names of the motions that a first search holds."""
         return () if self._known else self._feet
 
-    def _holding(self, held: Sequence[str], z: FloatArray) -> list[Parameter]:
-        """The parameters, some of them held at their standardised value among all, shape (p,)."""
-        return [
-            replace(each, start=float(each.value(at)), scale=HELD * each.scale) if each.name in held else each
-            for each, at in zip(self.parameters, z.tolist(), strict=True)
-        ]
-
-    def _fit(
-        self,
-        law: LawName,
-        measurement: MarkerData,
-        near: Fit | None,
-        start: FloatArray | None = None,
-        *,
-        held: Sequence[str] = (),
-        **limits: int,
-    ) -> Fit:
-        """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`.
-
-        A wide contact that the start has is soon lost, while the frame and the walls are those of a narrow
-        one. What is `held` stays, and its value in the fit is zero.
-        """
-        model = self.models[law]
-        markers = MarkerModel(model, measurement)
-        model.restart(None if near is None else near.response)
-
-        def predict(values: FloatArray) -> Prediction | None:
-            force = np.linalg.norm(model.unknowns.hypothesis(values).force)
-            self._progress(0.5, f"{law}: force {force:.4g} N/mm")
-            found = model.response(values)
-            if found is None and model.evaluations == first:  # another law's start was too far away
-                model.restart(None)
-                found = model.response(values)
-            if found is not None:
-                reached[values.tobytes()] = found
-                return markers.predicted(found)
-            lost.append(values)
-            if len(lost) > MOST_LOST or (explained_elsewhere and not reached):
-                raise nothing
-            return None
-
-        if near is not None:
-            start = near.estimate.z
-        elif start is None:
-            start = self._pressed(model, markers)
-        parameters = self.parameters
-        if held:
-            parameters = self._holding(held, start)
-            start = np.where(np.isin(self._names, held), 0.0, start)
-        # Where one law explains the markers, another one does as well, or nowhere.
-        explained_elsewhere = near is not None and near.law != law and near.estimate.converged
-        first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
-        nothing = NoSolutionError(
-            f"no equilibrium of the {law} law was found near the markers, from rest or from the force of a "
-            "linear finger; see whether the markers are of this finger and load, or take a smaller prior"
-        )
-        found = estimate(
-            predict,
-            measurement.observed,
-            measurement.noise,
-            parameters,
-            start,
-            cost_change=self._cost_change,
-            **limits,
-        )
-        if (rough := reached.get(found.values.tobytes())) is None:
-            raise nothing
-        model.restart(rough)
-        exact = model.response(found.values, EXACT)
-        return Fit(model, found, exact or rough, measurement, exact is not None)
-
-    def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
-        """Standardised values with the normal force that a linear finger would need, the rest as expected."""
-        z = np.zeros(len(self._names))
-        at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
-        if at_rest is not None:
-            which, noise = self._names.index("normal_force"), markers.measurement.noise
-            slope = markers.predicted(at_rest)[1][:, which] / noise
-            force = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
-            z[which] = force / self.parameters[which].scale
-        return z
-
     def _believed(self, fit: Fit) -> tuple[Fit, dict[int, FloatArray]]:
         """The fit without markers that contradict the others, and by how much they are off, mm.
 
@@ -387,7 +286,7 @@ class Identifier:
             if drops[worst] < 30:
                 break
             number = int(measurement.kept[worst])
-            without = self._fit(fit.law, measurement.only(np.delete(measurement.kept, worst)), fit)
+            without = self._fits.fit(fit.law, measurement.only(np.delete(measurement.kept, worst)), fit)
             if 2 * without.estimate.inflation > found.inflation and not _explained(without):
                 break
             computed, _ = MarkerModel(without.model, measurement).predicted(without.response)
@@ -400,7 +299,7 @@ def _explained(fit: Fit) -> bool:
     """Whether noise and priors explain the markers: neither is φ above one, nor are the values far astray."""
     found = fit.estimate
     cost = float(found.residuals @ found.residuals + found.z @ found.z)
-    return found.inflation == 1 and cost < chi2.ppf(1 - 1e-3, len(found.residuals))
+    return found.inflation == 1 and cost < chdtri(len(found.residuals), 1e-3)
 
 
 def carried(response: Response, state: FloatArray) -> Response:

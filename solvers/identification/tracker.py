@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtri
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import ShapeError, UserError
@@ -254,8 +254,8 @@ class ForceTracker:
         along = force / size if size else self._unknowns.directions[0]
         doubt = doubt_of_the_plane(self._unknowns.problem) * size
         half = found.quantile * float(np.hypot(np.sqrt(along @ spread @ along), doubt))
-        wider = found.quantile / float(norm.ppf((1 + LEVEL) / 2))
-        may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chi2.ppf(LEVEL, len(force))
+        wider = found.quantile / float(ndtri((1 + LEVEL) / 2))
+        may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chdtri(len(force), 1 - LEVEL)
         of_place = np.isin(self._unknowns.names, ("position", "eccentricity")).astype(np.float64)
         place, place_by_z = float(of_place @ values), of_place * derivatives
         around = found.quantile * np.sqrt(place_by_z @ found.covariance @ place_by_z)

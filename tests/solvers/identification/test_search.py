@@ -10,9 +10,10 @@ from geometry.finger.design import Design
 from geometry.mesh.boundary import mean_thickness
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.identification import FemBody, FemIdSolver
+from solvers.identification.law_fits import MOST_LOST, LawFits
 from solvers.identification.model import ResponseModel
 from solvers.identification.result import Identified
-from solvers.identification.search import MOST_LOST, WIDE, Identifier
+from solvers.identification.search import WIDE, Identifier
 from solvers.identification.unknowns import LAW_ODDS, LAWS
 from solvers.problem import Load, Material, Problem
 from solvers.solver import NoSolutionError
@@ -80,14 +81,14 @@ def test_a_wrong_marker_is_found_and_not_used(identified, problem):
 
 def failing(monkeypatch, *laws):
     """Let fits of some laws find no equilibrium."""
-    fit = Identifier._fit
+    fit = LawFits.fit
 
     def failed(self, law, *arguments, **options):
         if law in laws:
             raise NoSolutionError(f"no equilibrium of the {law} law")
         return fit(self, law, *arguments, **options)
 
-    monkeypatch.setattr(Identifier, "_fit", failed)
+    monkeypatch.setattr(LawFits, "fit", failed)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -157,7 +158,7 @@ def test_a_law_without_an_equilibrium_where_another_one_has_it_is_left_out_at_on
 
 def test_a_wide_contact_is_searched_with_its_width_held(identified, problem, monkeypatch):
     """Everything else goes first to where the wide contact explains the markers, then all of it."""
-    asked, known = [], Identifier._fit
+    asked, known = [], LawFits.fit
 
     def fit(self, law, measurement, near, start=None, **options):
         found = known(self, law, measurement, near, start, **options)
@@ -168,7 +169,7 @@ def test_a_wide_contact_is_searched_with_its_width_held(identified, problem, mon
             asked.append(start[width])
         return found
 
-    monkeypatch.setattr(Identifier, "_fit", fit)
+    monkeypatch.setattr(LawFits, "fit", fit)
     moved = identified[0].displacements + 0.1 * np.random.default_rng(1).normal(size=(9, 2))
     FemIdSolver(degree=1, law="given").solve(
         replace(problem, observations=replace(identified[0], displacements=moved))

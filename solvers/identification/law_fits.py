@@ -1,0 +1,156 @@
+"""Fits of the unknowns under one law each, from a start or from another fit."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from solvers.assimilation.estimation import Parameter, Prediction, estimate
+from solvers.elasticity import LawName
+from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
+from solvers.identification.result import Fit
+from solvers.solver import NoSolutionError, Progress, silent
+
+HELD = 1e-3
+"""Factor of the standard deviation of a parameter that is held."""
+
+MOST_LOST = 8
+"""Hypotheses without equilibrium at which a search ends: near a limit load there are ever more of them."""
+
+
+class LawModels(Mapping[LawName, ResponseModel]):
+    """The finger by each of some laws, made when it is first asked for."""
+
+    def __init__(self, laws: Sequence[LawName], make: Callable[[LawName], ResponseModel]) -> None:
+        self._laws, self._make, self._made = laws, make, dict[LawName, ResponseModel]()
+
+    def __getitem__(self, law: LawName) -> ResponseModel:
+        if law not in self._made:
+            if law not in self._laws:
+                raise KeyError(law)
+            self._made[law] = self._make(law)
+        return self._made[law]
+
+    def __iter__(self) -> Iterator[LawName]:
+        return iter(self._laws)
+
+    def __len__(self) -> int:
+        return len(self._laws)
+
+
+class LawFits:
+    """Fits the unknowns of one finger under any of the laws.
+
+    Args:
+        models: The finger by every law.
+        parameters: The unknowns, whose priors the laws share.
+        cost_change: Relative change of the cost below which a search has converged.
+    """
+
+    def __init__(
+        self, models: Mapping[LawName, ResponseModel], parameters: Sequence[Parameter], cost_change: float
+    ) -> None:
+        self._models, self.parameters, self._cost_change = models, parameters, cost_change
+        self._names = [parameter.name for parameter in parameters]
+        self.progress: Progress = silent
+
+    def shifted(self, fit: Fit, measurement: MarkerData) -> Fit:
+        """The fit to a measurement, to first order about another fit."""
+        about = fit.response
+        predicted, slopes = MarkerModel(fit.model, measurement).predicted(about)
+        found = estimate(
+            lambda values: (predicted + slopes @ (values - about.values), slopes),
+            measurement.observed,
+            measurement.noise,
+            self.parameters,
+            fit.estimate.z,
+        )
+        return fit._replace(
+            estimate=found,
+            response=fit.model.extrapolated(about, found.values),
+            measurement=measurement,
+            coarser=fit.coarser and self.shifted(fit.coarser, measurement),
+        )
+
+    def fit(
+        self,
+        law: LawName,
+        measurement: MarkerData,
+        near: Fit | None,
+        start: FloatArray | None = None,
+        *,
+        held: Sequence[str] = (),
+        **limits: int,
+    ) -> Fit:
+        """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`.
+
+        A wide contact that the start has is soon lost, while the frame and the walls are those of a narrow
+        one. What is `held` stays, and its value in the fit is zero.
+        """
+        model = self._models[law]
+        markers = MarkerModel(model, measurement)
+        model.restart(None if near is None else near.response)
+
+        def predict(values: FloatArray) -> Prediction | None:
+            force = np.linalg.norm(model.unknowns.hypothesis(values).force)
+            self.progress(0.5, f"{law}: force {force:.4g} N/mm")
+            found = model.response(values)
+            if found is None and model.evaluations == first:  # another law's start was too far away
+                model.restart(None)
+                found = model.response(values)
+            if found is not None:
+                reached[values.tobytes()] = found
+                return markers.predicted(found)
+            lost.append(values)
+            if len(lost) > MOST_LOST or (explained_elsewhere and not reached):
+                raise nothing
+            return None
+
+        if near is not None:
+            start = near.estimate.z
+        elif start is None:
+            start = self._pressed(model, markers)
+        parameters = self.parameters
+        if held:
+            parameters = self._holding(held, start)
+            start = np.where(np.isin(self._names, held), 0.0, start)
+        # Where one law explains the markers, another one does as well, or nowhere.
+        explained_elsewhere = near is not None and near.law != law and near.estimate.converged
+        first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
+        nothing = NoSolutionError(
+            f"no equilibrium of the {law} law was found near the markers, from rest or from the force of a "
+            "linear finger; see whether the markers are of this finger and load, or take a smaller prior"
+        )
+        found = estimate(
+            predict,
+            measurement.observed,
+            measurement.noise,
+            parameters,
+            start,
+            cost_change=self._cost_change,
+            **limits,
+        )
+        if (rough := reached.get(found.values.tobytes())) is None:
+            raise nothing
+        model.restart(rough)
+        exact = model.response(found.values, EXACT)
+        return Fit(model, found, exact or rough, measurement, exact is not None)
+
+    def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
+        """Standardised values with the normal force that a linear finger would need, the rest as expected."""
+        z = np.zeros(len(self._names))
+        at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
+        if at_rest is not None:
+            which, noise = self._names.index("normal_force"), markers.measurement.noise
+            slope = markers.predicted(at_rest)[1][:, which] / noise
+            force = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
+            z[which] = force / self.parameters[which].scale
+        return z
+
+    def _holding(self, held: Sequence[str], z: FloatArray) -> list[Parameter]:
+        """The parameters, some of them held at their standardised value among all, shape (p,)."""
+        return [
+            replace(each, start=float(each.value(at)), scale=HELD * each.scale) if each.name in held else each
+            for each, at in zip(self.parameters, z.tolist(), strict=True)
+        ]
