@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from math import cos, isfinite, radians, sin
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
@@ -37,6 +37,14 @@ def _number(
     )
 
 
+class Substance(NamedTuple):
+    """What is known of a material besides its elasticity."""
+
+    name: str
+    density: float  #: g/cm^3
+    strain_at_break: float  #: Nominal strain
+
+
 class Material(CheckedModel):
     """An isotropic elastic material; by default the paper's, Agilus30 and VeroUltra mixed to Shore 85A.
 
@@ -50,6 +58,7 @@ class Material(CheckedModel):
     #: Plane "strain" (thick finger) or plane "stress" (the equations that the paper prints)
     plane: Literal["strain", "stress"] = "strain"
     law: LawName = "linear"  #: "linear" is Hooke's law; the others are of finite strain
+    _substance: Substance | None = PrivateAttr(None)  # beside the constants, which alone decide a solution
 
     if TYPE_CHECKING:
 
@@ -79,6 +88,17 @@ class Material(CheckedModel):
         if self.law != "linear" and self.plane == "stress":
             raise ValueError(f"the {self.law} law is given for plane strain only; take plane = strain")
         return self
+
+    @property
+    def substance(self) -> Substance | None:
+        """What the finger is made of, where that is known."""
+        return self._substance
+
+    def made_of(self, substance: Substance | None) -> Self:
+        """The same elastic constants, of a substance."""
+        made = self.model_copy()
+        made._substance = substance
+        return made
 
     @property
     def lame(self) -> Lame:

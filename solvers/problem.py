@@ -22,6 +22,7 @@ from solvers.physics import Load as Load
 from solvers.physics import LoadKind as LoadKind
 from solvers.physics import Material as Material
 from solvers.physics import Physics as Physics
+from solvers.physics import Substance as Substance
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +91,8 @@ class Problem:
             content += [seen.marker_radius, *vars(seen.pressed).values(), *vars(seen.drawn).values()]
         if self.finger is not None:
             content.append(self.finger.digest)
+        if self.material.substance is not None:  # of which the figures are
+            content += self.material.substance
         return content_hash(content)
 
 

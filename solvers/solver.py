@@ -179,7 +179,7 @@ def with_law(material: Material, solver: Solver) -> Material:
     """
     law = material.law if material.law in solver.laws else solver.laws[0]
     try:
-        return Material(**{**material.model_dump(), "law": law})
+        return Material(**{**material.model_dump(), "law": law}).made_of(material.substance)
     except UserError as error:
         raise UnsupportedProblemError(f"{solver.name}: {error}") from None
 

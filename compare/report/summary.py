@@ -8,6 +8,7 @@ from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
 from compare.runtime.tables import NONE, TextTable, number, percent
+from solvers.finger_figures import break_warning
 
 Metrics = Mapping[str, Any]
 """`metrics.json`, or a part of it."""
@@ -96,6 +97,7 @@ def _figures(metrics: Metrics) -> RunAnswer | None:
         f"{number(moved, 3)} mm, and the largest strain away from corners is "
         f"{percent(values['principal_strain'], 2)}."
     )
+    broken = break_warning(max(each["values"].get("strain_over_break") or 0.0 for each in known.values()))
     rows = []
     for key, words, unit in FIGURES:
         cells = [_figure(each, key) for each in known.values()]
@@ -103,7 +105,10 @@ def _figures(metrics: Metrics) -> RunAnswer | None:
             rows.append([f"{words}, {unit}" if unit else words, *cells])
     caption = "* At nodes that are a wall thickness away from re-entrant corners, base and contact."
     return RunAnswer(
-        "What does the finger do?", verdict, [], TextTable("", ["", *known], rows, caption, left=[""])
+        "What does the finger do?",
+        verdict,
+        [broken] if broken else [],
+        TextTable("", ["", *known], rows, caption, left=[""]),
     )
 
 

@@ -183,7 +183,12 @@ class PhysicsOptions:
 
     def read(self, preset: str | None = None) -> tuple[Material, Load]:
         """Material and load; a preset of the solvers may choose the kind of load."""
-        return Physics(**self.values(preset)).parts
+        material, load = Physics(**self.values(preset)).parts
+        if self.material is None:
+            return material, load
+        from solvers.materials.presets import preset as material_preset
+
+        return material.made_of(material_preset(self.material).material.substance), load
 
     def values(self, preset: str | None = None) -> dict[str, Any]:
         """Material and load by the names of a study."""

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from solvers.fem.linear import FactorisedProblem
 
 DENSITY = 1.2
-"""Of a printed polyurethane, g/cm^3."""
+"""Of a printed polyurethane, g/cm^3: where the substance is not known."""
+NEAR_BREAK = 0.5
+"""Largest strain over the strain at break from which a finger is said to be near it."""
 NORMAL = 1.96
 """Half of a 95 % interval over the standard deviation."""
 
@@ -54,6 +56,7 @@ class FingerFigures:
         curve: Travel of the indenter, mm, and its force along it, N, from rest on; one pair where the way to
             the end is not known.
         depth: Of the finger, mm.
+        strain_over_break: Largest nominal strain over the material's strain at break, of a known material.
         sideways_stiffness: Force along the depth per displacement of the contact along it, at rest, N/mm;
             this and the next by `fem-3d` with its setting `lateral`.
         torsional_stiffness: Torque about the finger's axis per turn of the contact, at rest, N mm/rad.
@@ -83,6 +86,7 @@ class FingerFigures:
     narrowest_gap: float = _figure("mm", "narrowest clear width of a cavity")
     sideways_stiffness: float = float("nan")
     torsional_stiffness: float = float("nan")
+    strain_over_break: float = float("nan")
     strain_energy: float = float("nan")
     depth: float = float("nan")
     intervals: Mapping[str, Interval] = field(default_factory=dict)
@@ -146,6 +150,7 @@ class FingerFigures:
         asked = {
             "sideways_stiffness_N_per_mm": self.sideways_stiffness,
             "torsional_stiffness_N_mm_per_rad": self.torsional_stiffness,
+            "strain_over_break": self.strain_over_break,
         }
         found |= {name: value for name, value in asked.items() if np.isfinite(value)}
         return found | {"strain_energy_mJ": self.strain_energy}
@@ -210,6 +215,14 @@ def heading(name: str, quantity: Quantity | None = None) -> str:
     return f"{name}_{unit}" if unit else name
 
 
+def break_warning(share: float) -> str:
+    """A sentence if the largest strain is near the strain at break or beyond, by their ratio; else empty."""
+    if not share >= NEAR_BREAK:
+        return ""
+    end = "it breaks" if share >= 1 else "a printed part breaks earlier than the data sheet says"
+    return f"The largest strain is {share:.0%} of the material's strain at break: {end}."
+
+
 def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> FingerFigures:
     """The figures of a solution.
 
@@ -241,6 +254,7 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
         **(figures_at_rest(problem) if rest is None else rest),
         sideways_stiffness=lateral.sideways,
         torsional_stiffness=lateral.torsional,
+        strain_over_break=_strain_over_break(problem.material, strain.value),
         strain_energy=float(solution.energy) * depth,
         depth=depth,
         intervals=_intervals(solution, depth, stress),
@@ -254,7 +268,7 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
 
 
 def figures_at_rest(
-    problem: Problem, *, density: float = DENSITY, prepared: "FactorisedProblem | None" = None
+    problem: Problem, *, density: float | None = None, prepared: "FactorisedProblem | None" = None
 ) -> dict[str, float]:
     """The figures that do not depend on the load, by name: compliances, mass, area, walls and gaps.
 
@@ -262,11 +276,13 @@ def figures_at_rest(
 
     Args:
         problem: Its finger, its elastic constants and the place of its contact.
-        density: Of the material, g/cm^3.
+        density: Of the material, g/cm^3; its substance's, else `DENSITY`, if None.
         prepared: The linear problem, factorised, where it is at hand.
     """
     finger, position = _finger(problem), problem.load.position
     linear = problem.material.model_copy(update={"law": "linear"})
+    if density is None:
+        density = problem.material.substance.density if problem.material.substance else DENSITY
 
     def computed() -> dict[str, float]:
         along, across = _compliances(prepared or _prepared(problem, linear), position, finger.depth)
@@ -294,6 +310,14 @@ def _finger(problem: Problem) -> Finger:
     if problem.finger is None:
         raise UserError("figures are of a finger with a depth; this problem is of a plane body")
     return problem.finger
+
+
+def _strain_over_break(material: Material, strain: float) -> float:
+    """Nominal strain over the strain at break; the laws of finite strain have Green and Lagrange's strain."""
+    if material.substance is None:
+        return float("nan")
+    nominal = strain if material.law == "linear" else np.sqrt(1 + 2 * strain) - 1
+    return float(nominal / material.substance.strain_at_break)
 
 
 def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, Interval]:

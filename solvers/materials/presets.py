@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from geometry.errors import UserError
-from solvers.problem import Material
+from solvers.problem import Material, Substance
 
 STRETCH = 2.0 - 2.0**-2
 """λ - λ⁻² at the strain of 100 %, of an incompressible neo-Hookean bar in tension."""
@@ -39,7 +39,7 @@ def _silicone(stress: float, density: float, strain_at_break: float, source: str
 
 
 SMOOTH_ON = "Smooth-On, technical bulletin, 100 % modulus (ASTM D412)"
-MATERIALS: Mapping[str, MaterialPreset] = {
+_SHEETS = {
     "tpu-85a": _filament(12.0, 1.19, 6.6, "NinjaTek, NinjaFlex 85A, technical specifications (ASTM D638)"),
     "tpu-95a": _filament(26.0, 1.22, 5.8, "NinjaTek, Cheetah 95A, technical specifications (ASTM D638)"),
     "ecoflex-00-30": _silicone(0.0690, 1.07, 9.0, f"{SMOOTH_ON}, Ecoflex 00-30, 10 psi"),
@@ -54,6 +54,13 @@ MATERIALS: Mapping[str, MaterialPreset] = {
         "I. D. Johnston et al., J. Micromech. Microeng. 24 (2014) 035017: 1.32 to 2.97 MPa, cured at 25 to "
         "200 degrees; density and strain of Dow's data sheet",
     ),
+}
+
+MATERIALS: Mapping[str, MaterialPreset] = {
+    name: known._replace(
+        material=known.material.made_of(Substance(name, known.density, known.strain_at_break))
+    )
+    for name, known in _SHEETS.items()
 }
 """The presets by name; Poisson's ratios are assumed, 0.45 of filaments and 0.49 of silicones."""
 

@@ -45,6 +45,7 @@ def solve(
     from compare.report.figures_table import figures_lines
     from compare.report.output_files import write_vtu
     from compare.runtime.stages import Stages
+    from solvers.finger_figures import break_warning
     from solvers.problem import Problem
     from solvers.registry import unknown_solver
     from solvers.solver import Traits, solved, with_law
@@ -105,6 +106,8 @@ def solve(
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     if figures:
         print("\n".join(figures_lines(figures, grip)))
+        if said := break_warning(figures.strain_over_break):
+            say(f"warning: {said[:1].lower()}{said[1:-1]}")
     for path in written:
         print(path)
     return 0 if evaluation.converged and tolerance_reached(adaptation) else NOT_CONVERGED

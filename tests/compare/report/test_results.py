@@ -219,4 +219,7 @@ def test_the_report_says_what_the_finger_does_in_newtons(finished):
     assert f"{values['force_N']:#.3g} N" in first.verdict
     values |= {"force_low_N": 4.0, "force_high_N": 5.0}
     assert "95 % interval 4.00 to 5.00 N" in answers(told)[0].verdict
+    assert answers(told)[0].sentences == []
+    values["strain_over_break"] = 0.75
+    assert "75% of the material's strain at break" in answers(told)[0].sentences[0]
     assert any("(4.00 to 5.00)" in cell for row in answers(told)[0].table.rows for cell in row)

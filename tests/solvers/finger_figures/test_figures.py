@@ -12,7 +12,7 @@ from geometry.finger.section import rib_pitch
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.finger_figures import QUANTITIES, FingerFigures, figures_of
+from solvers.finger_figures import QUANTITIES, FingerFigures, break_warning, figures_of
 from solvers.finger_figures.measures import (
     force_curve,
     largest_away_from_corners,
@@ -20,7 +20,7 @@ from solvers.finger_figures.measures import (
     thinnest_wall,
     wrap_angle,
 )
-from solvers.problem import Load, Material, Physics, Problem
+from solvers.problem import Load, Material, Physics, Problem, Substance
 from solvers.registry import make_solver
 from solvers.solution import Solution, Status
 
@@ -165,3 +165,35 @@ def test_a_cylinder_at_finite_strain_has_every_quantity() -> None:
     # Force grows faster than the stroke, and the tip comes toward the indenter (docs/examples/rib_sweep.py).
     assert found.force_50 < 0.5 * found.force
     assert found.tip_v > 0
+
+
+def test_mass_and_break_are_of_the_substance() -> None:
+    glass = Substance("glass", 2.5, 0.02)
+    strained = [[0.01, 0.0], [0.0, -0.002]]
+    of_glass = affine(strained, replace(PROBLEM, material=Material().made_of(glass)))
+    found = figures_of(of_glass)
+    assert found.density == pytest.approx(2.5)
+    assert figures_of(affine(strained)).density == pytest.approx(1.2)  # of the default material
+    assert found.strain_over_break == pytest.approx(0.5)
+    assert found.columns()["strain_over_break"] == found.strain_over_break
+    assert "strain_over_break" not in figures_of(affine(strained)).columns()
+    green = Material(law="neo-hookean").made_of(glass)
+    finite = figures_of(affine([[0.01, 0.0], [0.0, 0.0]], replace(PROBLEM, material=green)))
+    assert finite.strain_over_break == pytest.approx(0.5)  # the nominal strain, not Green and Lagrange's
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (float("nan"), ""),
+        (0.4, ""),
+        (
+            0.6,
+            "60% of the material's strain at break: a printed part breaks earlier than",
+        ),
+        (1.2, "120% of the material's strain at break: it breaks."),
+    ],
+)
+def test_a_strain_near_the_break_is_said(share, said) -> None:
+    assert said in break_warning(share)
+    assert bool(break_warning(share)) == bool(said)

@@ -1,11 +1,14 @@
 """Presets, and moduli from tensile tests whose answer is known."""
 
+import pickle
+
 import numpy as np
 import pytest
 
 from geometry.errors import UserError
 from solvers.materials import MATERIALS, TensileTest, fitted, preset, read_tensile_test
 from solvers.materials.tensile_test import nominal_stress
+from solvers.registry import make_solver
 
 STRAIN = np.linspace(0.02, 0.8, 40)
 
@@ -86,3 +89,16 @@ def test_what_is_no_tensile_test_is_refused_in_one_line(tmp_path, text, said):
 def test_a_stress_that_falls_is_no_test():
     with pytest.raises(UserError, match="falls where the strain grows"):
         fitted(TensileTest(STRAIN, -STRAIN))
+
+
+def test_a_known_material_carries_its_substance_through_options_and_laws():
+    from pinnray.options.shared import PhysicsOptions
+    from solvers.solver import with_law
+
+    known = preset("tpu-95a")
+    assert (known.material.substance.density, known.material.substance.strain_at_break) == known[1:3]
+    material, _ = PhysicsOptions(material="tpu-95a", young=20.0).read()
+    assert (material.young, material.substance) == (20.0, known.material.substance)
+    assert PhysicsOptions(young=20.0).read()[0].substance is None
+    assert with_law(material, make_solver("fem")).substance == material.substance
+    assert pickle.loads(pickle.dumps(material)).substance == material.substance
