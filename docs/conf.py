@@ -112,6 +112,10 @@ def is_hidden(_app: Sphinx, _what: str, name: str, _value: object, skipped: bool
     return skipped or name.isupper()
 
 
+NOT_IN_NOTEBOOKS = r"^:::.*\n?|^\[?!\[.*\n?|\[(.*?)\]\([^)]*\)"
+"""What the text of a notebook goes without: boxes and pictures of the site, and addresses of links."""
+
+
 def cells_of(text: str) -> list[dict[str, object]]:
     """The cells of a notebook: code of a page that Python or IPython runs, and the text between."""
     cells: list[dict[str, object]] = []
@@ -131,7 +135,7 @@ def cells_of(text: str) -> list[dict[str, object]]:
             )
         elif number % 3 == 2:
             cells.append({"cell_type": "markdown", "source": f"```{language}\n{part}```", "metadata": {}})
-        elif said := re.sub(r"^:::.*\n?|!?\[(.*?)\]\([^)]*\)", r"\1", part, flags=re.MULTILINE).strip():
+        elif said := re.sub(NOT_IN_NOTEBOOKS, r"\1", part, flags=re.MULTILINE).strip():
             cells.append({"cell_type": "markdown", "source": said, "metadata": {}})
     return [{**cell, "id": str(place)} for place, cell in enumerate(cells)]
 

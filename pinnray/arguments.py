@@ -55,6 +55,21 @@ class MeshKeywords(FingerKeywords, total=False):
     corner_size: float | None
 
 
+class FilmKeywords(TypedDict, total=False):
+    """How a film of a finger is read; each may be left out."""
+
+    camera: str | Path | None  #: Camera file, as `calibrate` writes it
+    workspace: str | Path | None  #: JSON file of the fiducials; those around the design if None
+    colour: str  #: Of the markers, as `pinnray pick` prints it; dark by default
+    method: Literal["precise", "hough"]  #: Detection of the discs; `hough` is the paper's pipeline
+    fps: float | None  #: Frames a second of pictures, which do not say it; 30 if None
+
+
+class FilmJobKeywords(JobKeywords, FilmKeywords, total=False):
+    """How a film is read, and parameters of its finger and material."""
+
+
+FILM = tuple(FilmKeywords.__annotations__)
 MATERIAL = tuple(Material.model_fields)
 LOAD = tuple(name for name in Physics.model_fields if name not in (*MATERIAL, "load"))
 

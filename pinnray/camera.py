@@ -1,16 +1,27 @@
 """Functions of the front door for experimenters: calibrate, track, force from a film, and the virtual rig."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from geometry import observations
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
+from geometry.finger.parameters import unknown_parameter
 from geometry.text_files import as_path
-from pinnray.arguments import MATERIAL, JobKeywords, mesh_settings, read_finger, read_job, read_solver
+from pinnray.arguments import (
+    FILM,
+    MATERIAL,
+    FilmJobKeywords,
+    FilmKeywords,
+    JobKeywords,
+    mesh_settings,
+    read_finger,
+    read_job,
+    read_solver,
+)
 from pinnray.observations import Observations
 from solvers.physics import Load, LoadKind, Material
 from solvers.solver import Solver
@@ -74,26 +85,18 @@ def track(
     source: str | Path,
     design: str | Path | Finger = "default",
     *,
-    camera: str | Path | None = None,
-    workspace: str | Path | None = None,
-    colour: str = "dark",
-    method: Literal["precise", "hough"] = "precise",
-    fps: float | None = None,
     out: str | Path | None = None,
     progress: bool | None = None,
+    **film: Unpack[FilmKeywords],
 ) -> Observations:
     """Measure the markers of a finger in a film that shows it at rest, pressed, and held.
 
     Args:
         source: Video, folder or glob of pictures, or number of a camera.
         design: The finger, in one of the ways of `mesh`.
-        camera: Camera file, as `calibrate` writes it.
-        workspace: JSON file of the fiducials; those around the design if None.
-        colour: Of the markers, as `pinnray pick` prints it.
-        method: Detection of the discs; `hough` is the paper's pipeline.
-        fps: Frames a second of pictures, which do not say it; 30 if None.
         out: Folder for observations, tracks and pictures; nothing is kept if None.
         progress: Whether to show the stages; if None in a notebook only.
+        film: How it is read: `camera`, `workspace`, `colour`, `method`, `fps`; see `FilmKeywords`.
 
     Raises:
         UserError: If the film does not show the finger.
@@ -101,14 +104,17 @@ def track(
     from compare.camera.track_film import track_film
     from compare.runtime.stages import shown_stages
 
-    film, finger = _film(source, camera, workspace, colour, method, fps), read_finger(design)
+    for name in film:
+        if name not in FILM:
+            raise UserError(unknown_parameter(name, besides=(*FILM, "design", "out", "progress")))
+    opened, finger = _film(source, film), read_finger(design)
     with (
         TemporaryDirectory() if out is None else nullcontext(as_path(out, "out")) as folder,
         shown_stages(progress) as stages,
         stages.stage("track") as report,
     ):
         Path(folder).mkdir(parents=True, exist_ok=True)
-        _, found = track_film(film, finger, Path(folder), report, video=out is not None)
+        _, found = track_film(opened, finger, Path(folder), report, video=out is not None)
     return Observations.of(found)
 
 
@@ -116,29 +122,20 @@ def film_forces(
     source: str | Path,
     design: str | Path | Finger = "default",
     *,
-    camera: str | Path | None = None,
-    workspace: str | Path | None = None,
-    colour: str = "dark",
-    method: Literal["precise", "hough"] = "precise",
-    fps: float | None = None,
-    material: Material | None = None,
+    material: Material | str | None = None,
     progress: bool | None = None,
-    **given: Unpack[JobKeywords],
+    **given: Unpack[FilmJobKeywords],
 ) -> "pd.DataFrame":
     """Estimate the indenter's force and its place in every frame of a film, from the markers.
 
     Args:
-        source: The film; as the next arguments, see `track`.
+        source: The film, as for `track`.
         design: The finger.
-        camera: Camera file.
-        workspace: JSON file of the fiducials.
-        colour: Of the markers.
-        method: Detection of the discs.
-        fps: Frames a second of pictures.
-        material: The elastic constants; if the law is the linear one, the law of finite strain that the
-            markers tell is taken. The force is in proportion to Young's modulus.
+        material: The elastic constants, or the name of a material; if the law is the linear one, the law of
+            finite strain that the markers tell is taken. The force is in proportion to Young's modulus.
         progress: Whether to show the stages; if None in a notebook only.
-        given: Parameters of the finger and the material, as for `solve`.
+        given: How the film is read, as for `track`, and parameters of the finger and the material, as for
+            `solve`.
 
     Returns:
         A row for every frame, with time, force in N and N/mm and contact's place in mm, with 95 % intervals.
@@ -153,9 +150,10 @@ def film_forces(
     from compare.runtime.stages import shown_stages
     from geometry.cache import finger_mesh
 
-    film = _film(source, camera, workspace, colour, method, fps)
+    words: dict[str, Any] = {**given}
+    film = _film(source, {name: words.pop(name) for name in FILM if name in words})
     finger, elastic, _ = read_job(
-        design, material, None, given, besides=("material", "camera", "colour"), allowed=MATERIAL
+        design, material, None, words, besides=("material", *FILM), allowed=MATERIAL
     )
     with shown_stages(progress) as stages:
         with TemporaryDirectory() as folder, stages.stage("track") as report:
@@ -281,23 +279,15 @@ def _with_nan(row: "dict[str, Cell]") -> "dict[str, Cell]":
     return {name: float("nan") if cell == "" and name != "remark" else cell for name, cell in row.items()}
 
 
-def _film(
-    source: object,
-    camera: str | Path | None,
-    workspace: str | Path | None,
-    colour: str,
-    method: Literal["precise", "hough"],
-    fps: float | None,
-) -> "Film":
+def _film(source: object, film: Mapping[str, Any]) -> "Film":
+    """The film, with the options of `FilmKeywords` that are given."""
     from compare.camera.film import Film
 
-    if method not in ("precise", "hough"):
+    if (method := film.get("method", "precise")) not in ("precise", "hough"):
         raise UserError(f"method = {method!r}: there are precise, hough")
-    return Film(
-        str(source),
-        camera=None if camera is None else as_path(camera, "the camera"),
-        workspace=None if workspace is None else as_path(workspace, "the workspace"),
-        colour=colour,
-        method=method,
-        fps=fps,
-    )
+    files = {
+        name: as_path(film[name], said)
+        for name, said in (("camera", "the camera"), ("workspace", "the workspace"))
+        if film.get(name) is not None
+    }
+    return Film(str(source), **{**film, **files})

@@ -30,6 +30,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
         file = (tmp_path / "html" / page.relative_to(DOCS)).with_suffix(".ipynb")
         code = [cell for cell in json.loads(file.read_text())["cells"] if cell["cell_type"] == "code"]
         assert len(code) == sum(block.language in (CELL, "python") for block in blocks(page)) > 0
+        assert "](" not in file.read_text()  # a picture or a page that is not beside it
         for cell in code:
             compile(cell["source"], str(file), "exec")
 
