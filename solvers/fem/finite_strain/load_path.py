@@ -23,6 +23,8 @@ from solvers.stability import aside, descended
 BESIDE = 0.05
 """Largest distance of an equilibrium from that on coarser elements over the largest displacement; one that is
 further away is of another branch."""
+CARRIED = 40
+"""Newton iterations from an equilibrium on coarser elements; the first ones undo stretching of thin walls."""
 PENETRATION = 1e-5
 """Largest gap of a node in contact and penetration of any node, mm."""
 SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
@@ -71,7 +73,7 @@ class LoadPath:
         self._first_step, self._min_step, self.space, self._guide = first_step, min_step, space, guide
         method: LinearSolver = "iterative" if iterative else "direct"
         self.equilibrium = DiscreteEquilibrium(problem, space, constraints, method)
-        self._begin = partial(ConstrainedNewton, self.equilibrium, tolerance, max_iterations)
+        self._begin = partial(ConstrainedNewton, self.equilibrium, tolerance, max_iterations=max_iterations)
         self._newton = self._begin()
         contact = self.equilibrium.contact
         self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
@@ -124,7 +126,10 @@ class LoadPath:
             forces=last.forces,
             contact=self._carried_contact(way, last),
         )
+        newton, self._newton = self._newton, self._begin(max_iterations=CARRIED)
         found, _ = self._found(guess)
+        self._newton.close()
+        self._newton = newton
         size = np.abs(guess.nodal).max()
         if found is None or np.abs(found.nodal - guess.nodal).max() > BESIDE * size:
             return False
