@@ -58,6 +58,8 @@ def finger_mesh(
     settings = settings or MeshSettings()
     if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
         return replace(finger.mesh, depth=finger.depth)
+    if isinstance(finger, DrawnFinger):
+        finger.check_materials()
     task: dict[str, object] = {
         "kind": "mesh",
         "what": f"meshing design {finger.name!r}",

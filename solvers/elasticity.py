@@ -28,7 +28,7 @@ Field = Any
 
 
 class Lame(NamedTuple):
-    """Lamé constants, MPa."""
+    """Lamé constants, MPa: numbers or, at points in a body of several materials, arrays of one at each."""
 
     λ: float  # As it stands in the law; in plane stress the reduced one, 2 λ μ / (λ + 2 μ)
     μ: float  # Shear modulus
@@ -123,7 +123,7 @@ def stress_of(law: LawName, gradient: FloatArray, lame: Lame) -> tuple[FloatArra
     volume = lame.λ * trace
     across = lame.λ_out * trace
     if law in ("linear", "st-venant-kirchhoff"):
-        stress = volume[:, None, None] * unit + 2 * lame.μ * strain
+        stress = volume[:, None, None] * unit + 2 * np.reshape(lame.μ, (-1, 1, 1)) * strain
         if law == "st-venant-kirchhoff":
             jacobian = deformation_jacobian(gradient)
             stress = (unit + gradient) @ stress @ (unit + transposed) / jacobian[:, None, None]

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import BoolArray, FloatArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.notebook import brief, fact_table
 from geometry.registration import Pictures
@@ -233,7 +233,7 @@ class Solution:
         """Strain, stress and energy density at points of shape (n, 2), or at one of shape (2,), mm."""
         location, alone = self._locate(points)
         gradient = self.field.solid_gradient if isinstance(self.field, SolidField) else self.field.gradient
-        state = State.from_gradient(gradient(location), self.problem)
+        state = State.from_gradient(gradient(location), self.problem, location.cells)
         return State(**{name: values[0] for name, values in vars(state).items()}) if alone else state
 
     def _repr_html_(self) -> str:
@@ -283,10 +283,12 @@ class State:
     __repr__ = brief
 
     @classmethod
-    def from_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":
-        """The state of the problem's material at displacement gradients, shape (n, 2, 2) or (n, 3, 3)."""
-        material, solid = problem.material, gradient.shape[-1] == 3
-        law, lame = material.law, material.solid_lame if solid else material.lame
+    def from_gradient(cls, gradient: FloatArray, problem: Problem, cells: IntArray | None = None) -> "State":
+        """The state of the problem's material at displacement gradients, shape (n, 2, 2) or (n, 3, 3).
+
+        In a body of several materials the triangles of the n points are needed.
+        """
+        law, lame = problem.material.law, problem.lame(cells, solid=gradient.shape[-1] == 3)
         stress, stress_zz = stress_of(law, gradient, lame)
         strain: FloatArray = np.moveaxis(np.array(strain_of(law, gradient)), -1, 0)
         return cls(

@@ -39,14 +39,18 @@ def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> li
     """Certify the evaluations of the linear law, sampled on the problem's mesh, and judge their convergence.
 
     The least energy settles the question for the linear law only, whose energy is quadratic. It does not
-    judge a solver that was given observations, which pays energy for them, a body in three dimensions, nor a
-    found contact. Without DOLFINx there are no certificates, and a warning says so.
+    judge a solver that was given observations, which pays energy for them, a body in three dimensions or of
+    several materials, nor a found contact. Without DOLFINx there are no certificates, and a warning says so.
     """
 
     def certifiable(evaluation: Evaluation) -> bool:
         return evaluation.law == "linear" and not evaluation.in_sample and not evaluation.solid
 
-    if problem.load.kind == "cylinder" or not any(map(certifiable, evaluations)):
+    if (
+        problem.mesh.moduli is not None
+        or problem.load.kind == "cylinder"
+        or not any(map(certifiable, evaluations))
+    ):
         return list(evaluations)
     try:
         make_solver("fem")

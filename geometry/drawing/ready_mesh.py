@@ -1,10 +1,13 @@
 """The triangle mesh of a file in the finger's frame, with its boundaries named as every solver expects."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import shapely
 
 from geometry.arrays import BoolArray, FloatArray
-from geometry.drawing.formats.drawing import MeshInFile
+from geometry.drawing.description import PartMaterial
+from geometry.drawing.formats.drawing import MeshInFile, label_of
 from geometry.drawing.placement import Placement
 from geometry.errors import UserError
 from geometry.mesh.boundary import are_among, boundary_edges, counter_clockwise
@@ -13,7 +16,12 @@ from geometry.section.section import Section
 
 
 def ready_mesh(
-    found: MeshInFile, placement: Placement, section: Section, markers: FloatArray, contact: float
+    found: MeshInFile,
+    placement: Placement,
+    section: Section,
+    markers: FloatArray,
+    contact: float,
+    materials: Mapping[str, PartMaterial],
 ) -> TriangleMesh:
     """The mesh of a file as it is.
 
@@ -23,6 +31,7 @@ def ready_mesh(
         section: Its section in the finger's frame, with named pieces.
         markers: Places of the markers in the finger's frame, shape (m, 2), mm; each goes to the nearest node.
         contact: X of the contact's middle, mm; the contact's node is the one nearest to it.
+        materials: Of parts by the names of their physical surfaces.
     """
     points = placement(found.points)
     triangles = counter_clockwise(points, found.triangles)
@@ -48,7 +57,22 @@ def ready_mesh(
         boundaries={name: edges for name, edges in boundaries.items() if len(edges)},
         marker_nodes=nodes,
         contact_node=int(touched[np.abs(points[touched, 0] - contact).argmin()]),
+        moduli=_moduli(found, materials) if materials else None,
     )
+
+
+def _moduli(found: MeshInFile, materials: Mapping[str, PartMaterial]) -> FloatArray:
+    """Young's modulus and Poisson's ratio of every triangle, shape (t, 2); zeros outside the parts."""
+    moduli = np.zeros((len(found.triangles), 2))
+    for name, part in materials.items():
+        rows = found.parts.get(label_of(name))
+        if rows is None:
+            known = ", ".join(found.parts) or "none with a name"
+            raise UserError(f"there is no physical surface {name!r} to give a material; there are {known}")
+        if moduli[rows].any():
+            raise UserError(f"the physical surface {name!r} overlaps another one that has a material")
+        moduli[rows] = part.young, part.poisson
+    return moduli
 
 
 def _on_pieces(middles: FloatArray, section: Section, name: str) -> BoolArray:

@@ -12,6 +12,7 @@ on the angles of triangles constructed by bisecting the longest side, Math. Comp
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
+from geometry.errors import UserError
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.section.section import Section
@@ -27,6 +28,8 @@ def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = Non
         marked: Mask of shape (t,).
         section: The section onto whose arcs new boundary nodes are moved; None leaves them on the chord.
     """
+    if mesh.moduli is not None:
+        raise UserError("a mesh whose parts have materials of their own is not refined; give a finer one")
     count, lengths = len(mesh.points), np.linalg.norm(np.diff(mesh.points[mesh.edges], axis=1)[:, 0], axis=1)
     rank = np.empty(len(lengths), dtype=np.int64)
     rank[np.lexsort((np.arange(len(lengths)), lengths))] = np.arange(len(lengths))

@@ -68,7 +68,8 @@ class DiscreteEquilibrium:
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         material, gradient = problem.material, ufl.grad(self.distributed.function)
-        lame = material.solid_lame if self.distributed.dimension == 3 else material.lame
+        cells = None if problem.mesh.moduli is None else np.arange(len(problem.mesh.triangles))
+        lame = problem.lame(cells, solid=self.distributed.dimension == 3)
         density = energy_density_of(material.law, gradient, self.distributed.moduli(lame), ufl.ln)
         measure = ufl.dx if self.linear else ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
         self._integrand = density / space.thickness * measure

@@ -33,6 +33,7 @@ class FemSolver(ElementSettings):
     family = "finite elements"
     laws = ("linear",)
     loads = ("mean", "point", "patch")
+    parts = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -86,7 +87,8 @@ class FactorisedProblem:
         residual = equilibrium.internal_force(nodal)
         solved = time.perf_counter()
         error = None
-        if self._solver.estimate and load.kind != "point" and load.values.any():
+        smooth = load.kind != "point" and problem.mesh.moduli is None  # and the gradient does not jump
+        if self._solver.estimate and smooth and load.values.any():
             error = self._estimator.estimate(nodal, equilibrium.response)
         factors = equilibrium.factors
         sentence = [

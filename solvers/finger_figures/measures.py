@@ -61,16 +61,24 @@ def largest_away_from_corners(solution: Solution) -> tuple[Extreme, Extreme]:
     At sharp corners both grow without bound as elements shrink. Nodes nearer than the body's mean wall
     thickness to a re-entrant corner, an end of the base or the contact do not count. The displacement
     gradient at a node is the mean over its triangles, weighted by their areas, so that the numbers depend
-    little on where the mesher puts its nodes.
+    little on where the mesher puts its nodes. In a body of several materials, between which it jumps, it is
+    that in the middles of the triangles.
     """
     problem = solution.problem
     mesh = problem.mesh
     singular = np.concatenate([singular_points(mesh), mesh.points[contact_nodes(problem)]])
-    far = cKDTree(singular).query(mesh.points)[0] > mean_thickness(mesh)
+    middles = None if mesh.moduli is None else mesh.at_centroids()
+    places = mesh.points if middles is None else middles.points
+    far = cKDTree(singular).query(places)[0] > mean_thickness(mesh)
     if not far.any():
         nowhere = Extreme(np.nan, np.full(2, np.nan))
         return nowhere, nowhere
-    state, places = State.from_gradient(_nodal_gradient(solution)[far], problem), mesh.points[far]
+    places = places[far]
+    if middles is None:
+        state = State.from_gradient(_nodal_gradient(solution)[far], problem)
+    else:
+        gradient = solution.field.gradient(middles)[far]
+        state = State.from_gradient(gradient, problem, middles.cells[far])
     principal = np.linalg.eigvalsh(state.strain)[:, -1]
     stress, strain = (
         Extreme(float(values.max()), places[values.argmax()]) for values in (state.von_mises, principal)

@@ -40,11 +40,12 @@ class Scale(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MeshInFile:
-    """A plane triangle mesh of a file: nodes (n, 2), mm, triangles (t, 3), and edges (k, 2) of each group."""
+    """A plane triangle mesh of a file: nodes (n, 2), mm, triangles (t, 3), and its physical groups."""
 
     points: FloatArray
     triangles: IntArray
-    edges: Mapping[str, IntArray]
+    edges: Mapping[str, IntArray]  # of each group of curves, (k, 2)
+    parts: Mapping[str, IntArray] = field(default_factory=dict)  # numbers of each surface group's triangles
 
 
 @dataclass(frozen=True, eq=False)

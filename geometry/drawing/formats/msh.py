@@ -27,6 +27,9 @@ FACES = {
 }
 """Faces of tetrahedra, pyramids, prisms and hexahedra, by the number of corners."""
 
+TRIANGLE = 2
+"""Gmsh's number of the triangle of first order."""
+
 FLAT = 1e-4
 """Largest distance of a corner from the straight line that replaces it, and from a plane, mm."""
 
@@ -47,6 +50,7 @@ class RawMesh(NamedTuple):
     edges: Mapping[str, IntArray]  # of the physical curves by name, (k, 2) each
     nodes: Mapping[str, IntArray]  # of the physical points by name
     bent: Mapping[tuple[int, int], list[int]]  # nodes along each bent side by its corners, the lesser first
+    parts: Mapping[str, IntArray]  # of the physical surfaces by name, rows of the triangles of first order
 
     @property
     def used(self) -> IntArray:
@@ -95,6 +99,7 @@ def _plane_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
             points=points[used],
             triangles=triangles.reshape(-1, 3),
             edges={name: number[edges] for name, edges in raw.edges.items()},
+            parts=raw.parts,
         )
     return Drawing(
         loops=tuple(straightened(loop, FLAT) for loop in loops),
@@ -231,7 +236,21 @@ def _raw(path: Path, unit: float) -> RawMesh:
             dimension=dimension,
             edges={name: _numbers(number, nodes.reshape(-1, 2)) for name, nodes in _groups(1)},
             nodes={name: _numbers(number, nodes.ravel()) for name, nodes in _groups(0)},
+            parts=_parts(mesh),
         )
+
+
+def _parts(mesh: Any) -> dict[str, IntArray]:
+    """Rows, among the triangles of first order, of those of every named physical surface."""
+    tags, _ = mesh.getElementsByType(TRIANGLE)
+    order = np.argsort(tags)
+    parts: dict[str, list[IntArray]] = {}
+    for _, group in gmsh.model.getPhysicalGroups(2):
+        name = label_of(gmsh.model.getPhysicalName(2, group))
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(2, group):
+            own, _ = mesh.getElementsByType(TRIANGLE, int(entity))
+            parts.setdefault(name, []).append(order[np.searchsorted(tags, own, sorter=order)])
+    return {name: np.concatenate(rows) for name, rows in parts.items() if name}
 
 
 def _bent(points: FloatArray, sides: IntArray) -> dict[tuple[int, int], list[int]]:

@@ -21,6 +21,8 @@ def coarser(problem: Problem) -> Problem | None:
 
     None where its own mesh has not many more, or is of another body.
     """
+    if problem.mesh.moduli is not None:  # which the coarse mesh would lack
+        return None
     if problem.finger is None or len(problem.mesh.triangles) < FINE:
         return None
     settings = MeshSettings(size=COARSE)

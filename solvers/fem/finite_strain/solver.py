@@ -42,6 +42,7 @@ class FemNonlinearSolver(ElementSettings):
     laws = ("neo-hookean", "st-venant-kirchhoff", "gent")
     loads = ("mean", "point", "patch", "cylinder")
     friction = True
+    parts = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -170,11 +171,14 @@ def _equilibria_near(
 def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
     """The discretisation error at the full load; None where it was not reached, has no limit or no force.
 
+    Nor is it known in a body of several materials, between which the gradient jumps.
+
     The tangent there must be factorised.
     """
     last = path.points[-1]
     untouched = path.equilibrium.contact is not None and not last.contact.any()
-    if last.fraction < 1 or problem.load.kind == "point" or untouched:
+    jumps = problem.mesh.moduli is not None
+    if last.fraction < 1 or problem.load.kind == "point" or untouched or jumps:
         return None
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 

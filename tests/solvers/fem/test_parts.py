@@ -1,0 +1,112 @@
+"""Bodies of several materials against closed forms; units mm, MPa."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.linear import FemSolver
+from solvers.physics import Load, Material
+from solvers.problem import Problem
+from solvers.registry import make_solver
+from solvers.solver import UnsupportedProblemError
+
+SOFT, STIFF = (10.0, 0.3), (200.0, 0.3)
+
+
+def bar(length: float, height: float, along: int, across: int) -> TriangleMesh:
+    """A bar below y = 0, clamped at x = 0; its other end is `front` and `contact`, turned to run along x."""
+    x, y = np.meshgrid(np.linspace(0, length, along + 1), np.linspace(0, -height, across + 1))
+    row = along + 1
+    corners = (row * np.arange(across)[:, None] + np.arange(along)).ravel()
+    squares = corners[:, None] + [0, row, row + 1, 1]
+    top = np.stack([np.arange(along), np.arange(1, along + 1)], axis=1)
+    left = row * np.stack([np.arange(across), np.arange(1, across + 1)], axis=1)
+    return TriangleMesh(
+        np.column_stack([x.ravel(), y.ravel()]),
+        np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]),
+        {"base": left, "front": top, "contact": top[-2:]},
+        np.array([along // 2]),
+        along - 1,
+    )
+
+
+def layered(mesh: TriangleMesh, height: float) -> TriangleMesh:
+    """The upper half soft, by the problem's material, the lower one stiff."""
+    lower = mesh.at_centroids().points[:, 1] < -height / 2
+    return replace(mesh, moduli=np.where(lower[:, None], STIFF, 0.0))
+
+
+def plane(young: float, poisson: float) -> float:
+    return young / (1 - poisson**2)
+
+
+def test_a_cantilever_of_two_layers_bends_as_composite_beams_do():
+    length, height = 200.0, 4.0
+    mesh = layered(bar(length, height, 100, 8), height)
+    load = Load(kind="mean", displacement=(None, -1.0))
+    problem = Problem(mesh, Material(young=SOFT[0], poisson=SOFT[1]), load)
+    solution = FemSolver().solve(problem)
+    soft, stiff, half = plane(*SOFT), plane(*STIFF), height / 2
+    neutral = (soft * -half / 2 + stiff * -1.5 * half) / (soft + stiff)
+    bending = sum(
+        each * (half**3 / 12 + half * (middle - neutral) ** 2)
+        for each, middle in ((soft, -half / 2), (stiff, -1.5 * half))
+    )
+    arm = length - 2.0  # the middle of the contact
+    assert solution.reaction[1] == pytest.approx(-3 * bending / arm**3, rel=5e-3)
+    # The stress jumps at the interface as the moduli do, at equal strain.
+    above, below = solution.state(np.array([[60.0, -half + 1e-6], [60.0, -half - 1e-6]])).stress[:, 0, 0]
+    assert below / above == pytest.approx(stiff / soft, rel=2e-2)
+    moment = -solution.reaction[1] * (arm - 60.0)
+    assert above == pytest.approx(soft * moment / bending * (-half - neutral), rel=2e-2)
+
+
+@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
+def test_a_sandwich_stretches_by_the_mean_of_its_plane_moduli(law):
+    """Voigt's mean: layers side by side have one strain, so that half of the height counts for each."""
+    length, height = 100.0, 2.0
+    mesh = bar(length, height, 100, 8)
+    skins = np.abs(mesh.at_centroids().points[:, 1] + height / 2) > height / 4
+    mesh = replace(mesh, moduli=np.where(skins[:, None], STIFF, 0.0))
+    load = Load(kind="patch", displacement=(1e-4, 0.0))
+    solver = FemSolver() if law == "linear" else FemNonlinearSolver()
+    solution = solver.solve(Problem(mesh, Material(young=SOFT[0], poisson=SOFT[1], law=law), load))
+    strain = solution.gradient(np.array([[50.0, -0.2], [50.0, -1.0], [50.0, -1.8]]))[:, 0, 0]
+    mean = 0.5 * (plane(*SOFT) + plane(*STIFF))
+    assert strain[1] == pytest.approx(strain.mean(), rel=1e-3)  # the patch bends it a little
+    assert solution.reaction[0] == pytest.approx(mean * height * strain.mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize("solver", [FemSolver(), FemNonlinearSolver()], ids=lambda each: each.name)
+def test_parts_of_the_bodys_own_material_change_nothing(solver, coarse_mesh):
+    law = solver.laws[0]
+    problem = Problem(coarse_mesh, Material(law=law), Load(displacement=(0.0, -2.0)))
+    own = (problem.material.young, problem.material.poisson)
+    parted = replace(coarse_mesh, moduli=np.tile(own, (len(coarse_mesh.triangles), 1)))
+    one, other = (solver.solve(each) for each in (problem, replace(problem, mesh=parted)))
+    moved = [each.displacement(coarse_mesh.points) for each in (one, other)]
+    np.testing.assert_allclose(*moved, atol=1e-9)
+    assert other.energy == pytest.approx(one.energy, rel=1e-9)
+    centroids = coarse_mesh.at_centroids()
+    np.testing.assert_allclose(*(each.state(centroids).von_mises for each in (one, other)), rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["fem-3d", "fem-id", "fem-asm", "pinn-std", "gp", "statfem"])
+def test_other_solvers_refuse_parts_in_one_line(name, coarse_mesh):
+    parted = replace(coarse_mesh, moduli=np.zeros((len(coarse_mesh.triangles), 2)))
+    solver = make_solver(name)
+    with pytest.raises(UnsupportedProblemError, match="takes a body of one material"):
+        solver.solve(Problem(parted, Material(law=solver.laws[0])))
+
+
+def test_moduli_are_a_part_of_the_mesh(coarse_mesh, tmp_path):
+    parted = replace(coarse_mesh, moduli=np.tile(STIFF, (len(coarse_mesh.triangles), 1)))
+    assert parted.digest != coarse_mesh.digest
+    parted.save(tmp_path / "mesh.npz")
+    np.testing.assert_array_equal(TriangleMesh.load(tmp_path / "mesh.npz").moduli, parted.moduli)
+    with pytest.raises(UserError, match="shape"):
+        replace(coarse_mesh, moduli=np.ones((3, 2)))
