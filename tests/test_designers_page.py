@@ -50,6 +50,11 @@ def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(tmp_path, m
     monkeypatch.setattr("studies.optimum.proposals.POPULATION", 32)  # a quick search for the front
     monkeypatch.setattr("studies.optimum.proposals.GENERATIONS", 8)
     shutil.copytree(DOCS / "examples", tmp_path / "docs" / "examples")
+    for name, many, few in (("ribs", "samples = 64", "samples = 32"), ("wrap", "runs = 40", "runs = 24")):
+        study = tmp_path / "docs" / "examples" / f"{name}.toml"
+        text = study.read_text(encoding="utf-8")
+        assert many in text
+        study.write_text(text.replace(many, few), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     for line in blocks(PAGE)[0].text.splitlines():
         program, *arguments = shlex.split(line)

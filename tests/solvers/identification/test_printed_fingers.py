@@ -23,11 +23,9 @@ def test_mechanics_predict_a_real_finger_better_than_none(finger):
         wrapped = experiment.left_out("fem-id").status.warnings
         assert any("COVERS" in said for said in wrapped)
     rivals = min(left_out("gp"), left_out("statfem"))
-    # `pinn-id` takes a minute for A.
-    for solver in ("fem-id", "pinn-id") if finger.name == "B" else ("fem-id",):
-        best = left_out(solver)
-        assert best < 0.45
-        assert best < 0.8 * rivals
+    best = left_out("fem-id")  # `pinn-id` takes a minute: benchmarks/validation has it
+    assert best < 0.45
+    assert best < 0.8 * rivals
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ def test_one_wrong_marker_makes_no_wrong_law_certain():
     found = pr.solve(
         finger,
         "fem-id",
-        size=1.0,
+        size=2.0,
         load=Load(displacement=(0.0, -9.5)),
         measurements=DATA / "one-marker-off.csv",
     )
