@@ -91,6 +91,8 @@ class IdentifiedForce(NamedTuple):
 
     size: Estimated  #: N/mm
     position: Estimated | None  #: Contact's abscissa on the drawn front, mm; None where it was no unknown
+    #: Share of the contact's motion and force, N/mm, of the finger that was found, from little load to all
+    path: Sequence[tuple[float, float]] = ()
 
     def phrase(self, depth: float | None = None) -> str:
         """Force and place with their intervals in words; in N as well for a finger of a depth, mm."""

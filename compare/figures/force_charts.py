@@ -29,16 +29,17 @@ def draw_force_displacement(
 
     A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line. The
     simulated finger's curve ends in a cross. A force that was identified from the markers, by the number of
-    its solver in the run, is a square with its interval of 95 % at the end of the travel.
+    its solver in the run, is a square with its interval of 95 % at the end of the travel, and where the force
+    at lesser loads is known, a dotted line leads there.
     """
     labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
     true_label = [_end_label(truth, "truth, simulated")] if truth else []
     found = {
-        number: (each, each.identified.size)
+        number: (each, each.identified)
         for number, each in (identified or {}).items()
         if each.identified is not None
     }
-    more = [f"{each.label}, {size[0]:.3g} N/mm, identified" for each, size in found.values()]
+    more = [f"{each.label}, {force.size.value:.3g} N/mm, identified" for each, force in found.values()]
     top, height, left = 0.3 + legend_height([*labels, *true_label, *more]), 2.4, 0.75  # inches
     with figure(top + height + 0.45) as drawn:
         write_heading(drawn, "Force of the indenter along its travel")
@@ -65,7 +66,7 @@ def draw_force_displacement(
             axes.plot(truth.travel, truth.force, color=MEASURED, lw=1.3, zorder=3)
         reach = (truth or curves[0]).travel[-1]
         for place, (number, label) in enumerate(zip(found, more, strict=True)):
-            value, low, high = found[number][1]
+            (value, low, high), path = found[number][1].size, found[number][1].path
             # Beside each other: the intervals of several solvers would hide each other.
             x, apart = reach * (1 - 0.02 * (place + 1)), [[value - low], [high - value]]
             style: dict[str, Any] = {
@@ -75,11 +76,14 @@ def draw_force_displacement(
                 "color": solver_colour(number),
                 "zorder": 5,
             }
+            if path:
+                share, force = np.concatenate([np.zeros((1, 2)), np.array(path)]).T
+                axes.plot(reach * share, force, ":", color=style["color"], lw=1.3, zorder=4)
             axes.errorbar([x], [value], yerr=apart, fmt="s", label=label, **style)
         every = [*curves, truth] if truth else curves
         axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))
         forces = np.concatenate(
-            [curve.force for curve in every] + [np.array(size) for _, size in found.values()]
+            [curve.force for curve in every] + [np.array(force.size) for _, force in found.values()]
         )
         axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
         axes.set_xlabel("travel of the indenter, mm")

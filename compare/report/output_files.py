@@ -30,6 +30,7 @@ from geometry.atomic import write_text
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.finger_figures import FingerFigures
+from solvers.solution import IdentifiedForce
 
 SCHEMA = 1
 """Keys may be added to a schema; a key that is renamed or removed makes a new one."""
@@ -76,8 +77,7 @@ def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
         "energy": evaluation.energy,
         "reaction": evaluation.reaction.tolist(),
         "stats": dict(evaluation.stats),
-        "force": evaluation.identified
-        and {name: part and part._asdict() for name, part in evaluation.identified._asdict().items()},
+        "force": evaluation.identified and _force(evaluation.identified),
         "figures": evaluation.figures and _figures(evaluation.figures),
         "certificate": evaluation.certificate and evaluation.certificate.numbers(),
         "markers": {
@@ -95,6 +95,14 @@ def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
         "to_truth": None if truth is None else _by_component(truth_differences(evaluation, truth)._asdict()),
         "force_to_truth_rel": None if truth is None else force_error(evaluation, truth),
     }
+
+
+def _force(force: IdentifiedForce) -> dict[str, Any]:
+    parts = {"size": force.size, "position": force.position}
+    found: dict[str, Any] = {name: part and part._asdict() for name, part in parts.items()}
+    if force.path:
+        found["path"] = [{"share_of_travel": share, "size": size} for share, size in force.path]
+    return found
 
 
 def _figures(figures: FingerFigures) -> dict[str, Any]:

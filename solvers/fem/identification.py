@@ -24,11 +24,13 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import Factorisation
 from solvers.identification.body import Linearised
 from solvers.identification.contradiction import with_doubts
+from solvers.identification.field import IdentifiedField
 from solvers.identification.model import ResponseModel
 from solvers.identification.result import Fit, Identified
 from solvers.identification.search import Identifier
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.tracker import ForceTracker, LawTracker
+from solvers.identification.transfer import force_path
 from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
@@ -245,8 +247,21 @@ class FemIdSolver(IdentifyingSolver):
             problem.observations,
             lambda given: self._identifier(coarser(problem) or problem).expected(given),
         )
+        found = self._with_path(found)
         progress(1.0, found.force_phrase)
         return found
+
+    def _with_path(self, solution: Solution) -> Solution:
+        """The solution with its force at lesser loads, on a coarse mesh: the markers tell the end alone."""
+        if solution.identified is None or not isinstance(solution.field, IdentifiedField):
+            return solution
+        best = solution.field.members[0]
+        problem = best.model.unknowns.problem
+        unknowns = Unknowns(coarser(problem) or problem, self.unknowns)
+        size = solution.identified.size.value
+        shares = force_path(ResponseModel(FemBody(unknowns, self.degree), unknowns), best.response.values)
+        path = [(motion, share * size) for motion, share in shares]
+        return replace(solution, identified=solution.identified._replace(path=path))
 
     def refitter(self, problem: Problem) -> Callable[..., Solution]:
         """A function that finds the unknowns for other observations; see `Refittable`.

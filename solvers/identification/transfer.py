@@ -5,10 +5,12 @@ its force; the feet move in proportion to it. The stroke is not trusted, but its
 into the finger by the fit's displacement times the ratio of the two loads' displacements.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from geometry.arrays import BoolArray, FloatArray
 from solvers.identification.field import IdentifiedField
 from solvers.identification.model import EXACT, Response, ResponseModel
 from solvers.problem import Problem, contact_ends
@@ -52,6 +54,34 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
     )
 
 
+def force_path(model: ResponseModel, values: FloatArray, count: int = 4) -> Sequence[tuple[float, float]]:
+    """Share of the contact's motion and share of the force at lesser loads, the last of them (1, 1).
+
+    Args:
+        model: The finger that was found; its mesh may be a coarse one.
+        values: Of its unknowns, shape (p,).
+        count: Of loads, whose forces are evenly spaced.
+
+    Returns:
+        Nothing where an equilibrium on the way is not found.
+    """
+    loaded, into = _loaded(model), model.unknowns.directions[0]
+    model.restart(None)
+    shares, moved = np.arange(1, count + 1) / count, []
+    for share in shares:
+        response = model.response(np.where(loaded, share * values, values))
+        if response is None:
+            return []
+        moved.append(float(response.contact @ into))
+    return [(motion / moved[-1], float(share)) for motion, share in zip(moved, shares, strict=True)]
+
+
+def _loaded(model: ResponseModel) -> BoolArray:
+    """Mask of the unknowns that are in proportion to the load, shape (p,)."""
+    loaded = ("normal_force", "tangential_force", *model.unknowns.feet.names)
+    return np.isin(model.unknowns.names, loaded)
+
+
 def _response(model: ResponseModel, start: Response, share: float, shift: float) -> Response:
     """The response at a share of the contact's displacement, the contact shifted along x by mm.
 
@@ -59,8 +89,7 @@ def _response(model: ResponseModel, start: Response, share: float, shift: float)
     """
     names, into = model.unknowns.names, model.unknowns.directions[0]
     target = share * float(start.contact @ into)
-    loaded = ("normal_force", "tangential_force", *model.unknowns.feet.names)
-    force = np.array([name in loaded for name in names])
+    force = _loaded(model)
     direction, values = np.where(force, start.values, 0.0), np.where(force, 0.0, start.values)
     if "position" in names:
         values[names.index("position")] += shift
