@@ -77,7 +77,7 @@ class LoadPath:
         self._newton = self._begin()
         contact = self.equilibrium.contact
         self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
-        self._contacts = [contact] if contact is None else self._ever_harder(contact)
+        self._softer = [] if contact is None else self._ever_harder(contact)
         self.points = [self.equilibrium.rest]
         self.left = 0  # Number of unstable equilibria that were left for a stable one
         self._halved = self._iterations = 0  # Failed steps; Newton iterations of all steps
@@ -209,8 +209,9 @@ class LoadPath:
 
     def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
         """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""
-        hardest, final = 0, self._contacts[-1]
-        for contact in self._contacts:
+        hardest, final = 0, self.equilibrium.contact
+        softer = [] if final is None else [replace(final, stiffness=each) for each in self._softer]
+        for contact in (*softer, final):
             self.equilibrium.contact = contact
             for _ in range(30 if contact is final else 1):
                 result = self._newton.solve(guess)
@@ -227,14 +228,14 @@ class LoadPath:
         self._reason = "the contact does not settle"
         return None, hardest
 
-    def _ever_harder(self, contact: CylinderContact) -> list[CylinderContact]:
-        """The contacts of a step's solves: of a slender finger the hard one comes last."""
+    def _ever_harder(self, contact: CylinderContact) -> list[float]:
+        """Stiffnesses of the contact, N/mm per mm, with which a step of a slender finger begins."""
         own = self.equilibrium.stiffness_to_cylinder
         if contact.stiffness <= SLENDER * own:
-            return [contact]
+            return []
         count = math.ceil(math.log(contact.stiffness / (SOFTEST * own), HARDER)) + 1
-        soft = np.geomspace(SOFTEST * own, contact.stiffness, count)[:-1]
-        return [*(replace(contact, stiffness=float(each)) for each in soft), contact]
+        softer: list[float] = np.geomspace(SOFTEST * own, contact.stiffness, count)[:-1].tolist()
+        return softer
 
     def _guess(self, fraction: float) -> LoadState:
         """The state at a fraction of the load, by the guide or by extrapolation of the last ones."""
