@@ -20,6 +20,7 @@ from geometry.mesh.boundary import mean_thickness
 from solvers.assimilation.estimation import LEVEL, Estimate
 from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.elasticity import LawName
+from solvers.identification.contradiction import CONTRADICTED
 from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
 from solvers.identification.model import MarkerData, Response, ResponseModel
 from solvers.identification.unknowns import doubt_of_the_plane, log_prior
@@ -214,7 +215,7 @@ class Identified:
     def _unexplained(self) -> list[str]:
         """A sentence on markers that no values of the unknowns explain within their deviations."""
         off = self.best.estimate.inflation
-        if off < MISSED:
+        if not MISSED <= off < CONTRADICTED:  # beyond, no finger explains them, which is said instead
             return []
         return [
             f"THE MARKERS ARE {off:.2g} TIMES AS FAR FROM ANY FINGER OF THIS DRAWING AS THEY ARE KNOWN, "
