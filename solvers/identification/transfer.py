@@ -73,6 +73,8 @@ def force_path(model: ResponseModel, values: FloatArray, count: int = 4) -> Sequ
         if response is None:
             return []
         moved.append(float(response.contact @ into))
+    if not moved[-1]:  # no load
+        return []
     return [(motion / moved[-1], float(share)) for motion, share in zip(moved, shares, strict=True)]
 
 
