@@ -9,6 +9,7 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.boundary import mean_thickness
 from geometry.mesh.settings import MeshSettings
+from solvers.fem.finite_strain import nested_path
 from solvers.fem.identification import FemBody, FemIdSolver
 from solvers.identification.law_fits import MOST_LOST, LawFits
 from solvers.identification.model import ResponseModel
@@ -213,7 +214,7 @@ def test_on_a_fine_mesh_the_unknowns_are_sought_on_a_coarse_one(monkeypatch):
     monkeypatch.setattr(FemBody, "linearised", counted)
     found = {}
     for fine in (10**9, 1000):
-        monkeypatch.setattr("solvers.fem.finite_strain.nested_path.FINE", fine)
+        monkeypatch.setattr(nested_path, "FINE", fine)
         solution = solver.solve(problem)
         found[fine] = solution, sizes.count(len(mesh.triangles))
         sizes.clear()
