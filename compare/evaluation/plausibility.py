@@ -14,7 +14,7 @@ from geometry.errors import OutsideBodyError, UserError
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.identification.contradiction import likely_order, order_words
+from solvers.identification.contradiction import MUCH_NEARER, likely_order, order_words
 from solvers.problem import Problem
 from solvers.registry import MissingLibraryError, make_solver
 from solvers.solver import NONE_SEEN
@@ -40,9 +40,6 @@ UNLIKE = 0.5
 strain it is 0.92 or more on five designs with strokes up to 15 mm, and at most 0.06 with u and v swapped."""
 SIZES = 3.0
 """Ratio of measured to linear displacements that is unlikely; at finite strain it is 0.86 to 1."""
-MUCH_NEARER = 0.75
-"""Share of the distance from `fem` to which another order of the markers has to bring them: 0.53 to 0.58
-where they were in reverse order, numbered one off or had their walls swapped."""
 SMALL = 0.1
 """Share of the stroke below which `fem`'s displacements at the markers say little of a direction."""
 

@@ -18,6 +18,9 @@ CONTRADICTED = 20.0
 in another order."""
 EXPLAINED = 3.0
 """Factor by which another order or frame has to lower φ to be named; they are tried where it can."""
+MUCH_NEARER = 0.75
+"""Share of the distance from a linear finger to which another order of the markers has to bring them to be
+suspected: 0.53 to 0.58 where they were in reverse order, numbered one off or had their walls swapped."""
 
 
 def likely_order(moved: FloatArray, expected: FloatArray, share: float = 1.0) -> IntArray | None:

@@ -12,9 +12,10 @@ from scipy.special import chdtri
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.observations import Observations
-from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS, Estimate
+from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
+from solvers.identification.contradiction import MUCH_NEARER, likely_order
 from solvers.identification.law_fits import LawFits, LawModels
 from solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
 from solvers.identification.result import Fit, Identified
@@ -23,8 +24,8 @@ from solvers.identification.unknowns import LAWS, Unknowns
 from solvers.problem import Problem
 from solvers.solver import NoSolutionError, Progress, silent
 
-QUICK = 4
-"""Steps in which a law is judged first."""
+QUICK, ROUGH = 4, 2
+"""Steps in which a law is judged first, and rounds for φ in which the contacts to start from are."""
 
 WIDE = (2.0, 4.0)
 """Standardised widths of a contact from which to start again where none explains the markers."""
@@ -35,8 +36,9 @@ POLISHES, POLISHED = 6, 0.02
 IMPROBABLE = 15.0
 """Logarithm of the ratio of probabilities from which on a law is not fitted to the end."""
 
-HOPELESS = 100.0
-"""φ from which neither a wide contact nor another law explains the markers: another order or finger does."""
+ASTRAY, HOPELESS = 10.0, 100.0
+"""φ from which the contact is elsewhere or a marker is wrong, and from which neither a wide contact nor
+another law explains the markers: another order or finger does."""
 
 
 class Identifier:
@@ -85,13 +87,16 @@ class Identifier:
 
     def expected(self, observations: Observations) -> FloatArray:
         """Displacements of the markers seen, shape (m, 2), mm per N/mm: of a linear finger, drawn contact."""
+        return self._expected(self.measurement(observations))
+
+    def _expected(self, measurement: MarkerData) -> FloatArray:
         model = next(iter(self.models.values()))
         at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
         if at_rest is None:
             raise NoSolutionError("the finger has no equilibrium near rest")
-        markers = MarkerModel(model, self.measurement(observations))
+        markers = MarkerModel(model, measurement)
         slope = markers.predicted(at_rest)[1][:, self._names.index("normal_force")]
-        return slope[: 2 * len(markers.measurement.kept)].reshape(-1, 2)
+        return slope[: 2 * len(measurement.kept)].reshape(-1, 2)
 
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
         """The unknowns under every law, and the laws' probabilities.
@@ -104,7 +109,7 @@ class Identifier:
         lost = [law for law in self.models if law not in {each.law for each in rough}]
         for best in sorted(rough, key=lambda fit: -fit.log_posterior):
             try:
-                fit, doubtful = self._believed(self._settled(best))
+                fit, doubtful = self._settled(best)
                 break
             except NoSolutionError as error:
                 lost.append(best.law)
@@ -182,7 +187,8 @@ class Identifier:
                 return fit._replace(exact=False)
             fit = found._replace(coarser=None)
             deviations = np.sqrt(np.diagonal(fit.estimate.covariance))
-            if (np.abs(fit.estimate.z - before) < POLISHED * deviations).all():
+            near = (np.abs(fit.estimate.z - before) < POLISHED * deviations).all()
+            if near or fit.estimate.inflation > HOPELESS:
                 break
         return fit
 
@@ -208,34 +214,41 @@ class Identifier:
             raise reason
         return found
 
-    def _settled(self, rough: Fit) -> Fit:
-        """The fit of a law; where it does not explain the markers, the best from several contacts.
+    def _settled(self, rough: Fit) -> tuple[Fit, dict[int, FloatArray]]:
+        """The fit of a law without markers that contradict the others, and by how much they are off, mm.
 
-        The feet are held till then: they would turn far to make up for a contact that is not found yet.
+        Where it does not explain the markers, it is the best from several contacts. The feet are held till
+        then: they would turn far to make up for a contact that is not found yet.
         """
-        best = self._of_contacts(rough)
-        return self._fits.fit(rough.law, rough.measurement, best) if self._loose else best
-
-    def _of_contacts(self, rough: Fit) -> Fit:
         if rough.estimate.converged:
-            return rough
-        best = self._fits.fit(rough.law, rough.measurement, rough, held=self._loose)
+            return self._ended(rough), {}
+        best = self._fits.fit(rough.law, rough.measurement, rough, held=self._loose, rounds=ROUGH)
         if best.estimate.inflation == 1 or self._known:
-            return best
-        for start in self._elsewhere(best.estimate):
+            return self._believed(self._ended(best))
+        if self._loose or best.estimate.inflation < ASTRAY:
+            return self._believed(self._ended(self._of_contacts(best)))
+        found, doubtful = self._believed(best)
+        if _explained(found):
+            return found, doubtful
+        ended = self._ended(self._of_contacts(best))
+        return (found, doubtful) if ended is best else self._believed(ended)
+
+    def _ended(self, fit: Fit) -> Fit:
+        """The fit with the feet that a first search holds, and to the end if that is worth while."""
+        if not self._loose and (fit.estimate.converged or fit.estimate.inflation > HOPELESS):
+            return fit
+        return self._fits.fit(fit.law, fit.measurement, fit)
+
+    def _of_contacts(self, best: Fit) -> Fit:
+        """The best of a fit and those that start from other contacts."""
+        law, measurement = best.law, best.measurement
+        for start in self._elsewhere(best):
             try:
                 if start @ self._is_width:
-                    held = self._fits.fit(
-                        rough.law,
-                        rough.measurement,
-                        None,
-                        start,
-                        held=("width", *self._loose),
-                        rounds=1,
-                        steps=QUICK,
-                    )
-                    start = np.where(self._is_width, start, held.estimate.z)
-                other = self._fits.fit(rough.law, rough.measurement, None, start, held=self._loose)
+                    held = ("width", *self._loose)
+                    near = self._fits.fit(law, measurement, None, start, held=held, rounds=1, steps=QUICK)
+                    start = np.where(self._is_width, start, near.estimate.z)
+                other = self._fits.fit(law, measurement, None, start, held=self._loose, rounds=ROUGH)
             except NoSolutionError:
                 continue
             best = max(best, other, key=lambda fit: fit.log_evidence)
@@ -243,14 +256,20 @@ class Identifier:
                 break
         return best
 
-    def _elsewhere(self, found: Estimate) -> Iterator[FloatArray]:
+    def _elsewhere(self, fit: Fit) -> Iterator[FloatArray]:
         """Standardised values, shape (p,), to start again from: wider contacts.
 
-        Where little is explained, places far away follow; where nothing is, they are all.
+        Where little is explained, places far away follow; where nothing is, they are all, unless the markers
+        seem to be in another order.
         """
-        if "width" in self._names and found.inflation < HOPELESS:
+        found, hopeless = fit.estimate, fit.estimate.inflation > HOPELESS
+        if "width" in self._names and not hopeless:
             yield from (np.where(self._is_width, wide, found.z) for wide in WIDE)
-        if "position" in self._names and found.inflation > 10:
+        if hopeless:
+            expected = self._expected(fit.measurement)
+            if likely_order(fit.measurement.displacements, expected, MUCH_NEARER) is not None:
+                return
+        if "position" in self._names and found.inflation > ASTRAY:
             for away in (-2.0, 2.0):
                 start = np.zeros(len(self._names))
                 start[self._names.index("position")] = away
