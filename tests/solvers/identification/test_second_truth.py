@@ -11,7 +11,6 @@ DATA = Path(__file__).parents[2] / "data" / "second-renderer"
 FORCE = 0.2535
 
 
-
 def identified(measurements):
     """By `fem-id`, on coarse elements."""
     finger = pr.load_design("default").model_copy(update={"contact_position": 36.5})
