@@ -78,7 +78,8 @@ def solve_all(
     if job.processes > 1 and elsewhere and linear and others and len(problem.mesh.points) >= LARGE:
         outcome = _in_two_processes(
             {
-                name: _Part(job, own, problem, observations, folder)
+                # Without the solvers of the other part, which would be imported there.
+                name: _Part(replace(job, solvers=own), own, problem, observations, folder)
                 for name, own in (("linear solvers", linear), ("solvers of finite strain", others))
             },
             stages,
