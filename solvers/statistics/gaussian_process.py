@@ -3,16 +3,17 @@
 A solver with mechanics has to predict held-out markers better than this.
 
 Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, equations
-2.23 to 2.26 and chapter 5, as scikit-learn has them.
+2.23 to 2.26 and chapter 5.
 """
 
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.linalg import cho_solve
+from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
 from geometry.arrays import FloatArray
@@ -24,17 +25,27 @@ from solvers.energy_and_force import energy_and_force
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
 from solvers.solver import FieldSettings, Progress, UnsupportedProblemError, check_problem, silent
-from solvers.statistics.kernel_field import SMOOTHNESS, Kernel, MarkerPrediction, with_markers_left_out
+from solvers.statistics.kernel_field import (
+    Kernel,
+    MarkerPrediction,
+    correlation,
+    derivative_by_log_length,
+    with_markers_left_out,
+)
 from solvers.statistics.statistical_posterior import (
     Hyperparameters,
     Posterior,
     StatFemData,
     StatFemField,
+    log_root_determinant,
     predicted,
 )
 
 MIN_MARKERS = 3
 """Minimum number of markers that determines the two hyperparameters of a kernel."""
+
+START, RANGES = (10.0, 30.0), ((1e-4, 1e6), (1.0, 1000.0))
+"""Start and ranges of the search for variance, mm², and length, mm."""
 
 
 @dataclass(frozen=True)
@@ -132,19 +143,32 @@ class GaussianProcessSolver(FieldSettings):
 
 def _fit(data: StatFemData) -> Posterior:
     """The processes with the hyperparameters of the largest marginal likelihood, frames as they are."""
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern
-
-    # Start and search range of variance, mm², and length, mm
-    covariance = ConstantKernel(10.0, (1e-4, 1e6)) * Matern(30.0, (1.0, 1000.0), SMOOTHNESS[data.kernel])
-    found = []
-    for axis in (0, 1):
-        process = GaussianProcessRegressor(covariance, alpha=data.deviations[:, axis] ** 2)
-        with threadpool_limits(1, user_api="blas"), warnings.catch_warnings():
-            # On small matrices BLAS's threads wait for one another.
-            # An end of the search range is a valid result: constant over the finger, or the markers alone.
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            found.append(process.fit(data.points, data.observed[:, axis]).kernel_.theta)
-    variances, lengths = np.exp(found).T
+    with threadpool_limits(1, user_api="blas"):  # on small matrices its threads wait for one another
+        variances, lengths = np.exp([_most_likely(data, axis) for axis in (0, 1)]).T
     return Posterior.given(data, Hyperparameters(1.0, np.sqrt(variances), lengths))
+
+
+def _most_likely(data: StatFemData, axis: int) -> FloatArray:
+    """Logarithms of variance, mm², and length, mm, of the largest marginal likelihood of a component.
+
+    An end of the search range is a valid result: constant over the finger, or the markers alone. The source
+    has the likelihood in equation 2.30 and its gradient in 5.9.
+    """
+    observed, noise = data.observed[:, axis], np.diag(data.deviations[:, axis] ** 2)
+
+    def minus_log_likelihood(logarithms: FloatArray) -> tuple[float, FloatArray]:
+        variance, length = np.exp(logarithms)
+        process = variance * correlation(data.points, data.points, length, data.kernel)
+        by_length = variance * derivative_by_log_length(data.points, data.points, length, data.kernel)
+        try:
+            cholesky = np.linalg.cholesky(process + noise)
+        except np.linalg.LinAlgError:  # rounding: markers that all but coincide, nearly without noise
+            return np.inf, np.zeros(2)
+        weights = cho_solve((cholesky, True), observed)
+        outer = np.outer(weights, weights) - cho_solve((cholesky, True), np.eye(len(observed)))
+        constant = 0.5 * len(observed) * np.log(2 * np.pi)
+        value = 0.5 * float(observed @ weights) + log_root_determinant(cholesky) + constant
+        return value, np.array([-0.5 * (outer * slope).sum() for slope in (process, by_length)])
+
+    found = minimize(minus_log_likelihood, np.log(START), jac=True, method="L-BFGS-B", bounds=np.log(RANGES))
+    return np.asarray(found.x)

@@ -57,6 +57,14 @@ def correlation(points: FloatArray, others: FloatArray, length: float, kernel: K
     return np.asarray(series * np.exp(-distance))
 
 
+def derivative_by_log_length(
+    points: FloatArray, others: FloatArray, length: float, kernel: Kernel
+) -> FloatArray:
+    """Derivative of `correlation` by the length's logarithm, shape (n, m): -r dk/dr at a distance r."""
+    squares = ((points[:, None] - others) ** 2).sum(axis=2)
+    return np.asarray(squares * _derivative_factor(points, others, length, kernel))
+
+
 def _derivative_factor(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
     """Factor f in the gradient of k at the points, ∇k = f (others - points), shape (n, m), 1/mm²."""
     distance = _distance(points, others, length, kernel)

@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from geometry.errors import UserError
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 from solvers.statistics.gaussian_process import GaussianProcessSolver
+from solvers.statistics.kernel_field import SMOOTHNESS
 from tests.solvers.conftest import check_gradient, observed_at
 from tests.solvers.statistics.kernels import matern
 
@@ -60,6 +63,20 @@ def test_mean_and_deviation_are_those_of_the_process(solution, coarse_mesh):
         np.testing.assert_allclose(solution.displacement(places)[:, axis], mean, atol=1e-6)
         deviation = solution.field.standard_deviation(places)[:, axis]
         np.testing.assert_allclose(deviation**2, variance, atol=1e-5)
+
+
+@pytest.mark.parametrize("kernel", SMOOTHNESS)
+def test_the_constants_are_those_that_scikit_learn_finds(problem, kernel):
+    """From its start in its ranges: 1e-6 of them, where the search ends at the flat top of the likelihood."""
+    found = GaussianProcessSolver(kernel=kernel).solve(problem).field.posterior.constants
+    observations = problem.observations
+    seen = observations.visible
+    start = ConstantKernel(10.0, (1e-4, 1e6)) * Matern(30.0, (1.0, 1000.0), SMOOTHNESS[kernel])
+    for axis in (0, 1):
+        process = GaussianProcessRegressor(start, alpha=observations.standard_deviations[seen, axis] ** 2)
+        fitted = process.fit(observations.points[seen], observations.displacements[seen, axis])
+        expected = np.exp(fitted.kernel_.theta)
+        assert [found.amplitudes[axis] ** 2, found.lengths[axis]] == pytest.approx(expected, rel=1e-6)
 
 
 def test_gradient_is_the_derivative(solution, coarse_mesh):
