@@ -54,7 +54,7 @@ class WallMotion:
             thickness.append(_thickness(mesh, name, mask, loops))
             boundary.append(moved)
         nodal = np.array(boundary).reshape(-1, len(mesh.points), 2)
-        return cls(mesh, tuple(names), np.array(thickness), _harmonic(mesh, nodal))
+        return cls(mesh, tuple(names), np.array(thickness), harmonic(mesh, nodal))
 
     def changes(self, thickness: Mapping[str, float]) -> FloatArray:
         """Changes, shape (k,), mm, from thicknesses by name, mm; those that are not given are as drawn."""
@@ -211,7 +211,7 @@ def _barycentric_gradients(mesh: TriangleMesh) -> FloatArray:
     return np.asarray(rotated / (2 * mesh.areas)[:, None, None], dtype=np.float64)
 
 
-def _harmonic(mesh: TriangleMesh, boundary: FloatArray) -> FloatArray:
+def harmonic(mesh: TriangleMesh, boundary: FloatArray) -> FloatArray:
     """Harmonic extension (k, N, 2), by linear elements, of values on the boundary."""
     count = len(mesh.points)
     gradients = _barycentric_gradients(mesh)

@@ -118,6 +118,27 @@ class Loop:
         points[share == 0], points[share == 1] = start, end
         return points
 
+    def places(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The piece nearest to each of k points near the curve, (k, 2), mm, and its fraction: both (k,)."""
+        pieces, shares = np.zeros(len(points), dtype=np.int64), np.zeros(len(points))
+        nearest = np.full(len(points), np.inf)
+        for which, (start, end) in enumerate(self.ends):
+            if abs(self.bulges[which]) <= STRAIGHT:
+                along = end - start
+                share = (points - start) @ along / (along @ along)
+            else:
+                centre, _ = self.circle(which)
+                sweep = 4 * np.arctan(self.bulges[which])
+                (x, y), around = start - centre, points - centre
+                turned = np.arctan2(x * around[:, 1] - y * around[:, 0], around @ (x, y)) * np.sign(sweep)
+                middle = 0.5 * abs(sweep)
+                share = ((turned - middle + np.pi) % (2 * np.pi) - np.pi + middle) / abs(sweep)
+            share = share.clip(0, 1)
+            away = np.linalg.norm(self.along(which, share) - points, axis=1)
+            nearer = away < nearest
+            pieces[nearer], shares[nearer], nearest[nearer] = which, share[nearer], away[nearer]
+        return pieces, shares
+
     def flattened(self, deviation: float = 1e-3) -> tuple[FloatArray, IntArray]:
         """A polygon within `deviation`, mm, of the curve, whose corners lie on it.
 

@@ -22,6 +22,7 @@ from solvers.extrusion import NodalSpace
 from solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_conditions
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.linear_solvers import Factorisation, LinearSolver, Multigrid
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 from solvers.stability import ShiftedStep
 
@@ -70,7 +71,9 @@ class DiscreteEquilibrium:
         material, gradient = problem.material, ufl.grad(self.distributed.function)
         cells = None if problem.mesh.moduli is None else np.arange(len(problem.mesh.triangles))
         lame = problem.lame(cells, solid=self.distributed.dimension == 3)
-        density = energy_density_of(material.law, gradient, self.distributed.moduli(lame), ufl.ln)
+        moduli = self.distributed.moduli(lame)
+        self._moduli: tuple[Any, Any] = moduli[:2]
+        density = energy_density_of(material.law, gradient, moduli, ufl.ln)
         measure = ufl.dx if self.linear else ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
         self._integrand = density / space.thickness * measure
         self._inside_out = ufl.conditional(ufl.gt(deformation_jacobian(gradient), 0), 0.0, 1.0) * measure
@@ -111,6 +114,20 @@ class DiscreteEquilibrium:
         elif np.array_equal(functionals, self.constraints.functionals):
             return
         self.elimination = self._elimination()
+
+    def vary(self, problem: Problem) -> None:
+        """Take a problem that is a little different, on the same plane elements; keeps the factors.
+
+        Its mesh may have other points, its material other constants, its load another way or radius.
+        """
+        space = LagrangeSpace(problem.mesh, self.distributed.space.degree)
+        self.distributed.move(space.nodes[space.vertices])
+        self.problem, self.constraints = problem, DisplacementConstraints.of(problem, space)
+        _, self.prescribed = dirichlet_conditions(problem, space)
+        if self.contact is not None:
+            self.contact = CylinderContact.of(problem, space)
+        for constant, value in zip(self._moduli, problem.lame()[:2], strict=True):
+            constant.value = value
 
     def energy(self, nodal: FloatArray) -> float:
         """Elastic energy per depth, N mm / mm."""

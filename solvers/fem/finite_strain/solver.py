@@ -72,11 +72,22 @@ class FemNonlinearSolver(ElementSettings):
             max_iterations=self.max_iterations,
         )
 
+    def followed(self, coarse: Problem | None, path: LoadPath, progress: Progress) -> LoadPath | NestedPath:
+        """The path to the full load: on coarse elements as far as that leads, else on the given ones."""
+        if coarse is not None:
+            way = self.path(coarse, LagrangeSpace(coarse.mesh, self.degree))
+            way.follow(progress)
+            if path.take_over(way):
+                return NestedPath(path, way)
+            way.close()
+        path.follow(progress)
+        return path
+
     def _solve(self, coarse: Problem | None, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         path = self.path(problem, space)
-        followed = self._followed(coarse, path, progress)
+        followed = self.followed(coarse, path, progress)
         last, history, regions = path.points[-1], followed.history(), followed.regions()
         abscissa = path.force_abscissa(last)
         path.equilibrium.factorise(last)
@@ -116,17 +127,6 @@ class FemNonlinearSolver(ElementSettings):
             error=error,
             contact=contact_of(problem, abscissa, regions[-1]),
         )
-
-    def _followed(self, coarse: Problem | None, path: LoadPath, progress: Progress) -> LoadPath | NestedPath:
-        """The path to the full load: on coarse elements as far as that leads, else on the given ones."""
-        if coarse is not None:
-            way = self.path(coarse, LagrangeSpace(coarse.mesh, self.degree))
-            way.follow(progress)
-            if path.take_over(way):
-                return NestedPath(path, way)
-            way.close()
-        path.follow(progress)
-        return path
 
 
 @dataclass(frozen=True, eq=False)

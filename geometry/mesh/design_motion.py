@@ -1,0 +1,78 @@
+"""The motion of a mesh as the parameters of its finger change: no element is made or lost.
+
+A node on the boundary stays at the same fraction of the same piece of the section. Between the boundaries the
+motion is harmonic.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.errors import UserError
+from geometry.finger.finger import Finger, outline_with_contact
+from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.mesh.wall_motion import harmonic
+from geometry.section.loop import Loop
+
+ON_CURVE = 1e-6
+"""Largest distance of a boundary's node from the section, mm."""
+
+
+class MovingMesh:
+    """A mesh that follows its finger.
+
+    Args:
+        mesh: Of the finger's section.
+        finger: Whose parameters will change.
+
+    Raises:
+        UserError: If the boundary is not the finger's.
+    """
+
+    def __init__(self, mesh: TriangleMesh, finger: Finger) -> None:
+        self._mesh, self._loops = mesh, _loops(finger)
+        self._nodes = np.unique(boundary_edges(mesh.triangles))
+        points = mesh.points[self._nodes]
+        self._loop = np.zeros(len(points), dtype=np.int64)
+        self._piece, self._share = np.zeros_like(self._loop), np.zeros(len(points))
+        nearest = np.full(len(points), np.inf)
+        for number, loop in enumerate(self._loops):
+            piece, share = loop.places(points)
+            away = np.linalg.norm(_at(loop, piece, share) - points, axis=1)
+            nearer = away < nearest
+            self._loop[nearer], self._piece[nearer], self._share[nearer] = (
+                number,
+                piece[nearer],
+                share[nearer],
+            )
+            nearest[nearer] = away[nearer]
+        if nearest.max() > ON_CURVE:
+            raise UserError(f"the mesh is not of the finger {finger.name!r}: its boundary is elsewhere")
+
+    def of(self, finger: Finger) -> TriangleMesh | None:
+        """The mesh of a finger with slightly other parameters; None if its section has other pieces."""
+        loops = _loops(finger)
+        if [loop.names for loop in loops] != [loop.names for loop in self._loops]:
+            return None
+        moved = np.zeros((1, len(self._mesh.points), 2))
+        for number, loop in enumerate(loops):
+            own = self._loop == number
+            places = _at(loop, self._piece[own], self._share[own])
+            moved[0, self._nodes[own]] = places - self._mesh.points[self._nodes[own]]
+        return replace(
+            self._mesh, points=self._mesh.points + harmonic(self._mesh, moved)[0], depth=finger.depth
+        )
+
+
+def _loops(finger: Finger) -> tuple[Loop, ...]:
+    return (outline_with_contact(finger), *finger.section.cavities)
+
+
+def _at(loop: Loop, pieces: IntArray, shares: FloatArray) -> FloatArray:
+    """Points at fractions (k,) of the lengths of pieces (k,), shape (k, 2), mm."""
+    points = np.zeros((len(pieces), 2))
+    for which in np.unique(pieces):
+        points[pieces == which] = loop.along(int(which), shares[pieces == which])
+    return points

@@ -1,0 +1,200 @@
+"""How the figures of a finger change with its parameters, those of its material and of its load."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import atan2, cos, degrees, hypot, radians, sin
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geometry.errors import UserError
+from geometry.figure import CONTACT, INK, WIDTH, Figure, figure
+from geometry.finger.design import Design
+from geometry.finger.parameters import parameter_info
+from geometry.mesh.design_motion import MovingMesh
+from solvers.finger_figures.figures import QUANTITIES, FingerFigures, figures_of
+from solvers.problem import Problem
+from solvers.solver import Progress, silent
+
+STEP = 1e-4
+"""Step of a parameter, mm, or of Young's modulus over its value; ten times as much of an angle, degrees."""
+WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
+"""Whose thickness a print misses."""
+LEFT_OUT = ("marker_diameter", "marker_height")
+"""Parameters on which no figure depends."""
+LEAST = 0.005
+"""Smallest share that `plot` shows, percent per percent."""
+
+
+class Parameter(NamedTuple):
+    """A parameter with the problems a step below and above it."""
+
+    name: str
+    value: float
+    unit: str
+    step: float
+    low: Problem
+    high: Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Derivatives of a finger's figures by its parameters.
+
+    Attributes:
+        figures: What the finger does.
+        values: Of the parameters, in `units`.
+        derivatives: Of every figure of `QUANTITIES` by every parameter, in the figure's unit over the
+            parameter's; NaN where a figure is not known.
+    """
+
+    figures: FingerFigures
+    values: Mapping[str, float]
+    units: Mapping[str, str]
+    derivatives: Mapping[str, Mapping[str, float]]
+
+    def relative(self, figure: str) -> dict[str, float]:
+        """Change of a figure in percent per percent of each parameter; NaN where the parameter is zero."""
+        own = getattr(self.figures, figure)
+        return {
+            name: slope * self.values[name] / own if own and self.values[name] else float("nan")
+            for name, slope in self._of(figure).items()
+        }
+
+    def tolerance(self, figure: str, *, walls: float = 0.1, young: float = 0.1) -> float:
+        """Half of the 95 % interval of a figure over many prints.
+
+        Args:
+            figure: Its name.
+            walls: Half of the 95 % interval of every wall's thickness, mm, each independent of the others.
+            young: The same of Young's modulus, over its value.
+        """
+        spread = dict.fromkeys(WALLS, walls) | {"young": young * self.values["young"]}
+        slopes = self._of(figure)
+        return float(np.sqrt(sum((slopes[name] * spread[name]) ** 2 for name in spread if name in slopes)))
+
+    def rows(self) -> list[dict[str, float | str]]:
+        """A row for each parameter: its value, its unit, and the derivative of every figure that is known."""
+        known = [name for name in self.derivatives if np.isfinite(getattr(self.figures, name))]
+        rows = []
+        for name, value in self.values.items():
+            row: dict[str, float | str] = {"parameter": name, "value": value, "unit": self.units[name]}
+            rows.append(row | {figure: self.derivatives[figure][name] for figure in known})
+        return rows
+
+    def plot(self, name: str = "force") -> Figure:
+        """A bar for each parameter: percent of a figure per percent of it, the largest on top."""
+        shares = {each: share for each, share in self.relative(name).items() if abs(share) >= LEAST}
+        order = sorted(shares, key=lambda each: abs(shares[each]))
+        room, side = 0.19 * len(order), 1.45  # inches
+        total = room + 0.95
+        with figure(total) as drawn:
+            axes = drawn.add_axes((side / WIDTH, 0.5 / total, (WIDTH - side - 0.3) / WIDTH, room / total))
+            lengths = [shares[each] for each in order]
+            axes.barh(order, lengths, color=[INK if each > 0 else CONTACT for each in lengths], height=0.6)
+            for row, length in enumerate(lengths):
+                away, side_of = (4, "left") if length > 0 else (-4, "right")
+                where: dict[str, Any] = {"textcoords": "offset points", "ha": side_of, "va": "center"}
+                axes.annotate(f"{length:+.2g}", (length, row), (away, 0), **where)
+            axes.axvline(0, color=INK, lw=0.6)
+            axes.margins(x=0.14, y=0.02)
+            axes.spines["left"].set_visible(False)
+            axes.tick_params(axis="y", length=0)
+            axes.set_xlabel("percent per percent of the parameter")
+            value, unit = getattr(self.figures, name), QUANTITIES[name].unit
+            drawn.text(0.12 / WIDTH, 1 - 0.14 / total, f"{name}, {value:.4g} {unit}", weight="bold", va="top")
+        return drawn
+
+    def _of(self, figure: str) -> Mapping[str, float]:
+        if figure not in self.derivatives:
+            raise UserError(f"there is no figure {figure!r}; there are {', '.join(self.derivatives)}")
+        return self.derivatives[figure]
+
+
+def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 2) -> Sensitivity:
+    """Derivatives of a finger's figures by every continuous parameter that it has.
+
+    The mesh follows the parameters, so that the derivatives are those of the discrete solution: exact but
+    for rounding, which leaves six digits. A parameter at zero, such as a fillet that is not there, has none.
+
+    Args:
+        problem: Of a design, or of a drawn finger, which has none of the design's parameters.
+        progress: Called as it proceeds.
+        degree: Of the elements, 1 or 2.
+
+    Raises:
+        UserError: If there is friction.
+        NoSolutionError: If the full load is not reached, or its equilibrium is not stable.
+    """
+    from solvers.fem.variation import VariedProblem
+
+    parameters = list(_parameters(problem))
+    varied = VariedProblem(problem, lambda share, text: progress(0.5 * share, text), degree)
+    figures = figures_of(varied.solution)
+    derivatives: dict[str, dict[str, float]] = {name: {} for name in QUANTITIES}
+    pairs = [(each.low, each.high) for each in parameters]
+    for number, (each, ends) in enumerate(zip(parameters, varied.solutions(pairs), strict=True)):
+        low, high = (figures_of(end).values() for end in ends)
+        for name, slopes in derivatives.items():
+            slopes[each.name] = (high[name] - low[name]) / (2 * each.step)
+        progress(0.5 + 0.5 * number / len(parameters), each.name)
+    varied.close()
+    values = {each.name: each.value for each in parameters}
+    return Sensitivity(figures, values, {each.name: each.unit for each in parameters}, derivatives)
+
+
+def _parameters(problem: Problem) -> Iterator[Parameter]:
+    """The parameters on which the problem depends."""
+    if isinstance(problem.finger, Design):
+        yield from _of_design(problem, problem.finger)
+    material, load = problem.material, problem.load
+
+    def varied(name: str, value: float, unit: str, step: float, at: Callable[[float], Problem]) -> Parameter:
+        return Parameter(name, value, unit, step, at(value - step), at(value + step))
+
+    def of_constant(name: str) -> Callable[[float], Problem]:
+        return lambda to: replace(problem, material=material.model_copy(update={name: to}))
+
+    def moved(u: float, v: float) -> Problem:
+        ways = zip(load.displacement, (u, v), strict=True)
+        given = tuple(None if old is None else float(new) for old, new in ways)
+        return replace(problem, load=load.model_copy(update={"displacement": given}))
+
+    yield varied("young", material.young, "MPa", STEP * material.young, of_constant("young"))
+    yield varied("poisson", material.poisson, "", STEP, of_constant("poisson"))
+    u, v = (value or 0.0 for value in load.displacement)
+    stroke, angle = hypot(u, v), atan2(u, -v)
+    yield varied("stroke", stroke, "mm", STEP, lambda to: moved(u * to / stroke, v * to / stroke))
+    if None not in load.displacement:
+
+        def turned(degrees: float) -> Problem:
+            return moved(stroke * sin(radians(degrees)), -stroke * cos(radians(degrees)))
+
+        yield varied("direction", degrees(angle), "deg", 10 * STEP, turned)
+    if load.radius is not None:
+
+        def rounded(radius: float) -> Problem:
+            return replace(problem, load=load.model_copy(update={"radius": radius}))
+
+        yield varied("radius", load.radius, "mm", STEP, rounded)
+
+
+def _of_design(problem: Problem, design: Design) -> Iterator[Parameter]:
+    mesh = MovingMesh(problem.mesh, design)
+    for name, field in Design.model_fields.items():
+        value = design.contact_abscissa if name == "contact_position" else getattr(design, name)
+        if name in LEFT_OUT or field.annotation not in (float, float | None) or value is None:
+            continue
+        unit = str(parameter_info(name, "unit"))
+        step = 10 * STEP if unit == "deg" else STEP
+        ends = []
+        for to in (value - step, value + step):
+            try:
+                finger = design.replaced(**{name: to})
+            except UserError:  # at an end of its range, or a feature that is not there
+                break
+            if (moved := mesh.of(finger)) is None:
+                break
+            ends.append(replace(problem, mesh=moved, finger=finger))
+        if len(ends) == 2 and ends[0].mesh.digest != ends[1].mesh.digest:
+            yield Parameter(name, float(value), unit, step, *ends)
