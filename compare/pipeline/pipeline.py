@@ -21,7 +21,7 @@ from compare.evaluation.truths import (
     no_displacements,
     virtual_experiment,
 )
-from compare.figures import Picture, draw_all
+from compare.figures import Picture, draw_all, fields_beside
 from compare.pipeline.job import Job, checked
 from compare.pipeline.shared_mesh import shared_mesh, write_rounds
 from compare.pipeline.solving import ERRORS, solve_all
@@ -171,11 +171,14 @@ def _write(
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
-    with stages.stage("pictures") as progress:
-        pictures = draw_all(folder / "figures", comparison, progress, job.picture_formats)
+    figures = folder / "figures"
+    with fields_beside(figures, comparison, job.picture_formats, job.processes) as beside:
+        with stages.stage("fields"), SharedWork().used():
+            for evaluation in comparison.shown_fields:
+                write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
+        with stages.stage("pictures") as progress:
+            pictures = draw_all(figures, comparison, progress, job.picture_formats, beside)
     with stages.stage("report"), SharedWork().used():
-        for evaluation in comparison.shown_fields:
-            write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
         write_markers(folder / "markers.csv", comparison)
         write_table_one(folder / "table1.csv", comparison)
         write_summary(folder / "summary.csv", comparison)

@@ -14,13 +14,14 @@ from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
-from compare.figures import FORMATS, draw_all
+from compare.figures import FORMATS, draw_all, fields_beside
 from compare.figures.fields import QUANTITIES, draw_field
 from compare.figures.gallery import GALLERY, Illustration, draw
 from compare.figures.overlay import overlay_extent
 from geometry.errors import UserError
 from geometry.figure import DPI, NOTEBOOK_DPI, WIDTH
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.processes import ProcessFailed
 from solvers.problem import Problem
 from tests.compare.figures.drawn_pages import Page, page_of
 
@@ -97,6 +98,32 @@ def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawing
             assert image.width == round(WIDTH * DPI)
             low, high = image.convert("L").getextrema()
         assert (picture.path.stem, low < 60, high) == (picture.path.stem, True, 255)
+
+
+def test_a_second_process_draws_fields_as_this_one_and_its_end_does_not_lose_them(
+    comparison, tmp_path, monkeypatch
+):
+    chosen = {name: GALLERY[name] for name in ("von_mises", "strain_xx", "mesh")}
+    monkeypatch.setattr("compare.figures.gallery.GALLERY", chosen)
+    monkeypatch.setattr("compare.figures.fields.QUANTITIES", [QUANTITIES[0], QUANTITIES[2]])
+    monkeypatch.setattr("compare.figures.LARGE", 0)
+    alone, died = tmp_path / "alone", ProcessFailed(-9)
+    expected = [replace(each, path=each.path.name) for each in draw_all(alone, comparison)]
+    for place, lost in ((tmp_path / "beside", False), (tmp_path / "lost", True)):
+        with fields_beside(place, comparison, (), 2) as beside:
+            assert beside is not None
+            if lost:
+                monkeypatch.setattr(beside.drawn, "result", lambda: [("pictures", died)])
+            pictures = draw_all(place, comparison, beside=beside)
+        assert [replace(each, path=each.path.name) for each in pictures] == expected
+        for each in expected:
+            assert (place / each.path).read_bytes() == (alone / each.path).read_bytes()
+
+
+def test_fields_are_drawn_here_where_a_second_process_would_not_help(comparison, tmp_path):
+    for formats, processes in (((), 1), (("pdf",), 2), ((), 2)):  # the last: the mesh is small
+        with fields_beside(tmp_path, comparison, formats, processes) as beside:
+            assert beside is None
 
 
 def test_a_picture_shows_itself_in_a_notebook(drawings: dict[str, Illustration]) -> None:
