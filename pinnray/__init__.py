@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pinnray.comparison import Comparison as Comparison
     from pinnray.designers import optimise as optimise
     from pinnray.designers import predict as predict
+    from pinnray.designers import sensitivity as sensitivity
     from pinnray.designers import sweep as sweep
     from pinnray.functions import compare as compare
     from pinnray.functions import crossval as crossval

@@ -1,4 +1,4 @@
-"""Functions of the front door for designers: sweep, predict, optimise.
+"""Functions of the front door for designers: sensitivity, sweep, predict, optimise.
 
 The worker processes run a calling script once more: in a script, what starts a sweep or a search must stand
 under `if __name__ == "__main__":`.
@@ -17,14 +17,53 @@ from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
 from geometry.text_files import as_path
-from pinnray.arguments import JobKeywords
-from solvers.physics import Physics
+from pinnray.arguments import JobKeywords, mesh_settings, read_job
+from solvers.physics import Load, LoadKind, Material, Physics
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from solvers.finger_figures.sensitivity import Sensitivity
     from studies.optimum.search import Optimum
     from studies.sweep.study import Study
+
+
+def sensitivity(
+    design: str | Path | Finger = "default",
+    *,
+    size: float | None = None,
+    material: Material | str | None = None,
+    load: Load | LoadKind | None = None,
+    progress: bool | None = None,
+    **given: Unpack[JobKeywords],
+) -> "Sensitivity":
+    """How every figure of a finger changes with each parameter: `sensitivity(stroke=8).plot("force")`.
+
+    The derivatives are exact for the elements of `fem`, or of `fem-nonlinear` for a law of finite strain.
+
+    Args:
+        design: A finger in one of the ways of `mesh`.
+        size: Largest element in walls and ribs, mm.
+        material: See `solve`.
+        load: See `solve`.
+        progress: Whether to show the stages; if None in a notebook only.
+        given: Parameters of finger, material and load.
+
+    Raises:
+        UserError: If the load has friction or the body several materials, or the full load is not reached.
+    """
+    from compare.runtime.stages import shown_stages
+    from geometry.cache import finger_mesh
+    from solvers.finger_figures.sensitivity import sensitivity_of
+    from solvers.problem import Problem
+
+    words = ("size", "material", "load", "design")
+    finger, elastic, moved = read_job(design, material, load, given, besides=words)
+    with shown_stages(progress) as stages:
+        with stages.stage("mesh"):
+            triangles = finger_mesh(finger, settings=mesh_settings(size))
+        with stages.stage("sensitivity") as report:
+            return sensitivity_of(Problem(triangles, elastic, moved, None, finger), report)
 
 
 def sweep(

@@ -16,6 +16,7 @@ from pinnray.commands.comparison.solvers import solvers
 from pinnray.commands.finger.design import design
 from pinnray.commands.finger.material import material
 from pinnray.commands.finger.mesh import mesh
+from pinnray.commands.finger.sensitivity import sensitivity
 from pinnray.commands.finger.solve import solve
 from pinnray.commands.launch import EXIT_CODES
 from pinnray.commands.quiet import quietable
@@ -34,7 +35,7 @@ pinnray = App(
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = (
-    *(compare, report, design, mesh, material, solve, sweep, predict, optimise),
+    *(compare, report, design, mesh, material, solve, sensitivity, sweep, predict, optimise),
     *(gridsearch, crossval, solvers),
     *(fiducials, calibrate, pick, points, rig, track),
 )

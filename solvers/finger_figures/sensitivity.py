@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import atan2, cos, degrees, hypot, radians, sin
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,9 +12,13 @@ from geometry.figure import CONTACT, INK, WIDTH, Figure, figure
 from geometry.finger.design import Design
 from geometry.finger.parameters import parameter_info
 from geometry.mesh.design_motion import MovingMesh
+from solvers.fem.variation import VariedProblem
 from solvers.finger_figures.figures import QUANTITIES, FingerFigures, figures_of
 from solvers.problem import Problem
 from solvers.solver import Progress, silent
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 STEP = 1e-4
 """Step of a parameter, mm, or of Young's modulus over its value; ten times as much of an angle, degrees."""
@@ -22,6 +26,8 @@ WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 """Whose thickness a print misses."""
 LEFT_OUT = ("marker_diameter", "marker_height")
 """Parameters on which no figure depends."""
+SMALLEST = ("thinnest_wall", "narrowest_gap")
+"""Figures without derivatives: the smallest of several, which often are equal."""
 LEAST = 0.005
 """Smallest share that `plot` shows, percent per percent."""
 
@@ -44,8 +50,8 @@ class Sensitivity:
     Attributes:
         figures: What the finger does.
         values: Of the parameters, in `units`.
-        derivatives: Of every figure of `QUANTITIES` by every parameter, in the figure's unit over the
-            parameter's; NaN where a figure is not known.
+        derivatives: Of the figures of `QUANTITIES`, but for the smallest wall and gap, by every parameter, in
+            the figure's unit over the parameter's; NaN where a figure is not known.
     """
 
     figures: FingerFigures
@@ -55,23 +61,23 @@ class Sensitivity:
 
     def relative(self, figure: str) -> dict[str, float]:
         """Change of a figure in percent per percent of each parameter; NaN where the parameter is zero."""
-        own = getattr(self.figures, figure)
+        slopes, own = self._of(figure), getattr(self.figures, figure)
         return {
             name: slope * self.values[name] / own if own and self.values[name] else float("nan")
-            for name, slope in self._of(figure).items()
+            for name, slope in slopes.items()
         }
 
-    def tolerance(self, figure: str, *, walls: float = 0.1, young: float = 0.1) -> float:
+    def tolerance(self, figure: str, *, wall_error: float = 0.1, young_error: float = 0.1) -> float:
         """Half of the 95 % interval of a figure over many prints.
 
         Args:
             figure: Its name.
-            walls: Half of the 95 % interval of every wall's thickness, mm, each independent of the others.
-            young: The same of Young's modulus, over its value.
+            wall_error: Half of the 95 % interval of every wall's thickness, mm; walls err independently.
+            young_error: The same of Young's modulus, over its value.
         """
-        spread = dict.fromkeys(WALLS, walls) | {"young": young * self.values["young"]}
+        errors = dict.fromkeys(WALLS, wall_error) | {"young": young_error * self.values["young"]}
         slopes = self._of(figure)
-        return float(np.sqrt(sum((slopes[name] * spread[name]) ** 2 for name in spread if name in slopes)))
+        return float(np.sqrt(sum((slopes[name] * errors[name]) ** 2 for name in errors if name in slopes)))
 
     def rows(self) -> list[dict[str, float | str]]:
         """A row for each parameter: its value, its unit, and the derivative of every figure that is known."""
@@ -81,6 +87,12 @@ class Sensitivity:
             row: dict[str, float | str] = {"parameter": name, "value": value, "unit": self.units[name]}
             rows.append(row | {figure: self.derivatives[figure][name] for figure in known})
         return rows
+
+    def table(self) -> "pd.DataFrame":
+        """`rows` as a data frame."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows()).set_index("parameter")
 
     def plot(self, name: str = "force") -> Figure:
         """A bar for each parameter: percent of a figure per percent of it, the largest on top."""
@@ -95,7 +107,9 @@ class Sensitivity:
             for row, length in enumerate(lengths):
                 away, side_of = (4, "left") if length > 0 else (-4, "right")
                 where: dict[str, Any] = {"textcoords": "offset points", "ha": side_of, "va": "center"}
-                axes.annotate(f"{length:+.2g}", (length, row), (away, 0), **where)
+                axes.annotate(
+                    f"{length:+.2g}".replace("-", "\N{MINUS SIGN}"), (length, row), (away, 0), **where
+                )
             axes.axvline(0, color=INK, lw=0.6)
             axes.margins(x=0.14, y=0.02)
             axes.spines["left"].set_visible(False)
@@ -126,12 +140,10 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
         UserError: If there is friction.
         NoSolutionError: If the full load is not reached, or its equilibrium is not stable.
     """
-    from solvers.fem.variation import VariedProblem
-
     parameters = list(_parameters(problem))
     varied = VariedProblem(problem, lambda share, text: progress(0.5 * share, text), degree)
     figures = figures_of(varied.solution)
-    derivatives: dict[str, dict[str, float]] = {name: {} for name in QUANTITIES}
+    derivatives: dict[str, dict[str, float]] = {name: {} for name in QUANTITIES if name not in SMALLEST}
     pairs = [(each.low, each.high) for each in parameters]
     for number, (each, ends) in enumerate(zip(parameters, varied.solutions(pairs), strict=True)):
         low, high = (figures_of(end).values() for end in ends)

@@ -70,7 +70,10 @@ def with_doubts(
         observations: What was given.
         expected: Displacements of the markers seen, up to a factor, for a guess of their order.
     """
-    found = solve(observations)
+    try:
+        found = solve(observations)
+    except NoSolutionError as error:
+        raise NoSolutionError(f"{error}{_better_order(solve, observations, expected)}") from error
     off = _inflation(found)
     if off < EXPLAINED:
         return found
@@ -101,6 +104,22 @@ def with_doubts(
     if off <= CONTRADICTED:
         return found
     return _doubted(found, f"{fault}; see whether drawing, clamp, load and numbers of the markers are right")
+
+
+def _better_order(
+    solve: Callable[[Observations], Solution],
+    observations: Observations,
+    expected: Callable[[Observations], FloatArray],
+) -> str:
+    """Words on another order that explains markers for which there is no solution; empty if none does."""
+    seen = np.flatnonzero(observations.visible)
+    order = likely_order(observations.displacements[seen], expected(observations), MUCH_NEARER)
+    if order is None or (gain := _gain(solve, _reordered(observations, order), EXPLAINED**2)) is None:
+        return ""
+    return (
+        f"; {order_words(order, seen + 1)} their displacements fit, with a force of "
+        f"{np.linalg.norm(gain[1].reaction):.3g} N/mm; see how they are numbered"
+    )
 
 
 def _gain(

@@ -187,8 +187,7 @@ class Identifier:
                 return fit._replace(exact=False)
             fit = found._replace(coarser=None)
             deviations = np.sqrt(np.diagonal(fit.estimate.covariance))
-            near = (np.abs(fit.estimate.z - before) < POLISHED * deviations).all()
-            if near or fit.estimate.inflation > HOPELESS:
+            if (np.abs(fit.estimate.z - before) < POLISHED * deviations).all():
                 break
         return fit
 
@@ -237,7 +236,10 @@ class Identifier:
         """The fit with the feet that a first search holds, and to the end if that is worth while."""
         if not self._loose and (fit.estimate.converged or fit.estimate.inflation > HOPELESS):
             return fit
-        return self._fits.fit(fit.law, fit.measurement, fit)
+        try:
+            return self._fits.fit(fit.law, fit.measurement, fit)
+        except NoSolutionError:  # the way there leads astray; it stays as it is, not converged
+            return fit
 
     def _of_contacts(self, best: Fit) -> Fit:
         """The best of a fit and those that start from other contacts."""

@@ -1,6 +1,6 @@
 """Markers that no finger explains: the guess, and what becomes of the solution."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -135,6 +135,20 @@ def test_what_nothing_explains_says_what_to_look_at():
     assert not found.status.converged
     assert "60 times as far off as they are known" in found.status.warnings[0]
     assert "see whether drawing, clamp, load and numbers of the markers are right" in found.status.warnings[0]
+
+
+def test_where_there_is_no_solution_an_order_that_explains_is_said():
+    def solve(given):
+        if in_order(given) > 1:
+            raise NoSolutionError("the finger that was found is inside out")
+        return Found(Status(True, "found"), {"inflation": 1.0}, np.array([0.0, 0.25]))
+
+    turned = replace(seen(), displacements=EXPECTED[::-1])
+    said = "inside out; in reverse order their displacements fit, with a force of 0.25 N/mm"
+    with pytest.raises(NoSolutionError, match=said):
+        with_doubts(solve, turned, lambda given: EXPECTED)
+    with pytest.raises(NoSolutionError, match=r"inside out$"):
+        with_doubts(solve, replace(seen(), displacements=2 * EXPECTED), lambda given: EXPECTED)
 
 
 def test_a_guess_without_a_solution_is_none():

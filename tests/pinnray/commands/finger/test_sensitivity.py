@@ -1,0 +1,42 @@
+"""`pinnray sensitivity`: the table in the terminal, the CSV file and the picture."""
+
+import csv
+
+import pytest
+
+from pinnray.cli import main
+
+COARSE = ["sensitivity", "--mesh-size", "2", "--stroke", "4"]
+
+
+def test_the_command_writes_table_and_picture(tmp_path, capsys):
+    out = tmp_path / "found.csv"
+    assert main([*COARSE, "--figure", "wrap", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    (force,) = (line for line in said.splitlines() if line.startswith("force "))
+    assert "±" in force
+    assert "young +1" in force
+    with out.open() as file:
+        rows = {row["parameter"]: row for row in csv.DictReader(file)}
+    assert rows["young"]["unit"] == "MPa"
+    assert float(rows["young"]["force"]) * float(rows["young"]["value"]) == pytest.approx(
+        float(rows["stroke"]["force"]) * 4.0
+    )
+    assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--figure", "grip"], "--figure grip: there are force"),
+        (["--figure", "force_25"], "not known at the full load alone"),
+        (["--out", "found.txt"], "ends in .csv"),
+        (["--wall-error", "-1"], "--wall-error -1: give zero or more"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, capsys, arguments, said):
+    law = ["--law", "neo-hookean"]  # whose force on the way is not in proportion
+    out = [] if "--out" in arguments else ["--out", str(tmp_path / "found.csv")]
+    assert main([*COARSE, *law, *out, *arguments]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,114 @@
+"""Derivatives of the figures: against solutions of the changed problem on the mesh that followed it."""
+
+import numpy as np
+import pytest
+
+import pinnray as pr
+from geometry.cache import finger_mesh
+from geometry.mesh.design_motion import MovingMesh
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem.linear import FemSolver
+from solvers.finger_figures import figures_of
+from solvers.finger_figures.sensitivity import _parameters, sensitivity_of
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+from solvers.solver import NoSolutionError
+from tests.solvers.conftest import SHORT
+
+CHECKED = ("force", "tip_u", "tip_v", "wrap", "von_mises", "principal_strain", "compliance_across", "mass")
+
+
+@pytest.fixture(scope="module")
+def mesh() -> TriangleMesh:
+    """`SHORT` with one element across its walls: the derivatives are those of any mesh."""
+    return finger_mesh(SHORT, settings=MeshSettings(size=2.0), across=1)
+
+
+def solved(problem: Problem) -> dict[str, float]:
+    linear = problem.material.law == "linear"
+    solver = FemSolver(estimate=False) if linear else make_solver("fem-nonlinear", tolerance=1e-10)
+    return figures_of(solver.solve(problem)).values()
+
+
+@pytest.mark.parametrize(
+    ("law", "load", "names"),
+    [
+        (
+            "linear",
+            Load(stroke=4.0),
+            ("height", "poisson", "direction"),
+        ),
+        ("neo-hookean", Load(stroke=4.0), ("rib_thickness", "contact_position")),
+        ("neo-hookean", Load("patch", stroke=4.0, direction=10.0), ("front_thickness", "direction")),
+        ("neo-hookean", Load("cylinder", stroke=4.0, radius=6.0), ("back_thickness", "radius")),
+    ],
+    ids=["linear", "mean", "patch", "cylinder"],
+)
+def test_the_derivatives_are_those_of_solved_problems(monkeypatch, mesh, law, load, names):
+    """Central differences with a step of 0.0005 mm are within 1e-4: rounding and the step's square."""
+    problem = Problem(mesh, Material(law=law), load, None, SHORT)
+    found = sensitivity_of(problem)
+    monkeypatch.setattr("solvers.finger_figures.sensitivity.STEP", 5e-4)
+    chosen = [each for each in _parameters(problem) if each.name in names]
+    assert len(chosen) == len(names)
+    for each in chosen:
+        low, high = solved(each.low), solved(each.high)
+        for name in CHECKED:
+            difference = (high[name] - low[name]) / (2 * each.step)
+            largest = max(abs(slope) for slope in found.derivatives[name].values())
+            own = found.derivatives[name][each.name]
+            assert own == pytest.approx(difference, rel=1e-4, abs=1e-5 * largest), (name, each.name)
+
+
+def test_the_force_of_a_finger_meshed_anew_changes_as_much():
+    """Two with ribs of 1.9 and 2.1 mm; another mesh changes each force by up to 0.2 %, their slope by 5 %."""
+    found = pr.sensitivity(SHORT, size=0.5, stroke=4.0)
+    forces = [
+        pr.solve(SHORT.replaced(rib_thickness=thickness), "fem", size=0.5, stroke=4.0).figures.force
+        for thickness in (1.9, 2.1)
+    ]
+    slope = (forces[1] - forces[0]) / 0.2
+    assert found.derivatives["force"]["rib_thickness"] == pytest.approx(slope, rel=0.05)
+
+
+def test_figures_in_proportion_have_shares_of_one(mesh):
+    found = sensitivity_of(Problem(mesh, Material(), Load(stroke=4.0), None, SHORT))
+    force, compliance = found.relative("force"), found.relative("compliance_across")
+    assert [force[name] for name in ("young", "depth", "stroke")] == pytest.approx([1, 1, 1], abs=1e-6)
+    assert compliance["young"] == pytest.approx(-1, abs=1e-6)
+    assert np.isnan(force["direction"])  # zero degrees have no percent
+    assert "fillet_radius" not in force
+    assert found.tolerance("force", wall_error=0.0, young_error=0.2) == pytest.approx(
+        0.2 * found.figures.force, rel=1e-6
+    )
+    both = found.tolerance("force", wall_error=0.1, young_error=0.2)
+    walls = found.tolerance("force", wall_error=0.1, young_error=0.0)
+    assert both == pytest.approx(np.hypot(walls, 0.2 * found.figures.force))
+    assert found.table().loc["young", "force"] == pytest.approx(found.figures.force / 11.4)
+    assert found.plot("wrap")._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
+    with pytest.raises(pr.UserError, match="there is no figure 'forse'; there are force"):
+        found.relative("forse")
+
+
+def test_the_mesh_follows_every_parameter_of_its_section(short_mesh):
+    """Its area stays that of the section, arcs too: a node keeps its place on its piece."""
+    design = SHORT.replaced(tip_radius=2.0, fillet_radius=0.5)
+    mesh = finger_mesh(design, settings=MeshSettings(size=1.0))
+    other = design.replaced(rib_thickness=2.1, fillet_radius=0.6, height=50.5, contact_position=20.3)
+    moved = MovingMesh(mesh, design).of(other)
+    assert moved is not None
+    chords = mesh.areas.sum() - design.section.area  # straight edges on arcs
+    assert moved.areas.sum() - other.section.area == pytest.approx(chords, abs=0.2 * abs(chords))
+    assert moved.points[moved.contact_node] == pytest.approx([20.3, 0.0], abs=1e-9)
+    assert MovingMesh(mesh, design).of(design.replaced(fillet_radius=0.0)) is None
+    with pytest.raises(pr.UserError, match="the mesh is not of the finger"):
+        MovingMesh(short_mesh, design)
+
+
+def test_what_has_no_derivatives_is_refused(mesh):
+    rubbing = Load("cylinder", stroke=4.0, friction=0.3)
+    with pytest.raises(pr.UserError, match="without friction"):
+        sensitivity_of(Problem(mesh, Material(law="neo-hookean"), rubbing, None, SHORT))
+    with pytest.raises(NoSolutionError, match="stopped at"):
+        sensitivity_of(Problem(mesh, Material(law="neo-hookean"), Load(stroke=45.0), None, SHORT))
