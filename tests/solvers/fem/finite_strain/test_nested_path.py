@@ -15,8 +15,9 @@ from solvers.problem import Load, Material, Problem
 
 FINGER = Design()
 FINE = Problem(
-    finger_mesh(FINGER, settings=MeshSettings(size=0.3)), Material(law="neo-hookean"), finger=FINGER
+    finger_mesh(FINGER, settings=MeshSettings(size=0.35)), Material(law="neo-hookean"), finger=FINGER
 )
+SOLVER = FemNonlinearSolver(first_step=0.2)
 LOADS = {
     "mean": Load(),
     "patch": Load(kind="patch", displacement=(None, -6.0)),
@@ -28,14 +29,14 @@ def plainly(problem):
     """The solution by the path on the given elements alone."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(solver, "coarser", lambda _: None)
-        return FemNonlinearSolver().solve(problem)
+        return SOLVER.solve(problem)
 
 
 @pytest.mark.parametrize("kind", ["mean", "patch", pytest.param("cylinder", marks=pytest.mark.slow)])
 def test_the_end_is_the_equilibrium_of_the_path_on_fine_elements(kind):
     """Newton's tolerance leaves 1e-8 mm, the settling of a contact 1e-5 mm of penetration."""
     problem = replace(FINE, load=LOADS[kind])
-    nested = FemNonlinearSolver().solve(problem)
+    nested = SOLVER.solve(problem)
     assert "on elements of 1 mm" in nested.status.message
     plain = plainly(problem)
     assert "on elements of" not in plain.status.message
@@ -65,14 +66,14 @@ def test_where_coarse_elements_lead_elsewhere_the_path_is_followed_on_the_fine_o
         return 1.2 * followed(path, way, nodal)
 
     monkeypatch.setattr(solver.LoadPath, "interpolated", elsewhere)
-    found = FemNonlinearSolver().solve(FINE)
+    found = SOLVER.solve(FINE)
     assert found.status.converged
     assert "on elements of" not in found.status.message
 
 
 def test_friction_is_followed_on_the_given_elements():
     load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -1.0), friction=0.3)
-    found = FemNonlinearSolver().solve(replace(FINE, load=load))
+    found = SOLVER.solve(replace(FINE, load=load))
     assert found.status.converged
     assert "on elements of" not in found.status.message
 
