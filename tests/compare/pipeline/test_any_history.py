@@ -21,13 +21,13 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_sta
 
 from compare.pipeline.job import Job
 from geometry.errors import UserError
-from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, silent
 from tests.compare.pipeline.runs import compare as run_quietly
+from tests.solvers.conftest import SHORT
 
 NAMES = ("first", "second", "third")
 ENDINGS: dict[str, Callable[[], BaseException]] = {
@@ -153,7 +153,7 @@ class Histories(RuleBasedStateMachine):
 def finish(out: Path, names: Sequence[str], degree: int, resume: bool, called: Callable[[str], None]) -> Any:
     """Run a job and give its numbers, without times."""
     solvers = [Watched(name, degree, called) for name in names]
-    job = Job(Design(), solvers, mesh=MeshSettings(size=2.0), measurements=MEASURED, out=out, resume=resume)
+    job = Job(SHORT, solvers, mesh=MeshSettings(size=2.0), measurements=MEASURED, out=out, resume=resume)
     run_quietly(job)
     numbers = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
     for solver in numbers["solvers"].values():
@@ -184,7 +184,9 @@ MEASURED = Path()
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.* is damaged .* and is made again")
-def test_any_history_ends_with_the_numbers_of_a_fresh_folder(without_pictures, monkeypatch, measured):
+def test_any_history_ends_with_the_numbers_of_a_fresh_folder(without_pictures, monkeypatch, tmp_path):
+    measured = tmp_path / "measured.csv"
+    measured.write_text("x_mm,y_mm,u_mm,v_mm\n12,-1,-0.5,-5\n40,-1,-2,-0.5\n", encoding="utf-8")
     monkeypatch.setitem(globals(), "MEASURED", measured)
     run_state_machine_as_test(
         Histories,

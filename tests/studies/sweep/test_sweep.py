@@ -37,6 +37,7 @@ from studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
 from studies.sweep.tables import failure_grid, sample_table
 from studies.sweep.workers import Workers
 from tests.pinnray.commands.programs import COMMAND
+from tests.studies.sweep.workers import answered, die_at_one, hang_at_one
 
 STUDY = """
 mesh_size = 2.0
@@ -277,22 +278,6 @@ def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(monk
     ):
         found = {each.number: each.state for each in workers.answers(tasks)}
     assert found == {0: "done", 1: "failed", 2: "done"}
-
-
-def die_at_one(task: object, report: object) -> Measurement:
-    if getattr(task, "number", None) == 1:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return answered(task, report)
-
-
-def hang_at_one(task: object, report: object) -> Measurement:
-    if getattr(task, "number", None) == 1:
-        time.sleep(600)
-    return answered(task, report)
-
-
-def answered(task: object, report: object = None) -> Measurement:
-    return Measurement(getattr(task, "number", -1), "done", "", 0.0, {"force": 1.0})
 
 
 REFUSED: dict[str, tuple[Callable[[Path], list[str]], str]] = {
