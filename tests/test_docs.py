@@ -145,7 +145,7 @@ def test_examples_pin_a_number(path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("block", TO_RUN, ids=id_of)
-def test_python_in_the_docs_runs(block, tmp_path, monkeypatch):
+def test_python_in_the_docs_runs(block, tmp_path, monkeypatch, without_pictures):
     monkeypatch.chdir(tmp_path)
     padded = "\n" * block.line + block.text  # so that a traceback names the page's own line
     exec(compile(padded, str(block.page), "exec"), {"__name__": "__docs__"})

@@ -37,7 +37,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=id_of)
-def test_notebooks_run(page, tmp_path, monkeypatch):
+def test_notebooks_run(page, tmp_path, monkeypatch, without_pictures):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "__docs__"}
     for block in blocks(page):

@@ -19,7 +19,7 @@ def test_the_shipped_markers_are_those_of_the_default_finger_and_simulated():
 
 
 @pytest.mark.slow
-def test_the_shipped_markers_are_made_as_their_file_says():
+def test_the_shipped_markers_are_made_as_their_file_says(without_pictures):
     from pinnray import compare
 
     made = [line.strip("# \n") for line in FILE.read_text(encoding="utf-8").splitlines() if "#     " in line]

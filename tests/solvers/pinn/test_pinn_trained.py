@@ -171,9 +171,12 @@ def test_a_short_training_comes_near_to_finite_elements(trained, fem):
 
 
 @pytest.mark.slow
-def test_the_network_of_the_paper_is_within_four_percent_after_four_steps(problem, fem):
-    """Measured: 3.1 % and 5.0 times the energy; after two and two steps 6.7 % and 19 times."""
-    solution = TrainedPinnSolver(sampled_steps=3, subset_steps=1).solve(problem)
+def test_the_network_of_the_paper_is_within_four_percent_after_four_steps(short_mesh):
+    """Measured: 2.9 % and 3.7 times the energy; with one sampled step less 3.7 % and 25 times."""
+    problem = Problem(short_mesh)
+    settings = {"sample_points": 900, "subset": 800, "matrix_points": 2000}
+    solution = TrainedPinnSolver(sampled_steps=3, subset_steps=1, **settings).solve(problem)
+    fem = FemSolver(estimate=False).solve(problem)
     assert apart(solution, fem) < 0.04
     assert 1.0 < solution.energy / fem.energy < 7.0
 

@@ -14,13 +14,13 @@ from solvers.pinn.finite_basis.pressed_network import PENETRATION, PressedNetwor
 from solvers.problem import Load, Material, Problem
 
 LOCAL = PinnLocalSolver(wall_spacing=0.7, corner_spacing=0.1, tolerance=0.1)
-STROKE, RADIUS = 4.0, 5.0
+STROKE, RADIUS = 3.0, 5.0
 
 
 @pytest.fixture(scope="module")
-def problem(coarse_mesh):
+def problem(short_mesh):
     load = Load(kind="cylinder", radius=RADIUS, displacement=(0.0, -STROKE))
-    return Problem(coarse_mesh, Material(law="neo-hookean"), load)
+    return Problem(short_mesh, Material(law="neo-hookean"), load)
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +41,12 @@ def apart(solution, other):
 
 
 def test_displacement_and_force_are_those_of_finite_elements(local, fem):
-    """Measured: 0.4, 1.9 and 1.8 %, with a network whose own estimate of its error is 0.5 %."""
+    """Measured: 0.3, 0.7 and 0.8 %, with a network whose own estimate of its error is 0.5 %."""
     assert local.status.converged, local.status.message
-    assert "contact from x = 3" in local.status.message
+    assert "contact from x = 2" in local.status.message
     assert apart(local, fem) < 0.01
-    np.testing.assert_allclose(local.reaction, fem.reaction, atol=0.03 * np.linalg.norm(fem.reaction))
-    assert local.energy == pytest.approx(fem.energy, rel=0.03)
+    np.testing.assert_allclose(local.reaction, fem.reaction, atol=0.02 * np.linalg.norm(fem.reaction))
+    assert local.energy == pytest.approx(fem.energy, rel=0.02)
 
 
 def test_the_cylinder_only_presses_and_is_not_entered(local, problem):
@@ -112,7 +112,7 @@ def test_a_cylinder_that_moves_away_does_not_touch(problem):
 def test_a_small_stroke_is_that_of_the_linear_law(problem):
     """Laws agree at rest: the force of 0.3 mm by the linear one is that of neo-Hookean finite elements.
 
-    Measured: 6 % more, by a network with as few windows as bend at all.
+    Measured: 4 % more, by a network with as few windows as bend at all.
     """
     gentle = replace(problem, load=Load(kind="cylinder", radius=RADIUS, displacement=(0.0, -0.3)))
     coarse = PinnLocalSolver(wall_spacing=1.0, corner_spacing=0.2, tolerance=1.0)
