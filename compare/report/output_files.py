@@ -221,6 +221,7 @@ def _write(path: Path, grid: pyvista.UnstructuredGrid) -> None:
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(grid)
     writer.SetDataModeToBinary()
+    writer.SetCompressionLevel(1)  # the higher ones take longer for the same size
     writer.WriteToOutputStringOn()
     writer.Write()
     write_text(path, writer.GetOutputString())
