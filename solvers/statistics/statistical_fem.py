@@ -117,12 +117,16 @@ class StatFemSolver(ElementSettings):
                 raise NoSolutionError(f"statfem needs {fem.name}: {solution.status.message}")
             return cast(LagrangeField, solution.field)
 
-        if problem.material.law == "linear":
+        if isinstance(fem, FemSolver):
+            prepared = fem.prepare(replace(problem, load=load, observations=None))
+            progress(0.3, "factorised")
             rest = [None if value is None else 0.0 for value in load.displacement]
-            return [
-                moved([1.0 if axis == own else value for axis, value in enumerate(rest)])
-                for own in load.prescribed
-            ]
+            found = []
+            for own in load.prescribed:
+                unit = tuple(1.0 if axis == own else value for axis, value in enumerate(rest))
+                found.append(prepared.solve(load.model_copy(update={"displacement": unit})).field)
+            prepared.destroy()
+            return cast(list[LagrangeField], found)
         main = int(np.abs(load.values).argmax())
         if not load.values[main]:
             raise UserError("statfem at finite strain needs a load that moves the contact")
