@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, Protocol, cast, runtime_checkable
+from typing import ClassVar, Literal, NamedTuple, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +31,13 @@ class SolidField(DisplacementField, Protocol):
 
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j at `location.points`, shape (n, 3, 3)."""
+
+
+@runtime_checkable
+class SmoothField(DisplacementField, Protocol):
+    """A displacement whose gradient depends on the point alone: it does not jump between triangles."""
+
+    smooth: ClassVar[Literal[True]]
 
 
 @runtime_checkable

@@ -11,7 +11,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.section.section import Section
 from geometry.section.thickness import cavity_widths, wall_thickness
 from solvers.problem import Problem, contact_ends, contact_nodes, front_points
-from solvers.solution import SolidField, Solution, State
+from solvers.solution import SmoothField, SolidField, Solution, State
 
 RAY_SPACING = 0.5
 """Distance of the points from which wall thickness and gaps are measured, mm."""
@@ -118,8 +118,10 @@ def turn(points: FloatArray) -> float:
 def _nodal_gradient(solution: Solution) -> FloatArray:
     """The displacement gradient at the mesh's nodes, mean over their triangles, (n, 2, 2) or (n, 3, 3)."""
     mesh: TriangleMesh = solution.problem.mesh
-    corners = mesh.at_barycentric(np.eye(3))
     field = solution.field
+    if isinstance(field, SmoothField):
+        return field.gradient(mesh.at_nodes())
+    corners = mesh.at_barycentric(np.eye(3))
     found = field.solid_gradient(corners) if isinstance(field, SolidField) else field.gradient(corners)
     nodes, weights = mesh.triangles.ravel(), np.repeat(mesh.areas, 3)
     count, shape = len(mesh.points), found.shape[1:]

@@ -8,6 +8,7 @@ physics-informed neural networks, Adv. Comput. Math. 49 (2023).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 import torch
@@ -145,6 +146,7 @@ class FiniteBasisField:
     basis: FiniteBasis  # The basis functions
     # Output layer, shape (c, 2, m + 1): for every window, component and basis function, mm
     output: torch.Tensor
+    smooth: ClassVar[Literal[True]] = True
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
