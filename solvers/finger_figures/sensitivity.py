@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from geometry.errors import UserError
-from geometry.figure import CONTACT, INK, WIDTH, Figure, figure
 from geometry.finger.design import Design
 from geometry.finger.parameters import parameter_info
 from geometry.mesh.design_motion import MovingMesh
@@ -19,6 +18,8 @@ from solvers.solver import Progress, silent
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from geometry.figure import Figure
 
 STEP = 1e-4
 """Step of a parameter, mm, or of Young's modulus over its value; ten times as much of an angle, degrees."""
@@ -94,8 +95,10 @@ class Sensitivity:
 
         return pd.DataFrame(self.rows()).set_index("parameter")
 
-    def plot(self, name: str = "force") -> Figure:
+    def plot(self, name: str = "force") -> "Figure":
         """A bar for each parameter: percent of a figure per percent of it, the largest on top."""
+        from geometry.figure import CONTACT, INK, WIDTH, figure
+
         shares = {each: share for each, share in self.relative(name).items() if abs(share) >= LEAST}
         order = sorted(shares, key=lambda each: abs(shares[each]))
         room, side = 0.19 * len(order), 1.45  # inches
