@@ -1,0 +1,25 @@
+"""The benchmark of the default run, on a coarse one."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from benchmarks.results.default_time import StageTime
+
+ROOT = Path(__file__).parents[2]
+RUN = ["compare", "--quiet", "--solvers", "fem,pinn-std", "--mesh-size", "2", "--out"]
+
+
+def test_every_stage_has_what_it_needs_within_its_time(tmp_path: Path) -> None:
+    """In a process of its own, as it counts in the functions of the program."""
+    answer = tmp_path / "stages.json"
+    program = [sys.executable, "-m", "benchmarks.results.default_time", str(answer)]
+    subprocess.run([*program, *RUN, str(tmp_path / "out")], cwd=ROOT, check=True)
+    rows = {row[0]: StageTime(*row) for row in json.loads(answer.read_text(encoding="utf-8"))}
+    assert next(iter(rows)) == "start-up and imports"
+    assert {"fem", "pinn-std", "fields", "pictures", "report"} < set(rows)
+    assert all(0 <= row.floor <= row.seconds for row in rows.values())
+    assert rows["fem"].needs == "2 factorisations"  # the solution's, and that of the figures at rest
+    assert "GFlop of products" in rows["pinn-std"].needs
+    assert rows["fields"].needs == "3 fields written"  # the truth's, too
