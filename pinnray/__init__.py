@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from pinnray.functions import solver as solver
     from pinnray.observations import Observations as Observations
     from pinnray.solution import Solution as Solution
-    from solvers.finger_figures.sensitivity import Sensitivity as Sensitivity
+    from solvers.finger_figures.sensitivity import LocalSensitivity as LocalSensitivity
     from solvers.materials.presets import MATERIALS as MATERIALS
     from solvers.physics import Load as Load
     from solvers.physics import Material as Material

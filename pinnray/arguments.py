@@ -129,7 +129,7 @@ def read_finger(design: object, shape: Mapping[str, Any] | None = None) -> Finge
     if isinstance(design, Design):
         return design.replaced(**shape) if shape else design
     if isinstance(design, str | Path):
-        design = read_drawing(design)
+        design = given_drawing(design)
     if not isinstance(design, DrawnFinger):
         raise UserError(f"{design!r} is no design; give a finger, the name of a preset or a file")
     if shape:
@@ -137,7 +137,7 @@ def read_finger(design: object, shape: Mapping[str, Any] | None = None) -> Finge
     return design
 
 
-def read_drawing(file: str | Path, description: Mapping[str, Any] | None = None) -> DrawnFinger:
+def given_drawing(file: str | Path, description: Mapping[str, Any] | None = None) -> DrawnFinger:
     """The finger of a drawing; see `pinnray.functions.load_drawing`."""
     path = as_path(file, "the drawing")
     known = load_description(description_beside(path)).model_dump(exclude_none=True)

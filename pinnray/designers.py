@@ -23,7 +23,7 @@ from solvers.physics import Load, LoadKind, Material, Physics
 if TYPE_CHECKING:
     import pandas as pd
 
-    from solvers.finger_figures.sensitivity import Sensitivity
+    from solvers.finger_figures.sensitivity import LocalSensitivity
     from studies.optimum.search import Optimum
     from studies.sweep.study import Study
 
@@ -36,7 +36,7 @@ def sensitivity(
     load: Load | LoadKind | None = None,
     progress: bool | None = None,
     **given: Unpack[JobKeywords],
-) -> "Sensitivity":
+) -> "LocalSensitivity":
     """How every figure of a finger changes with each parameter: `sensitivity(stroke=8).plot("force")`.
 
     The derivatives are exact for the elements of `fem`, or of `fem-nonlinear` for a law of finite strain.

@@ -22,8 +22,8 @@ from geometry.text_files import as_path
 from pinnray.arguments import (
     JobKeywords,
     MeshKeywords,
+    given_drawing,
     mesh_settings,
-    read_drawing,
     read_job,
     read_solver,
     read_solvers,
@@ -69,7 +69,7 @@ def load_drawing(file: str | Path, **description: Any) -> DrawnFinger:
     Raises:
         UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
     """
-    return read_drawing(file, description)
+    return given_drawing(file, description)
 
 
 def solver(name: str = "", **settings: Any) -> Solver:

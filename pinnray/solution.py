@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from compare.evaluation.evaluation import Evaluation
     from geometry.figure import Figure
 
-Quantity = Literal["displacement", "von_mises", "strain_principal", "strain_xx", "strain_yy", "strain_xy"]
+FieldName = Literal["displacement", "von_mises", "strain_principal", "strain_xx", "strain_yy", "strain_xy"]
 
 
 class Solution(solution.Solution):
@@ -48,7 +48,7 @@ class Solution(solution.Solution):
         """
         return figures_of(self)
 
-    def plot(self, quantity: Quantity = "displacement", *, scale: float = 1.0) -> "Figure":
+    def plot(self, quantity: FieldName = "displacement", *, scale: float = 1.0) -> "Figure":
         """A field on the deformed mesh, as a matplotlib figure that a notebook shows.
 
         Args:

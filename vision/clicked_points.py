@@ -25,7 +25,7 @@ ROUNDING = 1e-6
 UNKNOWN_BY = 1.5
 """A mirror image that fits worse by less than this factor may be the right one."""
 
-Scale = Literal["same", "lengths"]
+LengthScale = Literal["same", "lengths"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def clicked_points(
     markers: FloatArray,
     *,
     marker_radius: float,
-    scale: Scale | tuple[float, float] = "same",
+    scale: LengthScale | tuple[float, float] = "same",
     source: str,
 ) -> ClickedPoints:
     """Displacements of markers (m, 2), mm, from clicks in their order, or at least of each other.

@@ -11,8 +11,8 @@ from compare.crossval.scores import (
     LEVEL,
     MARKERS,
     Difference,
-    Interval,
     Score,
+    ScoreInterval,
     differences,
     of_scheme,
     score,
@@ -314,7 +314,7 @@ def _contact_cells(score: Score) -> dict[str, Cell]:
     return row | {name: "" if share is None else share for name, share in score.stated.items()}
 
 
-def _interval_cells(name: str, unit: str, interval: Interval | None, mean: str = "") -> dict[str, Cell]:
+def _interval_cells(name: str, unit: str, interval: ScoreInterval | None, mean: str = "") -> dict[str, Cell]:
     """A mean and the ends of its interval in three columns, empty where there is none."""
     values = (None, None, None) if interval is None else (interval.mean, interval.low, interval.high)
     return {

@@ -24,7 +24,7 @@ BASELINES = ("fem", "gp", "statfem", "fem-asm")
 
 
 @dataclass(frozen=True)
-class Interval:
+class ScoreInterval:
     """A mean with a confidence interval, whose ends are NaN for one seed."""
 
     mean: float
@@ -42,7 +42,7 @@ class Interval:
 
 
 @dataclass(frozen=True)
-class Difference(Interval):
+class Difference(ScoreInterval):
     """A solver's score minus a baseline's, in the same folds and seeds; negative if it is better."""
 
     @classmethod
@@ -82,14 +82,14 @@ class Score:
         converged: Share of folds and seeds in which the solver converged.
     """
 
-    in_sample: Mapping[str, Interval]
-    held_out: Mapping[str, Interval]
-    fields: Mapping[str, Interval]
+    in_sample: Mapping[str, ScoreInterval]
+    held_out: Mapping[str, ScoreInterval]
+    fields: Mapping[str, ScoreInterval]
     coverage: float | None
     per_marker: Sequence[float]
     converged: float
-    force: Interval | None = None
-    position: Interval | None = None
+    force: ScoreInterval | None = None
+    position: ScoreInterval | None = None
     von_mises_coverage: float | None = None
     force_within: float | None = None
     position_within: float | None = None
@@ -117,7 +117,9 @@ def score(results: SeedResults) -> Score:
         in_sample=_errors(results, lambda found: found.in_sample),
         held_out=_errors(results, lambda found: found.held_out),
         fields={
-            name: Interval.of([float(np.mean([found.fields[name] for found in seed])) for seed in results])
+            name: ScoreInterval.of(
+                [float(np.mean([found.fields[name] for found in seed])) for seed in results]
+            )
             for name in FIELDS
             if name in results[0][0].fields
         },
@@ -162,12 +164,12 @@ def _values(results: SeedResults, what: str) -> FloatArray | None:
     return values if np.isfinite(values).all() else None
 
 
-def _interval(results: SeedResults, name: str) -> Interval | None:
+def _interval(results: SeedResults, name: str) -> ScoreInterval | None:
     """Interval over seeds of a number of the folds; None if some fold has none."""
     values = [[getattr(found, name) for found in seed] for seed in results]
     if any(value is None for seed in values for value in seed):
         return None
-    return Interval.of([float(np.mean(seed)) for seed in values])
+    return ScoreInterval.of([float(np.mean(seed)) for seed in values])
 
 
 def _share(results: SeedResults, name: str) -> float | None:
@@ -175,13 +177,13 @@ def _share(results: SeedResults, name: str) -> float | None:
     return None if found is None else found.mean
 
 
-def _errors(results: SeedResults, chosen: Callable[[FoldResult], FloatArray]) -> dict[str, Interval]:
+def _errors(results: SeedResults, chosen: Callable[[FoldResult], FloatArray]) -> dict[str, ScoreInterval]:
     """Intervals of the mean absolute errors over all folds of a seed."""
     by_seed = [np.concatenate([chosen(found) for found in seed]) for seed in results]
     if not all(map(len, by_seed)):
         return {}
     errors = [mean_errors(values) for values in by_seed]
-    return {name: Interval.of([entry[name] for entry in errors]) for name in MARKERS}
+    return {name: ScoreInterval.of([entry[name] for entry in errors]) for name in MARKERS}
 
 
 def _per_marker(results: SeedResults) -> list[float]:

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from compare.crossval.folds import ALL, SCHEMES
 from compare.crossval.result import CaseResult, CrossvalResult
-from compare.crossval.scores import BASELINES, FIELD_NAMES, FIELDS, LEVEL, Interval
+from compare.crossval.scores import BASELINES, FIELD_NAMES, FIELDS, LEVEL, ScoreInterval
 from compare.crossval.study import CrossvalStudy
 from compare.evaluation.truths import Truth
 from compare.runtime.tables import NONE, TextTable, distance, percent, significant, terminal_table
@@ -216,7 +216,7 @@ def _marker_row(result: CaseResult, label: str, scheme: str) -> list[str]:
     ]
 
 
-def _mm(interval: Interval | None) -> str:
+def _mm(interval: ScoreInterval | None) -> str:
     return NONE if interval is None else f"{interval.mean:.3f}"
 
 

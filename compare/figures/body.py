@@ -31,7 +31,7 @@ PERCENT = 99.5
 """Share of the area within a colour scale; peaks at re-entrant corners would leave the rest in one colour."""
 
 
-class Scale(NamedTuple):
+class ColourScale(NamedTuple):
     """A colour scale that several pictures share."""
 
     low: float  # value of the first colour
@@ -51,15 +51,17 @@ class Scale(NamedTuple):
         return np.asarray(rgba, dtype=np.uint8)[:, :3]
 
 
-def sequential(values: FloatArray, weights: FloatArray) -> Scale:
+def sequential(values: FloatArray, weights: FloatArray) -> ColourScale:
     """A scale from zero to the percentile of values, shape (t,), under area weights, shape (t,)."""
-    return Scale(0.0, _positive(weighted_percentile(values, weights, PERCENT)), mpl.colormaps["viridis"])
+    return ColourScale(
+        0.0, _positive(weighted_percentile(values, weights, PERCENT)), mpl.colormaps["viridis"]
+    )
 
 
-def symmetric(fields: Sequence[FloatArray], weights: FloatArray) -> Scale:
+def symmetric(fields: Sequence[FloatArray], weights: FloatArray) -> ColourScale:
     """A scale symmetric about zero that covers the percentile of the absolute value in each of the fields."""
     limit = max((weighted_percentile(np.abs(values), weights, PERCENT) for values in fields), default=0.0)
-    return Scale(-_positive(limit), _positive(limit), diverging())
+    return ColourScale(-_positive(limit), _positive(limit), diverging())
 
 
 @cache
@@ -247,7 +249,7 @@ def round_length(wanted: float) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
 
-def colour_bar(axes: Axes, scale: Scale, title: str, *, extend: str = "neither") -> None:
+def colour_bar(axes: Axes, scale: ColourScale, title: str, *, extend: str = "neither") -> None:
     """A horizontal colour bar that fills `axes`, with quantity and unit under its ticks.
 
     `extend` are the ends with values beyond the scale: `neither`, `min`, `max` or `both`.

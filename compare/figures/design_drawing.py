@@ -34,7 +34,7 @@ from geometry.finger.section import (
 from geometry.section.section import Section
 from geometry.section.thickness import inner_normals
 
-Place = Sequence[float] | FloatArray
+LabelPlace = Sequence[float] | FloatArray
 CENTRE_LINE = (0, (6, 2, 1, 2))
 """Dashes and dots of a line that is no edge."""
 
@@ -53,7 +53,7 @@ class Draughtsman:
     axes: Axes  # their data coordinates are mm
     em: float  # height of the type, mm of the drawing: the measure of every gap
 
-    def between(self, start: Place, end: Place, away: Place, text: str) -> None:
+    def between(self, start: LabelPlace, end: LabelPlace, away: LabelPlace, text: str) -> None:
         """A length from `start` to `end` with extension lines to its dimension line, which is `away`, mm."""
         shift = np.asarray(away, dtype=np.float64)
         length = float(np.linalg.norm(shift))
@@ -66,7 +66,9 @@ class Draughtsman:
         label = self.text((tail + head) / 2, text, rotation=turn, va="center", rotation_mode="anchor")
         label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 1.2})
 
-    def thickness(self, outer: Place, inner: Place, elbow: Place, text: str, *, side: str = "left") -> None:
+    def thickness(
+        self, outer: LabelPlace, inner: LabelPlace, elbow: LabelPlace, text: str, *, side: str = "left"
+    ) -> None:
         """A thickness between points on two faces, by arrows from outside and a leader from the outer one.
 
         The leader ends at the elbow, where the text stands with its `left`, `right` or `center`.
@@ -82,7 +84,14 @@ class Draughtsman:
         self.text((elbow[0] + gap, elbow[1]), text, ha=side, va=vertical)
 
     def angle(
-        self, corner: Place, first: Place, second: Place, radius: float, text: str, *, side: str = "center"
+        self,
+        corner: LabelPlace,
+        first: LabelPlace,
+        second: LabelPlace,
+        radius: float,
+        text: str,
+        *,
+        side: str = "center",
     ) -> None:
         """The angle between two unit vectors, as an arc of a radius, mm, around the corner where they start.
 
@@ -100,12 +109,12 @@ class Draughtsman:
             centre + middle / np.linalg.norm(middle) * (radius + 1.2 * self.em), text, va="top", ha=side
         )
 
-    def text(self, where: Place, text: str, **options: Any) -> Text:
+    def text(self, where: LabelPlace, text: str, **options: Any) -> Text:
         """Text with a white halo, in the drawing's type."""
         settings: dict[str, Any] = {"ha": "center", "color": INK, "zorder": 7, "path_effects": HALO} | options
         return self.axes.text(float(where[0]), float(where[1]), text, **settings)
 
-    def line(self, start: Place, end: Place, style: Any = "-") -> None:
+    def line(self, start: LabelPlace, end: LabelPlace, style: Any = "-") -> None:
         """A thin line between two points, mm."""
         self.axes.plot(
             [start[0], end[0]], [start[1], end[1]], color=INK, linewidth=0.6, linestyle=style, zorder=5
@@ -121,7 +130,7 @@ class Draughtsman:
                 found.append(shapely.Point(text.get_position()).buffer(0.7 * self.em))
         return found
 
-    def _arrow(self, tail: Place, head: Place, style: str) -> None:
+    def _arrow(self, tail: LabelPlace, head: LabelPlace, style: str) -> None:
         arrow(self.axes, tail, head, style=f"{style},head_width=0.12,head_length=0.3", width=0.6)
 
 

@@ -10,7 +10,7 @@ from compare.evaluation.comparison import TRUTH, Results
 from compare.evaluation.evaluation import Evaluation, field_difference, weighted_percentile
 from compare.evaluation.metrics import COMPONENTS
 from compare.figures import body
-from compare.figures.body import PERCENT, Scale, diverging, sequential, symmetric
+from compare.figures.body import PERCENT, ColourScale, diverging, sequential, symmetric
 from compare.figures.canvas import Canvas
 from compare.figures.style import axes_at, write_heading
 from compare.runtime.tables import percent, significant
@@ -85,7 +85,7 @@ def triangle_values(quantity: FieldQuantity, evaluation: Evaluation) -> FloatArr
     return evaluation.per_triangle(quantity.values(evaluation))
 
 
-def field_scale(quantity: FieldQuantity, mesh: TriangleMesh, reference: Evaluation) -> Scale:
+def field_scale(quantity: FieldQuantity, mesh: TriangleMesh, reference: Evaluation) -> ColourScale:
     """The scale that every solver's field is drawn on: it covers the percentile of the reference's area."""
     values = triangle_values(quantity, reference)
     return symmetric([values], mesh.areas) if quantity.signed else sequential(values, mesh.areas)
@@ -93,7 +93,7 @@ def field_scale(quantity: FieldQuantity, mesh: TriangleMesh, reference: Evaluati
 
 def difference_scale(
     quantity: FieldQuantity, mesh: TriangleMesh, evaluation: Evaluation, reference: Evaluation
-) -> Scale:
+) -> ColourScale:
     """The scale of a solver's difference, its own: beside one that is far away, a near one would be blank."""
     difference = triangle_values(quantity, evaluation) - triangle_values(quantity, reference)
     return symmetric([difference], mesh.areas)
@@ -168,7 +168,7 @@ def draw_field(comparison: Results, quantity: FieldQuantity, solvers: Collection
         bars = [
             (scale, f"${quantity.symbol}$, {quantity.unit}"),
             (
-                Scale(-1.0, 1.0, diverging()),
+                ColourScale(-1.0, 1.0, diverging()),
                 f"difference of ${quantity.symbol}$, share of the panel's own scale",
             ),
         ]
@@ -202,7 +202,7 @@ def draw_differences(
     height = width * extent.height / extent.width
     values = [triangle_values(quantity, each) - triangle_values(quantity, base) for each in others]
     sizes = sorted(symmetric([each], mesh.areas).high for each in values)
-    scale = Scale(-(high := sizes[len(sizes) // 2]), high, diverging())
+    scale = ColourScale(-(high := sizes[len(sizes) // 2]), high, diverging())
     total = HEAD + rows * (PANEL_TITLE + height) + FOOT
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
         write_heading(drawn, f"{quantity.title} minus {_name(base)}, one scale for all")
@@ -231,10 +231,10 @@ def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: E
     axes.text(0.02, 0.95, text, va="top", size=SMALL, color=MUTED, linespacing=1.35, transform=axes.transAxes)
 
 
-def excess_scale(mesh: TriangleMesh, densities: Sequence[FloatArray]) -> Scale:
+def excess_scale(mesh: TriangleMesh, densities: Sequence[FloatArray]) -> ColourScale:
     """The logarithmic scale that every solver shares; it ends at the highest percentile of any of them."""
     high = max(weighted_percentile(density, mesh.areas, PERCENT) for density in densities)
-    return Scale(high / 10**DECADES, high, mpl.colormaps["viridis"], log=True)
+    return ColourScale(high / 10**DECADES, high, mpl.colormaps["viridis"], log=True)
 
 
 def draw_excess(comparison: Results) -> Figure | None:

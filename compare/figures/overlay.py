@@ -12,7 +12,7 @@ from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import body
-from compare.figures.body import Scale
+from compare.figures.body import ColourScale
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
 from geometry.arrays import FloatArray
@@ -36,7 +36,7 @@ def draw_overlay(comparison: Results) -> Figure:
     extent = overlay_extent(comparison, width)
     height = width * extent.height / extent.width
     high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
-    scale = Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
+    scale = ColourScale(0.0, high or 1.0, mpl.colormaps["viridis"])
     notes = []
     if any(evaluation.in_sample for evaluation in evaluations):
         notes.append("† was given these markers and meets them; held out: each predicted from the others")
@@ -92,7 +92,9 @@ def _magnitude(mesh: TriangleMesh, evaluation: Evaluation) -> FloatArray:
     return np.asarray(size[mesh.triangles].mean(axis=1))
 
 
-def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Results, evaluation: Evaluation) -> None:
+def _panel(
+    axes: Axes, canvas: Canvas, scale: ColourScale, comparison: Results, evaluation: Evaluation
+) -> None:
     mesh, observations = comparison.mesh, comparison.observations
     deformed = mesh.points + evaluation.node_displacement
     body.prepare(axes, canvas.extent)

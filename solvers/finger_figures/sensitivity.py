@@ -33,7 +33,7 @@ LEAST = 0.005
 """Smallest share that `plot` shows, percent per percent."""
 
 
-class Parameter(NamedTuple):
+class VariedParameter(NamedTuple):
     """A parameter with the problems a step below and above it."""
 
     name: str
@@ -45,7 +45,7 @@ class Parameter(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity:
+class LocalSensitivity:
     """Derivatives of a finger's figures by its parameters.
 
     Attributes:
@@ -128,7 +128,7 @@ class Sensitivity:
         return self.derivatives[figure]
 
 
-def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 2) -> Sensitivity:
+def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 2) -> LocalSensitivity:
     """Derivatives of a finger's figures by every continuous parameter that it has.
 
     The mesh follows the parameters, so that the derivatives are those of the discrete solution: exact but
@@ -155,17 +155,19 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
         progress(0.5 + 0.5 * number / len(parameters), each.name)
     varied.close()
     values = {each.name: each.value for each in parameters}
-    return Sensitivity(figures, values, {each.name: each.unit for each in parameters}, derivatives)
+    return LocalSensitivity(figures, values, {each.name: each.unit for each in parameters}, derivatives)
 
 
-def _parameters(problem: Problem) -> Iterator[Parameter]:
+def _parameters(problem: Problem) -> Iterator[VariedParameter]:
     """The parameters on which the problem depends."""
     if isinstance(problem.finger, Design):
         yield from _of_design(problem, problem.finger)
     material, load = problem.material, problem.load
 
-    def varied(name: str, value: float, unit: str, step: float, at: Callable[[float], Problem]) -> Parameter:
-        return Parameter(name, value, unit, step, at(value - step), at(value + step))
+    def varied(
+        name: str, value: float, unit: str, step: float, at: Callable[[float], Problem]
+    ) -> VariedParameter:
+        return VariedParameter(name, value, unit, step, at(value - step), at(value + step))
 
     def of_constant(name: str) -> Callable[[float], Problem]:
         return lambda to: replace(problem, material=material.model_copy(update={name: to}))
@@ -194,7 +196,7 @@ def _parameters(problem: Problem) -> Iterator[Parameter]:
         yield varied("radius", load.radius, "mm", STEP, rounded)
 
 
-def _of_design(problem: Problem, design: Design) -> Iterator[Parameter]:
+def _of_design(problem: Problem, design: Design) -> Iterator[VariedParameter]:
     mesh = MovingMesh(problem.mesh, design)
     for name, field in Design.model_fields.items():
         value = design.contact_abscissa if name == "contact_position" else getattr(design, name)
@@ -212,4 +214,4 @@ def _of_design(problem: Problem, design: Design) -> Iterator[Parameter]:
                 break
             ends.append(replace(problem, mesh=moved, finger=finger))
         if len(ends) == 2 and ends[0].mesh.digest != ends[1].mesh.digest:
-            yield Parameter(name, float(value), unit, step, *ends)
+            yield VariedParameter(name, float(value), unit, step, *ends)

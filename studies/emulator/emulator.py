@@ -127,7 +127,7 @@ class Emulator:
         return Predictions(chosen, *whole.transpose(1, 2, 0))
 
 
-def fitted(
+def fitted_emulator(
     sweep: Sweep,
     inputs: Inputs,
     stages: Stages | None = None,

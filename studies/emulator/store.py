@@ -14,7 +14,7 @@ from geometry.atomic import write_bytes
 from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from geometry.text_files import read_json
-from studies.emulator.emulator import Emulator, Learnt, fitted
+from studies.emulator.emulator import Emulator, Learnt, fitted_emulator
 from studies.emulator.gaussian_process import GaussianProcess
 from studies.emulator.inputs import Inputs
 from studies.sweep.sweep import STUDY_FILE, Sweep, load_sweep
@@ -40,7 +40,7 @@ def emulator_of(folder: Path, *, refit: bool = False, stages: Stages | None = No
     file, digest = folder / FILE, digest_of(sweep, inputs)
     kept = None if refit else load(file, inputs, digest)
     if kept is None:
-        kept = fitted(sweep, inputs, stages)
+        kept = fitted_emulator(sweep, inputs, stages)
         save(file, kept, digest)
     return kept
 

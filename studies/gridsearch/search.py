@@ -15,7 +15,7 @@ from solvers.problem import Problem
 from studies.gridsearch.chart import draw_grid
 from studies.gridsearch.training_run import GridPoint, TrainingRun, best_of
 from studies.sweep.job import StudyJob
-from studies.sweep.quantities import TRAINING, heading
+from studies.sweep.quantities import TRAINING, quantity_heading
 from studies.sweep.study import Range, Study, Value, physics_of
 from studies.sweep.sweep import run_sweep
 
@@ -103,7 +103,7 @@ def _row(rank: int, run: TrainingRun) -> dict[str, Cell]:
         "status": run.status,
     }
     measured = run.measured or {}
-    row |= {heading(name): measured.get(name, "") for name in TRAINING}
+    row |= {quantity_heading(name): measured.get(name, "") for name in TRAINING}
     return row | {"message": run.message}
 
 

@@ -15,7 +15,7 @@ from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.validation import broken_rule
 from geometry.notebook import brief
-from studies.emulator.emulator import fitted
+from studies.emulator.emulator import fitted_emulator
 from studies.emulator.inputs import Inputs
 from studies.optimum.front import hypervolume, reference_point, unbeaten
 from studies.optimum.question import ENOUGH, Question
@@ -143,7 +143,7 @@ def _proposed(
         return more
     inputs = Inputs(question, job.task(0, fingers[0]).definition)
     with threadpool_limits(1):  # the same sums, whatever the number of cores
-        emulator = fitted(Sweep(question, fingers, measured), inputs, fewest=ENOUGH, quick=True)
+        emulator = fitted_emulator(Sweep(question, fingers, measured), inputs, fewest=ENOUGH, quick=True)
         costs = _allowed_costs(question, measured)
         every = np.array([question.costs(each.values) for each in measured if each.state == "done"])
         found = proposals(

@@ -29,7 +29,7 @@ TRAINING: Mapping[str, Quantity] = {
 """What a training gives besides, compared with `fem`."""
 
 
-def heading(name: str) -> str:
+def quantity_heading(name: str) -> str:
     """Column heading of a quantity or of a training's, its name with the unit, such as `force_N`."""
     return heading_of(name, {**QUANTITIES, **TRAINING}[name])
 

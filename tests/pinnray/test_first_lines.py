@@ -20,7 +20,7 @@ from geometry.finger.keywords import FingerKeywords
 from geometry.finger.parameters import Parameters
 from geometry.mesh.settings import MeshSettings
 from pinnray.arguments import LOAD, MATERIAL, JobKeywords, MeshKeywords, PhysicsKeywords
-from pinnray.solution import Quantity
+from pinnray.solution import FieldName
 from solvers.finger_figures import figures_of
 from solvers.physics import Physics
 
@@ -238,9 +238,9 @@ def test_a_solution_is_shown_deformed(solved: pr.Solution, monkeypatch: pytest.M
         solved.show("stress")
 
 
-@pytest.mark.parametrize("quantity", get_args(Quantity))
-def test_every_quantity_of_the_viewer_is_plotted(solved: pr.Solution, quantity: Quantity):
-    assert [each.name for each in VIEWED] == list(get_args(Quantity))
+@pytest.mark.parametrize("quantity", get_args(FieldName))
+def test_every_quantity_of_the_viewer_is_plotted(solved: pr.Solution, quantity: FieldName):
+    assert [each.name for each in VIEWED] == list(get_args(FieldName))
     drawn = solved.plot(quantity)
     low, high = drawn.axes[1].get_xlim()
     signed = next(each.signed for each in VIEWED if each.name == quantity)

@@ -13,7 +13,7 @@ from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import Marks
 from geometry.drawing.formats.drawing import Drawing, label_of
 from geometry.drawing.formats.dxf_blocks import Walk, sound
-from geometry.drawing.formats.dxf_file import document_of, scale_of
+from geometry.drawing.formats.dxf_file import document_of, dxf_scale
 from geometry.drawing.formats.pieces import Curve, Piece, arc_through, arcs_along, full_circle, line
 from geometry.errors import UserError
 
@@ -34,7 +34,7 @@ def read_dxf(path: Path, units: str | None = None, tolerance: float | None = Non
         tolerance: Largest gap between two ends that is closed, mm; None means 0.001 mm.
     """
     document, repaired = document_of(path)
-    scale = scale_of(document, path, units)
+    scale = dxf_scale(document, path, units)
     marks, pieces, unit = Marks(), list[Piece](), min(scale.length, 1e4)
     for entity, shown in Walk(document):
         layer = label_of(shown)

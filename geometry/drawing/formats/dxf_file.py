@@ -74,7 +74,7 @@ def document_of(path: Path) -> tuple[Any, str]:
     return document, ", repaired"
 
 
-def scale_of(document: Any, path: Path, units: str | None) -> Scale:
+def dxf_scale(document: Any, path: Path, units: str | None) -> Scale:
     """Unit of the coordinates: the given one, that of the header, or mm.
 
     Raises:

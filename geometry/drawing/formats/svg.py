@@ -13,7 +13,7 @@ from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import Marks
 from geometry.drawing.formats.drawing import LABELS, Drawing, label_of
 from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
-from geometry.drawing.formats.svg_tree import NAMESPACE, drawn, scale_of, tag_of
+from geometry.drawing.formats.svg_tree import NAMESPACE, drawn, svg_scale, tag_of
 from geometry.errors import UserError
 
 ASSUMED = '(assumed: 96 pixels to an inch; give units, such as "pt" for 72)'
@@ -40,7 +40,7 @@ def read_svg(path: Path, units: str | None = None, tolerance: float | None = Non
         root = ET.parse(path).getroot()
         if (tag := tag_of(root)) != "svg":
             raise UserError(f"its outermost element is {tag or root.tag}, not svg")
-        scale = scale_of(root, units)
+        scale = svg_scale(root, units)
         tree = drawn(root)
         parsed = svgelements.SVG.parse(BytesIO(ET.tostring(tree)), reify=False)
         back = ~svgelements.Matrix(parsed.viewbox_transform or "")

@@ -73,7 +73,7 @@ def view_box(element: ET.Element) -> ViewBox | None:
     return ViewBox(*numbers)
 
 
-def scale_of(root: ET.Element, units: str | None) -> Scale:
+def svg_scale(root: ET.Element, units: str | None) -> Scale:
     """Length of a user unit by `width`, `height` and `viewBox`, or the given one.
 
     Raises:

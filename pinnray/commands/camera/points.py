@@ -33,15 +33,15 @@ def points(
             millimetres per unit of both pictures, such as 0.21,0.22.
         out: Output file.
     """
-    from vision.clicked_points import Scale, clicked_points, read_clicks
+    from vision.clicked_points import LengthScale, clicked_points, read_clicks
     from vision.measurements import write_measurements
 
     design, _ = finger.read()
     if out.suffix.lower() != ".csv":
         raise UserError(f"--out {out}: give the name of a table, such as observations.csv")
-    chosen: Scale | tuple[float, float]
-    if scale in get_args(Scale):
-        chosen = cast(Scale, scale)
+    chosen: LengthScale | tuple[float, float]
+    if scale in get_args(LengthScale):
+        chosen = cast(LengthScale, scale)
     else:
         given = read_numbers("--scale", scale, counts=(1, 2))
         if not all(0 < each < 1e6 for each in given):

@@ -50,7 +50,9 @@ def predict(
     rows = read_rows(csv) if csv else [finger_given(set)]
     with Stages() as stages:
         emulator = emulator_of(sweep, refit=refit, stages=stages)
-    fingers = [read_finger(emulator, row, f"{csv}, row {place}: " if csv else "") for place, row in rows]
+    fingers = [
+        finger_of_options(emulator, row, f"{csv}, row {place}: " if csv else "") for place, row in rows
+    ]
     found = emulator.predict(fingers)
     if csv is None:
         print_table(emulator, found)
@@ -101,7 +103,7 @@ def read_rows(file: Path) -> list[tuple[int, dict[str, str]]]:
     ]
 
 
-def read_finger(emulator: "Emulator", settings: dict[str, str], where: str) -> "dict[str, Value]":
+def finger_of_options(emulator: "Emulator", settings: dict[str, str], where: str) -> "dict[str, Value]":
     """A finger that the emulator predicts; else a `UserError`."""
     try:
         finger = emulator.inputs.read(settings)

@@ -22,7 +22,7 @@ from compare.crossval.folds import (
 )
 from compare.crossval.output_files import draw_fields, draw_held_out, draw_weight_sweeps
 from compare.crossval.result import Case, CaseResult, CrossvalResult
-from compare.crossval.scores import Difference, Interval, differences, of_scheme, score
+from compare.crossval.scores import Difference, ScoreInterval, differences, of_scheme, score
 from compare.crossval.study import EVERY_TRUTH, CrossvalStudy, solver_variants
 from compare.crossval.tables import truth_tables, verdict_sentences
 from compare.evaluation.truths import TRUTHS
@@ -97,7 +97,7 @@ def test_scores_by_hand():
     assert found.fields["displacement"].mean == pytest.approx((0.2 + 0.25) / 2)
     assert found.coverage == 0.5  # 1 / 2 and 2 / 2 and both 0.5 / 1 are within 1.96, 2 / 0.5 and 4 / 1 not
     assert found.per_marker == pytest.approx([3.5, 4.5])
-    assert np.isnan(Interval.of([1.0]).low)
+    assert np.isnan(ScoreInterval.of([1.0]).low)
 
 
 def test_a_difference_is_paired_by_fold():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compare.evaluation.evaluation import Evaluation
-from compare.figures.body import Scale, diverging, sequential, symmetric
+from compare.figures.body import ColourScale, diverging, sequential, symmetric
 from compare.figures.fields import QUANTITIES, difference_scale, field_scale, max_principal
 from geometry.mesh.triangle_mesh import TriangleMesh
 
@@ -29,7 +29,7 @@ def test_a_field_of_zeros_can_be_drawn() -> None:
 
 
 def test_values_beyond_the_scale_take_the_end_colours() -> None:
-    scale = Scale(0.0, 1.0, diverging())
+    scale = ColourScale(0.0, 1.0, diverging())
     painted = scale.paint(np.array([-5.0, 0.0, 1.0, 5.0]))
     np.testing.assert_array_equal(painted[[0, 3]], painted[[1, 2]])
 

@@ -122,7 +122,7 @@ def test_some_quantities_alone_are_the_same(emulator: Emulator) -> None:
 
 
 def test_it_is_kept_to_the_bit(folder: Path, emulator: Emulator, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "fitted", None)  # a second fit would fail
+    monkeypatch.setattr(module, "fitted_emulator", None)  # a second fit would fail
     first, again = emulator.predict([FINGER]), emulator_of(folder).predict([FINGER])
     for one, other in zip(first.__dict__.values(), again.__dict__.values(), strict=True):
         assert np.array_equal(one, other)
