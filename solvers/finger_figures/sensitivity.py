@@ -11,9 +11,11 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.parameters import parameter_info
 from geometry.mesh.design_motion import MovingMesh
+from geometry.mesh.wall_motion import WallMotion
 from solvers.fem.variation import VariedProblem
 from solvers.finger_figures.figures import QUANTITIES, FingerFigures, figures_of
 from solvers.problem import Problem
+from solvers.solution import Solution
 from solvers.solver import Progress, silent
 
 if TYPE_CHECKING:
@@ -135,7 +137,7 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
     for rounding, which leaves six digits. A parameter at zero, such as a fillet that is not there, has none.
 
     Args:
-        problem: Of a design, or of a drawn finger, which has none of the design's parameters.
+        problem: Of a design, or of a drawn finger, of whose section the walls' thicknesses are varied.
         progress: Called as it proceeds.
         degree: Of the elements, 1 or 2.
 
@@ -149,7 +151,7 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
     derivatives: dict[str, dict[str, float]] = {name: {} for name in QUANTITIES if name not in SMALLEST}
     pairs = [(each.low, each.high) for each in parameters]
     for number, (each, ends) in enumerate(zip(parameters, varied.solutions(pairs), strict=True)):
-        low, high = (figures_of(end).values() for end in ends)
+        low, high = map(_values, ends)
         for name, slopes in derivatives.items():
             slopes[each.name] = (high[name] - low[name]) / (2 * each.step)
         progress(0.5 + 0.5 * number / len(parameters), each.name)
@@ -158,10 +160,18 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
     return LocalSensitivity(figures, values, {each.name: each.unit for each in parameters}, derivatives)
 
 
+def _values(solution: Solution) -> dict[str, float]:
+    """The figures; area and mass of the mesh, which alone follows the walls of a drawn finger."""
+    found, area = figures_of(solution).values(), float(solution.problem.mesh.areas.sum())
+    return found | {"area": area, "mass": found["mass"] * area / found["area"]}
+
+
 def _parameters(problem: Problem) -> Iterator[VariedParameter]:
     """The parameters on which the problem depends."""
     if isinstance(problem.finger, Design):
         yield from _of_design(problem, problem.finger)
+    else:
+        yield from _of_walls(problem)
     material, load = problem.material, problem.load
 
     def varied(
@@ -194,6 +204,16 @@ def _parameters(problem: Problem) -> Iterator[VariedParameter]:
             return replace(problem, load=load.model_copy(update={"radius": radius}))
 
         yield varied("radius", load.radius, "mm", STEP, rounded)
+
+
+def _of_walls(problem: Problem) -> Iterator[VariedParameter]:
+    motion = WallMotion.of(problem.mesh)
+    for name, thickness in zip(motion.names, motion.thickness.tolist(), strict=True):
+        low, high = (
+            replace(problem, mesh=replace(problem.mesh, points=motion.moved(motion.changes({name: to}))))
+            for to in (thickness - STEP, thickness + STEP)
+        )
+        yield VariedParameter(name, thickness, "mm", STEP, low, high)
 
 
 def _of_design(problem: Problem, design: Design) -> Iterator[VariedParameter]:

@@ -5,6 +5,7 @@ import pytest
 
 import pinnray as pr
 from geometry.cache import finger_mesh
+from geometry.finger.svg import section_svg
 from geometry.mesh.design_motion import MovingMesh
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -89,6 +90,21 @@ def test_figures_in_proportion_have_shares_of_one(mesh):
     assert found.plot("wrap")._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
     with pytest.raises(pr.UserError, match="there is no figure 'forse'; there are force"):
         found.relative("forse")
+
+
+def test_a_drawn_finger_has_its_walls(tmp_path):
+    """They become thicker into the cavities; by how much the force changes is nearly that of the design."""
+    design = pr.load_design("default")
+    file = tmp_path / "drawn.svg"
+    file.write_text(section_svg(design))
+    drawn = pr.sensitivity(file, size=1.0, stroke=4.0)
+    designed = pr.sensitivity(design, size=1.0, stroke=4.0)
+    for name in ("rib_thickness", "front_thickness", "back_thickness"):
+        own, other = (found.derivatives["force"][name] for found in (drawn, designed))
+        assert own == pytest.approx(other, rel=0.1), name
+        assert drawn.derivatives["mass"][name] > 0
+    assert drawn.tolerance("force") == pytest.approx(designed.tolerance("force"), rel=0.05)
+    assert "height" not in drawn.values
 
 
 def test_the_mesh_follows_every_parameter_of_its_section(short_mesh):
