@@ -40,6 +40,7 @@ def sensitivity(
     """How every figure of a finger changes with each parameter: `sensitivity(stroke=8).plot("force")`.
 
     The derivatives are exact for the elements of `fem`, or of `fem-nonlinear` for a law of finite strain.
+    Warns of numbers that look like another unit, and of a body that goes through itself.
 
     Args:
         design: A finger in one of the ways of `mesh`.
@@ -52,6 +53,8 @@ def sensitivity(
     Raises:
         UserError: If the load has friction or the body several materials, or the full load is not reached.
     """
+    from compare.evaluation.deformed_body import DeformedBody
+    from compare.evaluation.plausibility import problem_remarks
     from compare.runtime.stages import shown_stages
     from geometry.cache import finger_mesh
     from solvers.finger_figures.sensitivity import sensitivity_of
@@ -62,8 +65,13 @@ def sensitivity(
     with shown_stages(progress) as stages:
         with stages.stage("mesh"):
             triangles = finger_mesh(finger, settings=mesh_settings(size))
+        problem = Problem(triangles, elastic, moved, None, finger)
         with stages.stage("sensitivity") as report:
-            return sensitivity_of(Problem(triangles, elastic, moved, None, finger), report)
+            found = sensitivity_of(problem, report)
+    _, faults = DeformedBody(triangles).status(found.solution)
+    for remark in [*problem_remarks(problem), *faults]:
+        warnings.warn(remark, stacklevel=2)
+    return found
 
 
 def sweep(

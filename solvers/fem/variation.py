@@ -17,6 +17,7 @@ from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
 from solvers.fem.finite_strain.nested_path import coarser
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
@@ -33,13 +34,16 @@ class VariedProblem:
     """The equilibrium of a problem by `fem` or `fem-nonlinear`, as its law is, and of problems near it.
 
     Raises:
-        UserError: If there is friction, which depends on the way, or the body has several materials.
+        UserError: If there is friction, which depends on the way, the body has several materials, or the load
+            is a cylinder and the law linear.
         NoSolutionError: If the equilibrium under the full load is not found or not stable.
     """
 
     def __init__(self, problem: Problem, progress: Progress = silent, degree: int = 2) -> None:
         if problem.load.friction:
             raise UserError("derivatives are without friction, whose forces depend on the way to the load")
+        if problem.load.kind == "cylinder" and problem.material.law == "linear":
+            raise UserError("a cylinder needs a law of finite strain: set law = neo-hookean")
         if problem.mesh.moduli is not None:
             raise UserError("derivatives are of a body of one material")
         self._problem, self._degree = problem, degree
@@ -120,7 +124,7 @@ class VariedProblem:
         space, equilibrium = LagrangeSpace(problem.mesh, self._degree), self._equilibrium
         equilibrium.vary(problem)
         return Solution(
-            solver="fem" if equilibrium.linear else FemNonlinearSolver.name,
+            solver=FemSolver.name if equilibrium.linear else FemNonlinearSolver.name,
             problem=problem,
             field=LagrangeField(space, nodal),
             energy=equilibrium.energy(nodal),

@@ -113,11 +113,6 @@ class FingerFigures:
         """How far the tip moves, mm."""
         return float(np.hypot(self.tip_u, self.tip_v))
 
-    @property
-    def tip_direction(self) -> float:
-        """Direction in which the tip moves, degrees counter-clockwise from the finger's axis."""
-        return float(np.degrees(np.arctan2(self.tip_v, self.tip_u)))
-
     def force_at(self, stroke: float) -> float:
         """Force of the indenter, N, after a travel, mm; between computed equilibria it is interpolated.
 

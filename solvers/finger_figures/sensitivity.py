@@ -51,12 +51,14 @@ class LocalSensitivity:
     """Derivatives of a finger's figures by its parameters.
 
     Attributes:
+        solution: About which the figures change.
         figures: What the finger does.
         values: Of the parameters, in `units`.
         derivatives: Of the figures of `QUANTITIES`, but for the smallest wall and gap, by every parameter, in
             the figure's unit over the parameter's; NaN where a figure is not known.
     """
 
+    solution: Solution
     figures: FingerFigures
     values: Mapping[str, float]
     units: Mapping[str, str]
@@ -102,6 +104,8 @@ class LocalSensitivity:
         from geometry.figure import CONTACT, INK, WIDTH, figure
 
         shares = {each: share for each, share in self.relative(name).items() if abs(share) >= LEAST}
+        if not shares:
+            raise UserError(f"no parameter changes {name}, which is {getattr(self.figures, name):.4g}")
         order = sorted(shares, key=lambda each: abs(shares[each]))
         room, side = 0.19 * len(order), 1.45  # inches
         total = room + 0.95
@@ -147,7 +151,8 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
     """
     parameters = list(_parameters(problem))
     varied = VariedProblem(problem, lambda share, text: progress(0.5 * share, text), degree)
-    figures = figures_of(varied.solution)
+    solution = varied.solution
+    figures = figures_of(solution)
     derivatives: dict[str, dict[str, float]] = {name: {} for name in QUANTITIES if name not in SMALLEST}
     pairs = [(each.low, each.high) for each in parameters]
     for number, (each, ends) in enumerate(zip(parameters, varied.solutions(pairs), strict=True)):
@@ -157,7 +162,8 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
         progress(0.5 + 0.5 * number / len(parameters), each.name)
     varied.close()
     values = {each.name: each.value for each in parameters}
-    return LocalSensitivity(figures, values, {each.name: each.unit for each in parameters}, derivatives)
+    units = {each.name: each.unit for each in parameters}
+    return LocalSensitivity(solution, figures, values, units, derivatives)
 
 
 def _values(solution: Solution) -> dict[str, float]:

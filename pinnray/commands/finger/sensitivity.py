@@ -28,6 +28,7 @@ def sensitivity(
         young_error: Half of the 95 % interval of Young's modulus, over its value.
         out: CSV file of the derivatives; the picture is beside it.
     """
+    from compare.evaluation.deformed_body import DeformedBody
     from compare.evaluation.plausibility import problem_remarks
     from compare.pipeline.shared_mesh import shared_mesh
     from compare.runtime.stages import Stages
@@ -53,6 +54,9 @@ def sensitivity(
             say(f"warning: {remark}")
         with stages.stage("sensitivity") as progress:
             found = sensitivity_of(problem, progress)
+    _, faults = DeformedBody(triangles).status(found.solution)
+    for fault in faults:
+        say(f"warning: {fault}")
     known = [name for name in found.derivatives if np.isfinite(getattr(found.figures, name))]
     if figure not in known:
         raise UserError(

@@ -126,5 +126,7 @@ def test_what_has_no_derivatives_is_refused(mesh):
     rubbing = Load("cylinder", stroke=4.0, friction=0.3)
     with pytest.raises(pr.UserError, match="without friction"):
         sensitivity_of(Problem(mesh, Material(law="neo-hookean"), rubbing, None, SHORT))
+    with pytest.raises(pr.UserError, match="a cylinder needs a law of finite strain"):
+        sensitivity_of(Problem(mesh, Material(), Load("cylinder", stroke=4.0), None, SHORT))
     with pytest.raises(NoSolutionError, match="stopped at"):
         sensitivity_of(Problem(mesh, Material(law="neo-hookean"), Load(stroke=45.0), None, SHORT))
