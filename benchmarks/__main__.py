@@ -11,9 +11,7 @@ from geometry.errors import UserError
 BENCHMARKS = {
     "results": "results.default_run:main",
     "default": "results.default_time:main",
-    "readings": "results.readings:main",
     "fem": "elements.scikit_fem:main",
-    "plane_strain": "elements.plane_strain:main",
     "pinn": "networks.graded:pinn",
     "designs": "networks.graded:designs",
     "drawings": "networks.graded:drawings",
@@ -22,8 +20,6 @@ BENCHMARKS = {
     "scenes": "tracker.scenes:main",
     "stress": "tracker.stress:main",
     "live": "tracker.live:main",
-    "localisation": "tracker.localisation:main",
-    "dots": "tracker.printed_dots:main",
     "sweep": "sweeps.speed:main",
     "optimise": "sweeps.fronts:main",
     "validation": "validation.document:main",
@@ -43,6 +39,10 @@ SETTLED = (
     "predict",
     "paper",
     "million",
+    "readings",
+    "plane_strain",
+    "localisation",
+    "dots",
 )
 """Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
 

@@ -1,10 +1,7 @@
 """Tables of figures: kept as CSV files, and in Markdown between two marks of a page."""
 
 import csv
-import platform
 from collections.abc import Callable, Iterable, Sequence
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -58,11 +55,3 @@ def fill(page: Path, name: str, table: str) -> None:
 
 def _number(cell: str) -> float | None:
     return float(cell) if cell else None
-
-
-def made_by(command: str) -> str:
-    """When, where and with what versions a command made a table."""
-    return (
-        f"Made by `python -m benchmarks {command}` on {datetime.now(UTC):%Y-%m-%d}: {platform.machine()}, "
-        f"Python {platform.python_version()}, numpy {version('numpy')}"
-    )
