@@ -308,7 +308,7 @@ def test_turned_pictures_are_told_and_cost_statfem_little(tmp_path, in_line):
     """Its held-out error is that of straight pictures within a half; `fem` knows of no picture."""
     frame, errors = '--frame "turn 3 deg, shift 0.3 mm, scale 1 %"', {}
     for name, option in (("straight", ""), ("turned", frame)):
-        line = f"--solvers statfem,fem --schemes one-out --seeds 2 {option}"
+        line = f"--solvers statfem,fem --schemes one-out --seeds 1 {option}"
         assert run(line, tmp_path / name) == 0
         own = layouts_of(tmp_path / name)["joints"]["solvers"]
         errors[name] = {

@@ -147,6 +147,6 @@ def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkey
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in TRUTHS if name != "3d"])  # see test_virtual_experiment
 def test_every_truth_comes_to_its_full_load(study, name):
-    found = true_field(study, TRUTHS[name])
+    found = true_field(replace(study, mesh=MeshSettings(size=2.0)), TRUTHS[name])
     assert 0.1 < found.contact.force < 2.0  # N/mm: thick or thin, sliding or not, it is one finger
     assert np.isfinite(found.sampled.gradient).all()
