@@ -6,6 +6,8 @@ import pytest
 
 from pinnray.cli import compare_main
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
+
 SMALL = ["--solvers", "fem,gp", "--mesh-size", "1.5", "--set", "rib_count=3", "--quiet"]
 
 

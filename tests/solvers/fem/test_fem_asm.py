@@ -32,8 +32,8 @@ def pulled(mesh, load, *, hidden=()):
 
 
 @pytest.fixture(scope="module", params=LOADS)
-def problem(request, coarse_mesh):
-    return pulled(coarse_mesh, Load(kind=request.param), hidden=(3,))
+def problem(request, marked_mesh):
+    return pulled(marked_mesh, Load(kind=request.param), hidden=(3,))
 
 
 SOFT = FemAsmSolver(weights="precision", scale=0.05)
