@@ -47,7 +47,7 @@ def found(refit, problem):
 def test_it_is_near_its_twin(problem, found):
     """Within 0.3 % in displacement, 7 % in stress; the force within a tenth of its own interval.
 
-    Measured: 0.15 %, 4.7 % and an eightieth. Elements of 0.5 mm leave finite elements themselves some 4 % from
+    Measured: 0.15 %, 4.7 % and an eightieth. Elements of 0.5 mm leave finite elements some 4 % from
     converged stress at the corners.
     """
     twin = FemIdSolver().solve(problem)
