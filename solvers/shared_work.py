@@ -26,6 +26,11 @@ class SharedWork:
             _KEPT.reset(token)
 
 
+def is_shared() -> bool:
+    """Whether `shared` keeps results."""
+    return _KEPT.get() is not None
+
+
 def shared(key: Hashable, make: Callable[[], Work]) -> Work:
     """The result under a key, which holds all it depends on; it is kept only inside `SharedWork.used`."""
     kept = _KEPT.get()

@@ -84,11 +84,11 @@ class Certifier:
     """Finite elements of degree 2 on a problem's mesh, by which any displacement is measured."""
 
     def __init__(self, problem: Problem) -> None:
-        from solvers.fem.equilibrium import DiscreteEquilibrium  # it needs DOLFINx
+        from solvers.fem.equilibrium import linear_equilibrium  # it needs DOLFINx
 
         self._problem = problem
         self._space = LagrangeSpace(problem.mesh, 2)
-        self._equilibrium = DiscreteEquilibrium(problem, self._space)
+        self._equilibrium = linear_equilibrium(problem, 2)
         self._rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = self._space.shape_gradients(self._rule.location)
         self._solution = self._equilibrium.linear_guess(1.0).nodal

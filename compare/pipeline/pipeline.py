@@ -9,7 +9,6 @@ from typing import Any
 
 from compare.camera.film import Film
 from compare.evaluation.branches import with_branches
-from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Results, supported_solvers
 from compare.evaluation.deformed_body import with_body_checks
 from compare.evaluation.evaluation import Evaluation
@@ -109,9 +108,8 @@ def compute(job: Job, stages: Stages, folder: Path) -> Results:
                 unsupported |= without
                 observations, remarks = no_displacements(problem, radius, str(error)), [f"no truth: {error}"]
     outcome = solve_all(job, solvers, problem, observations, folder, stages)
-    with stages.stage("certificate"):
-        evaluations = with_certificates(list(outcome.evaluations.values()), problem)
-        evaluations, impossible = with_body_checks(evaluations, mesh, truth)
+    with stages.stage("checks"):
+        evaluations, impossible = with_body_checks(list(outcome.evaluations.values()), mesh, truth)
         evaluations, branches = with_branches(evaluations, problem)
     return Results(
         design=job.design,

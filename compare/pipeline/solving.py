@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
+from compare.evaluation.certification import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import evaluated
 from compare.pipeline.job import Job
@@ -144,7 +145,7 @@ class _Part:
     folder: Path
 
     def outcome(self, stage: Stage) -> Outcome:
-        """Solve with one solver after another, in this process."""
+        """Solve with one solver after another, in this process, and certify the results."""
         outcome = Outcome()
         work = SharedWork()
         for solver in self.solvers:
@@ -160,6 +161,11 @@ class _Part:
                 if solver.name == self.job.reference:
                     raise
                 outcome.failed[solver.name] = self._reason(solver, error)
+        found = outcome.evaluations
+        if any(each.law == "linear" for each in found.values()):
+            with stage("certificate"), work.used():
+                certified = with_certificates(list(found.values()), self.problem)
+                found |= zip(found, certified, strict=True)
         return outcome
 
     def _reason(self, solver: Solver, error: UserError) -> str:

@@ -22,8 +22,10 @@ from solvers.extrusion import NodalSpace
 from solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_conditions
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.linear_solvers import Factorisation, LinearSolver, Multigrid
+from solvers.fem.ranks import communicator
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
+from solvers.shared_work import is_shared, shared
 from solvers.stability import ShiftedStep
 
 QUADRATURE_DEGREE = 4
@@ -35,6 +37,10 @@ ITERATIVE_BEYOND = 10_000_000
 MUMPS is ten times as fast at 3.9 million, but its memory (1.8 GB a million there) grows faster than the
 iterations' (1.4 GB).
 """
+
+
+SHARED_UP_TO = 300_000
+"""Unknowns up to which factors, half a GB there, are kept for the next solver."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +57,8 @@ class DiscreteEquilibrium:
     the full load, mm; `elimination` solves with the constraints and the tangent factorised last, which is the
     stiffness for the linear law.
     """
+
+    shared = False  # Whether other solvers use it too
 
     def __init__(
         self,
@@ -283,3 +291,26 @@ class DiscreteEquilibrium:
         nodal, force = pressing.solution(rest.nodal, np.maximum(-gap[[nearest]], 0.0))
         rest.contact[line] = force[0] * contact.shares
         return replace(rest, nodal=nodal)
+
+
+def linear_equilibrium(
+    problem: Problem, degree: int, linear_solver: LinearSolver = "auto"
+) -> DiscreteEquilibrium:
+    """The discrete problem of a linear law on plane elements, made and factorised once where work is shared.
+
+    Under a mean or point load the factors are those of the body with its base clamped. On several ranks
+    nothing is shared, as rank 0 alone knows what it keeps.
+    """
+    space = LagrangeSpace(problem.mesh, degree)
+
+    def made() -> DiscreteEquilibrium:
+        return DiscreteEquilibrium(problem, space, linear_solver=linear_solver)
+
+    small = space.nodes.size <= SHARED_UP_TO and problem.load.kind in ("mean", "point")
+    if not (small and is_shared() and communicator().size == 1):
+        return made()
+    key = ("equilibrium", problem.mesh.digest, repr(problem.material), degree, linear_solver)
+    found = shared(key, made)
+    found.shared = True
+    found.prescribe(problem)
+    return found

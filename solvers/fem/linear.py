@@ -6,7 +6,7 @@ from typing import get_args
 
 from geometry.errors import UserError
 from solvers.fem.boundary_conditions import reaction_by_residual_work
-from solvers.fem.equilibrium import DiscreteEquilibrium
+from solvers.fem.equilibrium import DiscreteEquilibrium, linear_equilibrium
 from solvers.fem.error_estimate import ErrorEstimator, locking_advice
 from solvers.fem.linear_solvers import LinearSolver
 from solvers.fem.ranks import on_all_ranks
@@ -49,9 +49,7 @@ class FemSolver(ElementSettings):
     def prepare(self, problem: Problem) -> "FactorisedProblem":
         """Assemble and factorise once, to solve for many loads."""
         check_problem(self, problem)
-        space = LagrangeSpace(problem.mesh, self.degree)
-        equilibrium = DiscreteEquilibrium(problem, space, linear_solver=self.linear_solver)
-        return FactorisedProblem(self, equilibrium)
+        return FactorisedProblem(self, problem, linear_equilibrium(problem, self.degree, self.linear_solver))
 
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
@@ -71,16 +69,15 @@ class FactorisedProblem:
     the same components. Loads that differ in their displacement only share the responses to unit forces too.
     """
 
-    def __init__(self, solver: FemSolver, equilibrium: DiscreteEquilibrium) -> None:
-        self._solver, self._equilibrium = solver, equilibrium
-        space = LagrangeSpace(equilibrium.problem.mesh, solver.degree)
-        self._estimator = ErrorEstimator(equilibrium.problem, space)
+    def __init__(self, solver: FemSolver, problem: Problem, equilibrium: DiscreteEquilibrium) -> None:
+        self._solver, self._problem, self._equilibrium = solver, problem, equilibrium
+        self._estimator = ErrorEstimator(problem, LagrangeSpace(problem.mesh, solver.degree))
 
     def solve(self, load: Load) -> Solution:
         """Solve for a load; `seconds` of the solution's `stats` is the time of this call."""
         started = time.perf_counter()
         equilibrium, space = self._equilibrium, self._estimator.space
-        problem = replace(equilibrium.problem, load=load)
+        problem = replace(self._problem, load=load)
         check_problem(self._solver, problem)
         equilibrium.prescribe(problem)
         nodal = equilibrium.linear_guess(1.0).nodal
@@ -116,8 +113,9 @@ class FactorisedProblem:
         )
 
     def destroy(self) -> None:
-        """Free the factors."""
-        self._equilibrium.factors.destroy()
+        """Free the factors, unless others share them."""
+        if not self._equilibrium.shared:
+            self._equilibrium.factors.destroy()
 
 
 def _uncertainty(problem: Problem, error: ErrorEstimate | None) -> str:

@@ -5,10 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compare.evaluation.certification import with_certificates
+from compare.evaluation.metrics import evaluated
+from geometry.finger.design import Design
+from solvers.fem.linear import FemSolver
+from solvers.fem.linear_solvers import Factorisation
+from solvers.finger_figures import figures_at_rest
 from solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalSolver, PinnStdSolver
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from solvers.problem import Load, Problem
 from solvers.shared_work import SharedWork, shared
+from solvers.statistics.statistical_fem import StatFemSolver
 from tests.solvers.conftest import observed_at
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}
@@ -73,6 +80,31 @@ def test_markers_cost_no_factorisation_where_the_network_without_them_was_solved
     np.testing.assert_array_equal(found.left_out, alone.left_out)
     assert found.energy == alone.energy
     assert np.abs(found.displacement(points) - without.displacement(points)).max() > 0.1
+
+
+def test_solvers_of_the_linear_law_share_one_factorisation_of_the_body(observed, monkeypatch):
+    """The solution, the figures at rest, unit displacements and the certificate: with the numbers of each."""
+    made: list[object] = []
+    update = Factorisation.update
+    monkeypatch.setattr(
+        Factorisation, "update", lambda self, *state: made.append(self) or update(self, *state)
+    )
+    plain = replace(observed, observations=None, finger=Design())
+
+    def found():
+        solution = FemSolver().solve(plain)
+        figures = figures_at_rest(plain)
+        markers = StatFemSolver().solve(observed)
+        (certified,) = with_certificates([evaluated(solution, plain.mesh)], plain)
+        nodal = [each.displacement(plain.mesh.points) for each in (solution, markers)]
+        return [*nodal, solution.error.markers, *figures.values(), certified.certificate.energy]
+
+    with SharedWork().used():
+        shared_numbers = found()
+    assert len(made) == 1
+    for one, other in zip(found(), shared_numbers, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert len(made) > 4
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ def test_run_json_tells_where_the_result_comes_from(finished):
     assert told["versions"] == package_versions()
     assert told["machine"]["cores"] > 0
     assert list(told["seconds"]) == [
-        *("mesh", "measurements", "fem", "fem-nonlinear", "certificate", "fields", "pictures")
+        *("mesh", "measurements", "fem", "fem-nonlinear", "certificate", "checks", "fields", "pictures")
     ]
     assert datetime.fromisoformat(told["started"]).tzinfo is not None
 
