@@ -60,7 +60,8 @@ def in_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
 def numbers(evaluation: Evaluation) -> dict[str, Any]:
     """All of an evaluation that is not a time."""
     kept = {key: value for key, value in evaluation.stats.items() if "seconds" not in key}
-    return {**vars(evaluation), "stats": kept, "figures": vars(evaluation.figures)}
+    parts = {name: vars(part) for name in ("figures", "certificate") if (part := getattr(evaluation, name))}
+    return {**vars(evaluation), "stats": kept, **parts}
 
 
 def test_two_processes_give_the_numbers_of_one_and_a_second_run_takes_them_over(solve, tmp_path, monkeypatch):
