@@ -223,7 +223,7 @@ def test_a_truncated_video_is_refused_or_tracked_as_far_as_it_goes(film, tmp_pat
     assert not (tmp_path / "out").exists()
 
 
-def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys):
+def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys, without_pictures):
     out = tmp_path / "out"
     options = ["--solvers", "fem", "--mesh-size", "1", "--camera", str(film / "camera.json")]
     video = str(film / "video.mkv")

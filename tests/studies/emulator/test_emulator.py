@@ -130,7 +130,7 @@ def test_it_is_kept_to_the_bit(folder: Path, emulator: Emulator, monkeypatch: py
 
 def test_a_fit_is_repeatable(tmp_path: Path) -> None:
     made = [
-        emulator_of(synthetic_sweep(tmp_path / name, small_study(), smooth)).predict(
+        emulator_of(synthetic_sweep(tmp_path / name, small_study(40), smooth)).predict(
             [{"rib_thickness": 1.3, "front_thickness": 1.1}], ["force", "tip_v"]
         )
         for name in "ab"
@@ -192,16 +192,16 @@ def test_a_missing_parameter_is_told(emulator: Emulator) -> None:
 
 
 def test_more_samples_fit_it_again(tmp_path: Path) -> None:
-    folder = solved_sweep(tmp_path / "s", count=70, left_out=("wrap", "tip_v", "von_mises"))
+    folder = solved_sweep(tmp_path / "s", count=30, left_out=("wrap", "tip_v", "von_mises"))
     before = emulator_of(folder)
-    solved_sweep_of_more = solved_sweep(tmp_path / "more", count=90, left_out=("wrap", "tip_v", "von_mises"))
+    solved_sweep_of_more = solved_sweep(tmp_path / "more", count=40, left_out=("wrap", "tip_v", "von_mises"))
     with opened(solved_sweep_of_more / JOURNAL) as journal:
-        later = journal.measurements()[70:]
+        later = journal.measurements()[30:]
     with opened(folder / JOURNAL) as journal:
         for each in later:
             journal.add(each)
     after = emulator_of(folder)
-    assert (before.count, after.count) == (70, 90)
+    assert (before.count, after.count) == (30, 40)
 
 
 def test_too_few_samples_are_told(tmp_path: Path) -> None:

@@ -181,7 +181,7 @@ def test_the_command_writes_the_front(tmp_path, capsys, monkeypatch):
     assert [each.name for each in problems] == [each.name for each in designs]
 
 
-def test_the_problem_of_a_finger_gives_the_number_of_the_front(tmp_path, capsys):
+def test_the_problem_of_a_finger_gives_the_number_of_the_front(tmp_path, capsys, without_pictures):
     """The load was lost: the design alone had another force by a factor of two."""
     physics = {"load": "cylinder", "radius": 8.0, "stroke": 3.0, "young": 3.0, "law": "neo-hookean"}
     asked = QUESTION.model_copy(
