@@ -1,6 +1,6 @@
 """Figures by which a designer judges a finger: their names, units and meanings, said once."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -263,7 +263,7 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
 
 
 def figures_at_rest(
-    problem: Problem, *, density: float | None = None, prepared: "FactorisedProblem | None" = None
+    problem: Problem, *, density: float | None = None, solve: Callable[[Load], Solution] | None = None
 ) -> dict[str, float]:
     """The figures that do not depend on the load, by name: compliances, mass, area, walls and gaps.
 
@@ -272,7 +272,7 @@ def figures_at_rest(
     Args:
         problem: Its finger, its elastic constants and the place of its contact.
         density: Of the material, g/cm^3; its substance's, else `DENSITY`, if None.
-        prepared: The linear problem, factorised, where it is at hand.
+        solve: Solves the linear problem under a load, where it is factorised already.
     """
     finger, position = _finger(problem), problem.load.position
     linear = problem.material.model_copy(update={"law": "linear"})
@@ -280,7 +280,7 @@ def figures_at_rest(
         density = problem.material.substance.density if problem.material.substance else DENSITY
 
     def computed() -> dict[str, float]:
-        along, across = _compliances(prepared or _prepared(problem, linear), position, finger.depth)
+        along, across = _compliances(solve or _prepared(problem, linear).solve, position, finger.depth)
         return {
             "compliance_along": along,
             "compliance_across": across,
@@ -328,15 +328,21 @@ def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, I
     return found
 
 
-def _compliances(prepared: "FactorisedProblem", position: float | None, depth: float) -> tuple[float, float]:
+def unit_loads(position: float | None) -> tuple[Load, Load]:
+    """The loads that move the contact by 1 mm, along the finger and across it, and not in the other way."""
+    return (
+        Load(displacement=(1.0, 0.0), position=position),
+        Load(displacement=(0.0, 1.0), position=position),
+    )
+
+
+def _compliances(
+    solve: Callable[[Load], Solution], position: float | None, depth: float
+) -> tuple[float, float]:
     """Displacement of the contact per force on the whole depth, along and across the finger, mm/N.
 
     The force acts in one direction, and the contact is free in the other.
     """
-    units = (
-        Load(displacement=(1.0, 0.0), position=position),
-        Load(displacement=(0.0, 1.0), position=position),
-    )
-    stiffness = depth * np.array([prepared.solve(unit).reaction for unit in units])
+    stiffness = depth * np.array([solve(unit).reaction for unit in unit_loads(position)])
     compliance = np.linalg.inv(stiffness)
     return float(compliance[0, 0]), float(compliance[1, 1])

@@ -1,6 +1,6 @@
 """How the figures of a finger change with its parameters, those of its material and of its load."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import atan2, cos, degrees, hypot, radians, sin
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,8 +13,14 @@ from geometry.finger.parameters import parameter_info
 from geometry.mesh.design_motion import MovingMesh
 from geometry.mesh.wall_motion import WallMotion
 from solvers.fem.variation import VariedProblem
-from solvers.finger_figures.figures import QUANTITIES, FingerFigures, figures_of
-from solvers.problem import Problem
+from solvers.finger_figures.figures import (
+    QUANTITIES,
+    FingerFigures,
+    figures_at_rest,
+    figures_of,
+    unit_loads,
+)
+from solvers.problem import Load, Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, silent
 
@@ -24,7 +30,8 @@ if TYPE_CHECKING:
     from geometry.figure import Figure
 
 STEP = 1e-4
-"""Step of a parameter, mm, or of Young's modulus over its value; ten times as much of an angle, degrees."""
+"""Step of a parameter, mm, or of Young's modulus over its value; ten times as much of an angle, degrees, and
+a tenth as much of Poisson's ratio, on which much depends near 0.5."""
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 """Whose thickness a print misses."""
 LEFT_OUT = ("marker_diameter", "marker_height")
@@ -155,8 +162,9 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
     figures = figures_of(solution)
     derivatives: dict[str, dict[str, float]] = {name: {} for name in QUANTITIES if name not in SMALLEST}
     pairs = [(each.low, each.high) for each in parameters]
-    for number, (each, ends) in enumerate(zip(parameters, varied.solutions(pairs), strict=True)):
-        low, high = map(_values, ends)
+    found = zip(parameters, varied.solutions(pairs), *_at_rest(problem, pairs, degree), strict=True)
+    for number, (each, ends, along, across) in enumerate(found):
+        low, high = map(_values, ends, along, across)
         for name, slopes in derivatives.items():
             slopes[each.name] = (high[name] - low[name]) / (2 * each.step)
         progress(0.5 + 0.5 * number / len(parameters), each.name)
@@ -166,9 +174,31 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
     return LocalSensitivity(solution, figures, values, units, derivatives)
 
 
-def _values(solution: Solution) -> dict[str, float]:
-    """The figures; area and mass of the mesh, which alone follows the walls of a drawn finger."""
-    found, area = figures_of(solution).values(), float(solution.problem.mesh.areas.sum())
+def _at_rest(
+    problem: Problem, pairs: Sequence[tuple[Problem, Problem]], degree: int
+) -> list[list[tuple[Solution, Solution]]]:
+    """For each of the `unit_loads` the solutions of every pair by the linear law."""
+    found = []
+    for unit in unit_loads(problem.load.position):
+
+        def still(each: Problem, unit: Load = unit) -> Problem:
+            linear = each.material.model_copy(update={"law": "linear"})
+            return replace(each, material=linear, load=unit)
+
+        varied = VariedProblem(still(problem), degree=degree)
+        found.append(varied.solutions([(still(low), still(high)) for low, high in pairs]))
+        varied.close()
+    return found
+
+
+def _values(solution: Solution, along: Solution, across: Solution) -> dict[str, float]:
+    """The figures, with solutions for the `unit_loads`.
+
+    Area and mass are those of the mesh, which alone follows the walls of a drawn finger.
+    """
+    units = {each.problem.load: each for each in (along, across)}
+    rest = figures_at_rest(solution.problem, solve=units.__getitem__)
+    found, area = figures_of(solution, rest).values(), float(solution.problem.mesh.areas.sum())
     return found | {"area": area, "mass": found["mass"] * area / found["area"]}
 
 
@@ -194,7 +224,7 @@ def _parameters(problem: Problem) -> Iterator[VariedParameter]:
         return replace(problem, load=load.model_copy(update={"displacement": given}))
 
     yield varied("young", material.young, "MPa", STEP * material.young, of_constant("young"))
-    yield varied("poisson", material.poisson, "", STEP, of_constant("poisson"))
+    yield varied("poisson", material.poisson, "", 0.1 * STEP, of_constant("poisson"))
     u, v = (value or 0.0 for value in load.displacement)
     stroke, angle = hypot(u, v), atan2(u, -v)
     yield varied("stroke", stroke, "mm", STEP, lambda to: moved(u * to / stroke, v * to / stroke))

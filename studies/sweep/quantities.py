@@ -59,7 +59,7 @@ def quantities(
         lawful = replace(problem, material=with_law(problem.material, solver))
         solution = solved(solver, lawful, progress)
         prepared = plain.prepare(replace(linear, load=Load(position=problem.load.position)))
-    rest = figures_at_rest(problem, density=density, prepared=prepared)
+    rest = figures_at_rest(problem, density=density, solve=prepared.solve)
     prepared.destroy()
     values = figures_of(solution, rest).values()
     return solution, values | (training(solution) if isinstance(solver, TrainedSolver) else {})
