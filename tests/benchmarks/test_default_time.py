@@ -20,6 +20,6 @@ def test_every_stage_has_what_it_needs_within_its_time(tmp_path: Path) -> None:
     assert next(iter(rows)) == "start-up and imports"
     assert {"fem", "pinn-std", "fields", "pictures", "report"} < set(rows)
     assert all(0 <= row.floor <= row.seconds for row in rows.values())
-    assert rows["fem"].needs == "2 factorisations"  # the solution's, and that of the figures at rest
+    assert rows["fem"].needs == "1 factorisations"  # which the figures at rest share
     assert "GFlop of products" in rows["pinn-std"].needs
     assert rows["fields"].needs == "3 fields written"  # the truth's, too
