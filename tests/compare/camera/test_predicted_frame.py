@@ -23,7 +23,7 @@ FILM = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 0 --tilt 8 --turn 15 
 
 
 @pytest.fixture
-def drawn(tmp_path, monkeypatch):
+def drawn(tmp_path, monkeypatch, without_pictures):
     """The picture of a film that was solved by the solver that moved the finger in it, and the film."""
     figures = []
     draw = predicted_frame.draw_predictions
