@@ -232,5 +232,5 @@ def test_guesses_where_little_agrees_are_not_found_and_stop_no_other():
     for row in range(20, 240, 40):
         image[row : row + 19] = 210
     image = np.asarray(np.clip(image + np.random.default_rng(0).normal(0, 3, image.shape), 0, 255), np.uint8)
-    guesses = [(x, y, 7.6) for x in range(20, 310, 138) for y in range(12, 235, 5)]
+    guesses = [(x, y, 7.6) for x in range(66, 310, 138) for y in range(12, 235, 5)]
     assert not fit_discs(image, guesses, radii=7.6).found.any()
