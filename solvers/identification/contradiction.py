@@ -113,7 +113,10 @@ def _better_order(
 ) -> str:
     """Words on another order that explains markers for which there is no solution; empty if none does."""
     seen = np.flatnonzero(observations.visible)
-    order = likely_order(observations.displacements[seen], expected(observations), MUCH_NEARER)
+    try:
+        order = likely_order(observations.displacements[seen], expected(observations), MUCH_NEARER)
+    except NoSolutionError:
+        return ""
     if order is None or (gain := _gain(solve, _reordered(observations, order), EXPLAINED**2)) is None:
         return ""
     return (
