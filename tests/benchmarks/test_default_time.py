@@ -5,12 +5,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from benchmarks.results.default_time import StageTime
 
 ROOT = Path(__file__).parents[2]
 RUN = ["compare", "--quiet", "--solvers", "fem,pinn-std", "--mesh-size", "2", "--out"]
 
 
+@pytest.mark.slow
 def test_every_stage_has_what_it_needs_within_its_time(tmp_path: Path) -> None:
     """In a process of its own, as it counts in the functions of the program."""
     answer = tmp_path / "stages.json"
