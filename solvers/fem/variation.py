@@ -23,8 +23,8 @@ from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import NoSolutionError, Progress, silent
 
-ROUNDS, SETTLED = 30, 1e-9
-"""Updates of a cylinder's multipliers at most, and their last change over the largest."""
+ROUNDS, SETTLED = 60, 1e-6
+"""Updates of a cylinder's multipliers at most, and their last change over the largest; each halves it."""
 
 Pair = tuple[Problem, Problem]
 """Two problems that a parameter's step backward and forward make of one."""
@@ -36,7 +36,8 @@ class VariedProblem:
     Raises:
         UserError: If there is friction, which depends on the way, the body has several materials, or the load
             is a cylinder and the law linear.
-        NoSolutionError: If the equilibrium under the full load is not found or not stable.
+        NoSolutionError: If the equilibrium under the full load is not found or not stable, or the derivatives of
+            a cylinder's contact do not settle.
     """
 
     def __init__(self, problem: Problem, progress: Progress = silent, degree: int = 2) -> None:
@@ -73,7 +74,7 @@ class VariedProblem:
         equilibrium, state = self._equilibrium, self._state
         changes = [np.zeros_like(state.nodal)] * len(pairs)
         contacts = [np.zeros_like(state.contact)] * len(pairs)
-        for _ in range(1 if equilibrium.contact is None else ROUNDS):
+        for _ in range(ROUNDS):  # without a cylinder there are no multipliers, and one is enough
             loads, gaps, held = [], [], []
             for pair, contact in zip(pairs, contacts, strict=True):
                 ends = [
@@ -97,6 +98,10 @@ class VariedProblem:
                 for new, old in zip(contacts, before, strict=True)
             ):
                 break
+        else:
+            raise NoSolutionError(
+                "the contact's derivatives do not settle; take a finer mesh"
+            )
         equilibrium.vary(self._problem)
         return changes
 

@@ -1,4 +1,4 @@
-"""How the figures of a finger change with its parameters, those of its material and of its load."""
+"""Derivatives of a finger's figures by its parameters, those of its material and of its load."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

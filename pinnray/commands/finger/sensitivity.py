@@ -1,4 +1,4 @@
-"""How the figures of one finger change with its parameters."""
+"""Derivatives of one finger's figures by its parameters."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What is held out, and scores and verdicts by hand."""
+"""Held-out markers and loads, and scores and verdicts by hand."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What stands for the measurement of a sample: a module of its own, because every worker loads it."""
+"""Stand-ins for the measurement of a sample, in a module of their own, because every worker loads it."""
 
 import os
 import signal
