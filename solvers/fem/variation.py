@@ -36,8 +36,8 @@ class VariedProblem:
     Raises:
         UserError: If there is friction, which depends on the way, the body has several materials, or the load
             is a cylinder and the law linear.
-        NoSolutionError: If the equilibrium under the full load is not found or not stable, or the derivatives of
-            a cylinder's contact do not settle.
+        NoSolutionError: If the equilibrium under the full load is not found or not stable, or the derivatives
+            of a cylinder's contact do not settle.
     """
 
     def __init__(self, problem: Problem, progress: Progress = silent, degree: int = 2) -> None:
@@ -99,9 +99,7 @@ class VariedProblem:
             ):
                 break
         else:
-            raise NoSolutionError(
-                "the contact's derivatives do not settle; take a finer mesh"
-            )
+            raise NoSolutionError("the contact's derivatives do not settle; take a finer mesh")
         equilibrium.vary(self._problem)
         return changes
 
