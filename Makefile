@@ -1,6 +1,8 @@
 # Every target sets up what it needs first (tools/setup.sh); a second time that takes no time.
 # Arguments go through ARGS, as in: make compare ARGS="--design slender"
 BIN := .venv/bin
+# Without compiled modules each of the tests' many processes would compile what it imports.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help setup setup-tests compare test test-all docs verification lint bench sbom clean
 .DEFAULT_GOAL := help
