@@ -20,8 +20,6 @@ BENCHMARKS = {
     "scenes": "tracker.scenes:main",
     "stress": "tracker.stress:main",
     "live": "tracker.live:main",
-    "sweep": "sweeps.speed:main",
-    "optimise": "sweeps.fronts:main",
     "validation": "validation.document:main",
     "posterior": "validation.posterior:main",
     "reliability": "reliability.document:main",
@@ -43,6 +41,8 @@ SETTLED = (
     "plane_strain",
     "localisation",
     "dots",
+    "sweep",
+    "optimise",
 )
 """Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
 

@@ -1,1 +1,1 @@
-"""Faults put into every change of a file, random and mutated input, and mutants of the code."""
+"""Faults put into every change of a file, and random input."""

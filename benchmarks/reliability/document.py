@@ -21,7 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agre
 
 from rich.table import Table
 
-from benchmarks.reliability import fuzzing, inputs, mutants
+from benchmarks.reliability import inputs
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
 from benchmarks.tables import DOCS, kept_rows, markdown
@@ -33,7 +33,6 @@ HERE = Path(__file__).parent
 PAGE = DOCS / "reliability.md"
 FAULTS = ("job", "points", "killed", "torn write", "full disk", "failed call", "as promised", "left over")
 INPUTS = ("solver", "inputs", "solved", "not converged", "refused", "wrong", "slowest, s", "memory, MB")
-FUZZING = ("reader", "runs", "good files", "unhandled", "ended by a library", "slowest, s", "memory, MB")
 MEMORY = ("repeated", "times", "after a tenth, MB", "at the end, MB", "growth, kB each time")
 
 
@@ -52,14 +51,6 @@ def page(rows: Sequence[Row]) -> str:
         (f"`{each.solver}`", *map(str, each[1:6]), f"{each.slowest:.1f}", f"{each.peak / 1e6:.0f}")
         for each in kept_rows(inputs.ROWS, inputs.Row)
     ]
-    fuzzed = [
-        (
-            each.reader,
-            *(f"{count:,}" for count in (each.runs, each.read, each.unhandled, each.ended)),
-            *(f"{each.slowest:.2f}", f"{each.peak / 1e6:.0f}"),
-        )
-        for each in kept_rows(fuzzing.ROWS, fuzzing.Row)
-    ]
     with (HERE / "memory.csv").open(encoding="utf-8", newline="") as file:
         memory = [
             (job, f"{int(count):,}", *(f"{float(number):.1f}" for number in numbers))
@@ -72,10 +63,8 @@ def page(rows: Sequence[Row]) -> str:
         if wrong
         else "",
         inputs=markdown(INPUTS, tried),
-        fuzzing=markdown(FUZZING, fuzzed),
         memory=markdown(MEMORY, memory),
         **same_answer(),
-        **mutant_tables(),
     )
 
 
@@ -111,25 +100,3 @@ def same_answer() -> dict[str, str]:
     header = ("job", *(", ".join(each for each in system if each not in own) for system in systems))
     rows = [(f"`{job}`", *(difference(job, each["jobs"]) for each in others)) for job in stored["jobs"]]
     return {"stored": ", ".join(own), "same": markdown(header, rows)}
-
-
-def mutant_tables() -> dict[str, str]:
-    """Mutants by module, and those that survived."""
-    rows = kept_rows(mutants.ROWS, mutants.Row)
-    names = dict.fromkeys(row.module for row in rows)
-    counted = []
-    for name in (*names, "all"):
-        group = [row for row in rows if name in (row.module, "all")]
-        killed = sum(row.end == "killed" for row in group)
-        equal = sum(row.judgement.startswith("equal") for row in group)
-        share = f"{100 * killed / len(group):.0f} %"
-        counted.append((f"`{name}`", str(len(group)), str(killed), share, str(equal)))
-    survived = [
-        (f"`{row.module}`", str(row.line), row.change, row.judgement or "not judged")
-        for row in rows
-        if row.end == "survived"
-    ]
-    return {
-        "mutants": markdown(("module", "mutants", "killed", "share", "equal"), counted),
-        "survivors": markdown(("module", "line", "change", "judgement"), survived, left=4),
-    }

@@ -1,10 +1,8 @@
 """Faults at changes of files: where they strike, and what a command makes of some of them."""
 
 import os
-import pydoc
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,8 +10,6 @@ import pytest
 
 from benchmarks.reliability.document import PAGE, page
 from benchmarks.reliability.faults import ROWS, Expected, Row, chosen, differences, known_trials, plain
-from benchmarks.reliability.fuzzing import READERS, SEEDS, taken
-from benchmarks.reliability.mutants import settings
 from benchmarks.reliability.supervision import Fault, Point, supervised
 from benchmarks.tables import kept_rows
 from geometry.atomic import write_text
@@ -128,25 +124,6 @@ def test_kept_trials_are_those_of_the_same_file_by_whatever_number(tmp_path: Pat
 
 def test_the_page_is_that_of_the_kept_trials() -> None:
     assert PAGE.read_text(encoding="utf-8").splitlines()[8:] == page(kept_rows(ROWS, Row)).splitlines()[8:]
-
-
-@pytest.mark.parametrize("name", READERS)
-def test_fuzzing_starts_from_a_file_that_its_reader_takes(name: str, tmp_path: Path) -> None:
-    reader, seeds = READERS[name], sorted((SEEDS / name).iterdir())
-    path = tmp_path / seeds[0].name
-    path.write_bytes(seeds[0].read_bytes())
-    assert taken(reader, pydoc.locate(reader.function), path)
-
-
-def test_mutmut_is_told_one_module_and_its_tests() -> None:
-    table = tomllib.loads(
-        settings("compare.evaluation.metrics", ["tests/compare/evaluation/test_metrics.py"])
-    )
-    told = table["tool"]["mutmut"]
-    assert told["only_mutate"] == ["compare/evaluation/metrics.py"]
-    assert told["pytest_add_cli_args_test_selection"] == ["tests/compare/evaluation/test_metrics.py"]
-    assert {"geometry/", "solvers/", "compare/"} <= set(told["source_paths"])
-    assert not {"tests/", "benchmarks/"} & set(told["source_paths"])
 
 
 @pytest.mark.slow

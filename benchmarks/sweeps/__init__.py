@@ -1,1 +1,0 @@
-"""Speed of sweeps, and fronts against an optimiser without an emulator."""
