@@ -43,11 +43,11 @@ class WallMotion:
         """The motions of a mesh."""
         parts = {name: mask for name, mask in walls_and_ribs(mesh).items() if mask.any()}
         loops = _cavities(mesh)
-        names, thickness, boundary = [], [], []
+        mean, names, thickness, boundary = mean_thickness(mesh), [], [], []
         for name, mask in parts.items():
             moved = np.zeros((len(mesh.points), 2))
             for loop in loops:
-                moved[loop] = _loop_motion(mesh, loop, mask, 0.5 if name == "rib" else 1.0)
+                moved[loop] = _loop_motion(mesh, loop, mask, 0.5 if name == "rib" else 1.0, mean)
             if not moved.any():
                 continue
             names.append(f"{name}_thickness")
@@ -92,13 +92,18 @@ def _cavities(mesh: TriangleMesh) -> list[IntArray]:
     return loops
 
 
-def _loop_motion(mesh: TriangleMesh, loop: IntArray, mask: BoolArray, share: float) -> FloatArray:
-    """Motion of a cavity's nodes (n, 2) when the wall of the masked triangles thickens."""
+def _loop_motion(
+    mesh: TriangleMesh, loop: IntArray, mask: BoolArray, share: float, mean: float
+) -> FloatArray:
+    """Motion of a cavity's nodes (n, 2) when the wall of the masked triangles thickens.
+
+    `share` is the part of the change by which the cavity's face moves, `mean` the body's mean thickness, mm.
+    """
     along = mesh.points[np.roll(loop, -1)] - mesh.points[loop]
     lengths = np.linalg.norm(along, axis=1)
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / lengths[:, None]  # out of the body
     owned = _beside(mesh, loop, mask)
-    breaks = _breaks(along, lengths, mean_thickness(mesh))
+    breaks = _breaks(along, lengths, mean)
     if not breaks.any():
         return _node_mean(normals * (share * owned)[:, None])
     first = int(np.flatnonzero(breaks & ~np.roll(breaks, 1))[0]) if not breaks.all() else 0

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,6 +16,7 @@ from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
 from geometry.registration import Registration
+from solvers.assimilation.estimation import COST_CHANGE
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_conditions
 from solvers.fem.dolfinx_compat import DistributedSpace, NodeFunction
@@ -73,8 +75,7 @@ class FemBody:
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
         self.feet[:, at_base] = unknowns.feet.motions(space.nodes[at_base])
         self._conditions = self._distributed.clamp(self._clamped)
-        self._matrix = self._distributed.assemble_matrix(self._tangent, self._conditions)
-        self._factors = Factorisation(self._distributed, self._matrix, self._clamped, positive_definite=False)
+        self._factors: Factorisation | None = None
         self._sampled: dict[bytes, LocatedPoints] = {}
 
     @property
@@ -88,12 +89,28 @@ class FemBody:
             return None
         self._set(state, lame, changes)
         force = np.where(self._clamped, 0.0, self._distributed.assemble_nodal(self._force))
-        self._distributed.assemble_matrix(self._tangent, self._conditions, into=self._matrix)
         try:
-            self._factors.update()
+            factors = self._factorised()
         except UserError:  # a singular tangent
             return None
-        return Linearised(force, self._factors.solve_all, lambda: self._factors.negative)
+        return Linearised(force, factors.solve_all, lambda: factors.negative)
+
+    def _factorised(self) -> Factorisation:
+        """Factors of the tangent at the state that was set last."""
+        if self._factors is None:
+            matrix = self._distributed.assemble_matrix(self._tangent, self._conditions)
+            self._factors = Factorisation(self._distributed, matrix, self._clamped, positive_definite=False)
+        else:
+            self._distributed.assemble_matrix(self._tangent, self._conditions, into=self._factors.matrix)
+            self._factors.update()
+        return self._factors
+
+    def force(self, state: FloatArray, lame: Lame, changes: FloatArray) -> FloatArray | None:
+        """By quadrature; see `Body`."""
+        if not self._admissible(state, changes):
+            return None
+        self._set(state, lame, changes)
+        return np.where(self._clamped, 0.0, self._distributed.assemble_nodal(self._force))
 
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray
@@ -168,6 +185,10 @@ class FemBody:
 IMPROBABLE = 8.0
 """Logarithm of the ratio of probabilities on a coarse mesh from which on a law is not carried to a fine one:
 the fine mesh changed it by up to 3.5, and a law of one in a hundred has no weight."""
+
+ROUGHLY = 1e-2
+"""Relative change of the cost below which a search on a coarse mesh has converged: the steps on the fine one
+are as large, and on the coarse one the force's place makes the cost rough."""
 
 
 class NestedSearch:
@@ -287,11 +308,16 @@ class FemIdSolver(IdentifyingSolver):
         return fitted
 
     def _search(self, problem: Problem) -> Identifier | NestedSearch:
-        fine, coarse = self._identifier(problem), coarser(problem)
-        return fine if coarse is None else NestedSearch(self._identifier(coarse), fine)
+        if (coarse := coarser(problem)) is None:
+            return self._identifier(problem)
+        rough = self._identifier(coarse, cost_change=ROUGHLY)
+        return NestedSearch(rough, self._identifier(problem, flexibility=rough.flexibility))
 
-    def _identifier(self, problem: Problem) -> Identifier:
-        return Identifier(self, problem, lambda unknowns: FemBody(unknowns, self.degree))
+    def _identifier(
+        self, problem: Problem, cost_change: float = COST_CHANGE, flexibility: float | None = None
+    ) -> Identifier:
+        body = partial(FemBody, degree=self.degree)
+        return Identifier(self, problem, body, cost_change=cost_change, flexibility=flexibility)
 
 
 def fem_law_tracker(

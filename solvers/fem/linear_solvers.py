@@ -31,7 +31,7 @@ class StiffnessSolver:
     """
 
     def __init__(self, space: DistributedSpace[Any], matrix: PETSc.Mat, clamped: BoolArray) -> None:
-        self._space, self._matrix, self._clamped = space, matrix, clamped
+        self._space, self.matrix, self._clamped = space, matrix, clamped
         self._ksp = PETSc.KSP().create(space.comm)
         self._ksp.setOperators(matrix)
         self._free_with_this(self._ksp, matrix)
@@ -43,7 +43,7 @@ class StiffnessSolver:
 
     def solve(self, nodal: FloatArray) -> FloatArray:
         """Solve for a right-hand side of shape (N, d); the solution has the same shape."""
-        right, solution = self._matrix.createVecs()
+        right, solution = self.matrix.createVecs()
         self._space.distribute(np.where(self._clamped, 0.0, nodal), right)
         self._ksp.solve(right, solution)
         values = self._space.gather(solution)
@@ -58,7 +58,7 @@ class StiffnessSolver:
     def destroy(self) -> None:
         """Free the factors or the preconditioner, and the matrix."""
         self._ksp.destroy()
-        self._matrix.destroy()
+        self.matrix.destroy()
 
 
 class Factorisation(StiffnessSolver):
@@ -98,7 +98,7 @@ class Factorisation(StiffnessSolver):
 
     def update(self, nodal: FloatArray | None = None) -> None:
         """Factorise again after the matrix has got new values in its old places; needs no displacements."""
-        self._ksp.setOperators(self._matrix)
+        self._ksp.setOperators(self.matrix)
         try:
             self._ksp.setUp()
         except PETSc.Error as error:
@@ -127,9 +127,9 @@ class Factorisation(StiffnessSolver):
         """Raise a `UserError` if a solution, shape (N, d), leaves too much of its right-hand side."""
         if not self._checked:
             return
-        given, product = self._matrix.createVecs()
+        given, product = self.matrix.createVecs()
         self._space.distribute(values, given)
-        self._matrix.mult(given, product)
+        self.matrix.mult(given, product)
         right: FloatArray = np.where(self._clamped, 0.0, nodal)
         left, size = np.linalg.norm(self._space.gather(product) - right), np.linalg.norm(right)
         for item in (given, product):
@@ -147,7 +147,7 @@ class Factorisation(StiffnessSolver):
             return super().solve_all(nodal)
         right = PETSc.Mat().createDense((nodal[0].size, len(nodal)), comm=self._space.comm)
         right.setUp()
-        held = self._matrix.createVecRight()
+        held = self.matrix.createVecRight()
         columns = right.getDenseArray()
         for column, each in zip(columns.T, nodal, strict=True):
             self._space.distribute(np.where(self._clamped, 0.0, each), held)
@@ -212,7 +212,7 @@ class Multigrid(StiffnessSolver):
 
     def update(self, nodal: FloatArray | None = None) -> None:
         """Renew the preconditioner after the matrix has become the tangent at displacements (N, d), mm."""
-        self._precondition_by(self._matrix, nodal)
+        self._precondition_by(self.matrix, nodal)
         self._ksp.setType(PETSc.KSP.Type.CG)
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._ksp.setUp()
@@ -225,7 +225,7 @@ class Multigrid(StiffnessSolver):
         matrix.setNearNullSpace(motions)
         for item in (motions, positions):
             item.destroy()  # the names only
-        self._ksp.setOperators(self._matrix, matrix)
+        self._ksp.setOperators(self.matrix, matrix)
 
     def destroy(self) -> None:
         """Free the preconditioner and the matrices."""

@@ -32,6 +32,9 @@ MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
+NEAR, SLOW = 25, 0.3
+"""Size of a step over the tolerance up to which the next one takes its tangent, and share of the one before
+above which it does not: that is a fifth of the work, but leaves the derivatives off by the step's size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,7 @@ class ResponseModel:
         self.body, self.unknowns = body, unknowns
         self._clamp = Clamp(unknowns.problem.mesh)
         self._last: Response | None = None
+        self._marker_rows: dict[tuple[bytes, float], tuple[FloatArray, FloatArray]] = {}
         self.evaluations = 0
 
     def flexibility(self) -> float:
@@ -114,6 +118,24 @@ class ResponseModel:
             contact=about.contact + step @ about.contact_slopes,
         )
 
+    def marker_rows(self, points: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+        """The rows of `MarkerModel` for markers at points (m, 2), mm; the last ones are kept."""
+        if (key := (points.tobytes(), radius)) not in self._marker_rows:
+            self._marker_rows = {key: self._rows_of_markers(points, radius)}
+        return self._marker_rows[key]
+
+    def _rows_of_markers(self, points: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+        points, means = disc_quadrature(points, radius)
+        body, motion = self.body, self.unknowns.motion
+        location = self.unknowns.problem.mesh.locate(points)
+        shifts = [motion.shifts(location, one) for one in np.eye(len(motion.names))]
+        rows = body.displacement_rows(points, means)
+        moved_rows = [-body.gradient_rows(points, means[:, :, None] * shift) for shift in shifts]
+        if any(name.startswith("drawn") for name in self.unknowns.names):
+            still = self.unknowns.homography("drawn", {})
+            moved_rows += [body.gradient_rows(points, means[:, :, None] * by) for by in still.slopes(points)]
+        return rows, np.array(moved_rows).reshape(-1, *rows.shape)
+
     def _reached(
         self, values: FloatArray, tolerance: float, iterations: int, halvings: int
     ) -> Response | None:
@@ -153,16 +175,23 @@ class ResponseModel:
             if linearised is None:
                 return None
             state = state + length * step
-            balance = load - linearised.force
-            step = linearised.solve(balance[None])[0]
-            # The least work, N mm/mm, moves a finger by some ten nanometres.
-            work = max(abs(float((load * state).sum())), 1e-10)
-            size = float(np.sqrt(abs((step * balance).sum()) / work)) if balance.any() else 0.0
-            # Large steps must not grow: the guess is too far away.
-            if not np.isfinite(size) or size > max(before, 0.1):
-                return None
-            if size < tolerance:
-                return self._with_slopes(values, hypothesis, (state + step, state), linearised, traction)
+            force: FloatArray | None = linearised.force
+            while force is not None:
+                balance = load - force
+                step = linearised.solve(balance[None])[0]
+                # The least work, N mm/mm, moves a finger by some ten nanometres.
+                work = max(abs(float((load * state).sum())), 1e-10)
+                size = float(np.sqrt(abs((step * balance).sum()) / work)) if balance.any() else 0.0
+                # Large steps must not grow: the guess is too far away.
+                if not np.isfinite(size) or size > max(before, 0.1):
+                    return None
+                if size < tolerance:
+                    return self._with_slopes(values, hypothesis, (state + step, state), linearised, traction)
+                if size > min(NEAR * tolerance, SLOW * before):
+                    break
+                force = self.body.force(state + step, hypothesis.lame, hypothesis.changes)
+                if force is not None:
+                    state, before = state + step, size
             before = size
         return None
 
@@ -272,16 +301,8 @@ class MarkerModel:
     """
 
     def __init__(self, model: ResponseModel, measurement: MarkerData) -> None:
-        self.measurement, self.unknowns, body = measurement, model.unknowns, model.body
-        points, means = disc_quadrature(measurement.points, measurement.radius)
-        location, motion = self.unknowns.problem.mesh.locate(points), self.unknowns.motion
-        shifts = [motion.shifts(location, one) for one in np.eye(len(motion.names))]
-        self.rows = body.displacement_rows(points, means)
-        moved_rows = [-body.gradient_rows(points, means[:, :, None] * shift) for shift in shifts]
-        if any(name.startswith("drawn") for name in self.unknowns.names):
-            still = self.unknowns.homography("drawn", {})
-            moved_rows += [body.gradient_rows(points, means[:, :, None] * by) for by in still.slopes(points)]
-        self.moved_rows = np.array(moved_rows).reshape(-1, *self.rows.shape)
+        self.measurement, self.unknowns = measurement, model.unknowns
+        self.rows, self.moved_rows = model.marker_rows(measurement.points, measurement.radius)
 
     def predicted(self, response: Response) -> Prediction:
         """Values in the order of `MarkerData.observed`, shape (n,), and their derivatives (n, p)."""

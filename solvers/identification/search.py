@@ -30,8 +30,9 @@ QUICK, ROUGH = 4, 2
 WIDE = (2.0, 4.0)
 """Standardised widths of a contact from which to start again where none explains the markers."""
 
-POLISHES, POLISHED = 6, 0.02
-"""Steps of first order on a finer mesh at most, and their last size over the standard deviations."""
+POLISHES, POLISHED = 6, 0.5
+"""Steps of first order on a finer mesh at most, and the size of the last one in the posterior's metric, in
+standard deviations: what a step leaves was measured to be a third of it."""
 
 IMPROBABLE = 15.0
 """Logarithm of the ratio of probabilities from which on a law is not fitted to the end."""
@@ -50,6 +51,7 @@ class Identifier:
         body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
         laws: The laws to choose from; None: by the settings.
         cost_change: Relative change of the cost below which a search has converged.
+        flexibility: Of the finger if it is known, mm per N/mm; see `ResponseModel.flexibility`.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class Identifier:
         *,
         laws: Sequence[LawName] | None = None,
         cost_change: float = COST_CHANGE,
+        flexibility: float | None = None,
     ) -> None:
         self._settings, self._mesh = settings, problem.mesh
 
@@ -73,7 +76,8 @@ class Identifier:
         self.models = LawModels(laws, model)
         first = self.models[laws[0]]
         self._names = first.unknowns.names
-        self.parameters = first.unknowns.parameters(first.flexibility(), settings.prior)
+        self.flexibility = first.flexibility() if flexibility is None else flexibility
+        self.parameters = first.unknowns.parameters(self.flexibility, settings.prior)
         self._fits = LawFits(self.models, self.parameters, cost_change)
         self._feet = first.unknowns.feet.names
         self._known: dict[LawName, Fit] = {}
@@ -105,36 +109,34 @@ class Identifier:
             UserError: If there are no markers, or the finger has no equilibrium near rest.
         """
         self._fits.progress = progress
-        rough = self._rough(self.measurement(observations))
-        lost = [law for law in self.models if law not in {each.law for each in rough}]
-        for best in sorted(rough, key=lambda fit: -fit.log_posterior):
+        measurement, untried, lost = self.measurement(observations), list(self.models), list[LawName]()
+        rough: list[Fit] = []
+        while True:
+            if not rough:
+                rough = self._rough(measurement, untried, lost)
+            best = max(rough, key=lambda fit: fit.log_posterior)
             try:
                 fit, doubtful = self._settled(best)
                 break
-            except NoSolutionError as error:
+            except NoSolutionError:
                 lost.append(best.law)
                 if len(lost) == len(self.models):
-                    raise error
-        fits, quick = [fit], {each.law: each for each in rough[1:] if fit is rough[0]}
+                    raise
+                rough = [each for each in rough if each.law != best.law]
+        fits = [fit]
         rivals = [law for law in self.models if law != fit.law and law not in lost]
         for law in rivals if fit.estimate.inflation < HOPELESS else ():
             try:
-                fits.append(self._rival(law, fit, quick.get(law)))
+                fits.append(self._rival(law, fit))
             except NoSolutionError:
                 lost.append(law)
         for each in fits:
             self._known.setdefault(each.law, each)
         return Identified.ranked(fits, doubtful, lost)
 
-    def _rival(self, law: LawName, fit: Fit, quick: Fit | None) -> Fit:
-        """The fit of another law, to its end unless it could not be probable even there.
-
-        Args:
-            law: The other law.
-            fit: By the best law.
-            quick: A few steps from there, if they were made already.
-        """
-        other = quick or self._fits.fit(law, fit.measurement, fit, rounds=1, steps=QUICK)
+    def _rival(self, law: LawName, fit: Fit) -> Fit:
+        """The fit of another law than the best one, to its end unless it could not be probable even there."""
+        other = self._fits.fit(law, fit.measurement, fit, rounds=1, steps=QUICK)
         if self._fits.shifted(other, fit.measurement).log_posterior > fit.log_posterior - IMPROBABLE:
             other = self._fits.fit(law, fit.measurement, other)
         return other
@@ -186,8 +188,8 @@ class Identifier:
             if found is None:
                 return fit._replace(exact=False)
             fit = found._replace(coarser=None)
-            deviations = np.sqrt(np.diagonal(fit.estimate.covariance))
-            if (np.abs(fit.estimate.z - before) < POLISHED * deviations).all():
+            step = fit.estimate.z - before
+            if step @ np.linalg.solve(fit.estimate.covariance, step) < POLISHED**2:
                 break
         return fit
 
@@ -196,18 +198,23 @@ class Identifier:
         measurement = self.measurement(observations)
         return Identified.ranked([self._fits.shifted(fit, measurement) for fit in found.fits], {}, found.lost)
 
-    def _rough(self, measurement: MarkerData) -> list[Fit]:
-        """A fit of every law with φ = 1: the first one to its end, the others in a few steps from it.
+    def _rough(self, measurement: MarkerData, untried: list[LawName], lost: list[LawName]) -> list[Fit]:
+        """Fits with φ = 1, the first one to its end, others in a few steps from it, till one explains all.
 
-        Laws are left out that have no equilibrium near the markers.
+        Args:
+            measurement: The markers.
+            untried: The laws, of which those that are fitted are taken.
+            lost: Takes the laws that have no equilibrium near the markers.
         """
         found: list[Fit] = []
-        for law in self.models:
+        while untried and not (found and _explained(found[-1])):
+            law = untried.pop(0)
             steps = QUICK if found else MAX_STEPS
             near = self._known.get(law, found[0] if found else None)
             try:
                 found.append(self._fits.fit(law, measurement, near, held=self._loose, rounds=1, steps=steps))
             except NoSolutionError as error:
+                lost.append(law)
                 reason = error
         if not found:
             raise reason

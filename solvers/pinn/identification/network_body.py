@@ -96,13 +96,27 @@ class NetworkBody:
         """The force at a state and the tangent; None if a point is turned inside out."""
         metric = self._metric(changes)
         with pool():
-            gradient = self._gradient(state) @ metric.inverse
-            if not ((metric.volume > 0).all() and (deformation_jacobian(gradient) > 0).all()):
+            if (gradient := self._admissible(state, metric)) is None:
                 return None
             stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
             force = self._forces(_pulled_back(stress, metric)[None])[0]
         tangent = _tangent_pulled_back(tangent, metric)
         return Linearised(force.numpy(), partial(self._solved, tangent), partial(self._negative, tangent))
+
+    def force(self, state: FloatArray, lame: Lame, changes: FloatArray) -> FloatArray | None:
+        """The force at a state; None if a point is turned inside out."""
+        metric = self._metric(changes)
+        with pool():
+            if (gradient := self._admissible(state, metric)) is None:
+                return None
+            stress, _ = piola_stress_and_tangent(gradient, lame, self._law)
+            return self._forces(_pulled_back(stress, metric)[None])[0].numpy()
+
+    def _admissible(self, state: FloatArray, metric: WallMetric) -> torch.Tensor | None:
+        """G of a state at the quadrature points, (q, 2, 2); None if a point is turned inside out."""
+        gradient = self._gradient(state) @ metric.inverse
+        inside_out = not ((metric.volume > 0).all() and (deformation_jacobian(gradient) > 0).all())
+        return None if inside_out else gradient
 
     def _negative(self, tangent: torch.Tensor) -> int:
         """Number of negative eigenvalues of a tangent A at the quadrature points."""
