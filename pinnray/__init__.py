@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pinnray.functions import solve as solve
     from pinnray.functions import solver as solver
     from pinnray.observations import Observations as Observations
+    from pinnray.simulators import export as export
     from pinnray.solution import Solution as Solution
     from solvers.finger_figures.sensitivity import LocalSensitivity as LocalSensitivity
     from solvers.materials.presets import MATERIALS as MATERIALS
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from solvers.problem import Problem as Problem
     from solvers.registry import solver_names as solver_names
     from studies.optimum.search import Optimum as Optimum
+    from studies.robots.export import Exported as Exported
     from vision.calibration.camera_calibration import Calibration as Calibration
     from vision.rig.exposure import Exposure as Exposure
     from vision.rig.motion import Motion as Motion

@@ -84,7 +84,7 @@ class CylinderContact:
         return cls(
             nodes=(starts[:, None] + nodes).ravel(),
             positions=section.nodes[nodes],
-            centre=_touching_centre(problem),
+            centre=touching_centre(problem),
             travel=load.values,
             radius=float(load.radius or 0),
             # More would need fewer updates of the multipliers but more Newton iterations.
@@ -221,7 +221,7 @@ def _turned(normal: FloatArray) -> FloatArray:
     return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
 
 
-def _touching_centre(problem: Problem) -> FloatArray:
+def touching_centre(problem: Problem) -> FloatArray:
     """Centre of the cylinder, shape (2,), mm: as low above the contact's middle as the front lets it."""
     radius, middle = float(problem.load.radius or 0), float(np.mean(contact_ends(problem)))
     front = problem.mesh.points[np.unique(problem.mesh.boundary("front"))]

@@ -14,6 +14,7 @@ from pinnray.commands.comparison.crossval import crossval
 from pinnray.commands.comparison.report import report
 from pinnray.commands.comparison.solvers import solvers
 from pinnray.commands.finger.design import design
+from pinnray.commands.finger.export import export
 from pinnray.commands.finger.material import material
 from pinnray.commands.finger.mesh import mesh
 from pinnray.commands.finger.sensitivity import sensitivity
@@ -35,7 +36,7 @@ pinnray = App(
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = (
-    *(compare, report, design, mesh, material, solve, sensitivity, sweep, predict, optimise),
+    *(compare, report, design, mesh, material, solve, sensitivity, export, sweep, predict, optimise),
     *(gridsearch, crossval, solvers),
     *(fiducials, calibrate, pick, points, rig, track),
 )
