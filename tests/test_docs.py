@@ -467,6 +467,17 @@ def test_the_docs_have_every_name_of_a_list(page, column, listed):
     assert names(table(page, column)) == [name for name in pkgutil.resolve_name(listed) if name != "all"]
 
 
+def test_the_docs_have_every_key_of_a_published_line():
+    from compare.camera.publication import FrameLine, PublishedForce
+
+    page = HOW_TO / "force-from-film.md"
+    for heading, model in (("key of a line", FrameLine), ("key of a line's force", PublishedForce)):
+        said = {name for row in table(page, heading) for name in re.findall(r"`(\w+)`", row[0])}
+        assert said == set(model.model_json_schema()["properties"])
+    (example,) = (block.text for block in blocks(page) if block.language == "json")
+    assert FrameLine.model_validate_json(example).force is not None
+
+
 def test_the_docs_have_every_exit_code():
     from compare.runtime import exits
 

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.live import Live
 
 from compare.runtime.exits import say
+from geometry.errors import UserError
 from pinnray.options.camera import FilmOptions, ForceOptions
 from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
 
@@ -20,6 +21,7 @@ def track(
     force: ForceOptions = ForceOptions(),
     *,
     live: Flag = False,
+    publish: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     record: Path | None = None,
     without_video: OutputFlag = False,
     out: OutputPath = Path("out/track"),
@@ -32,11 +34,13 @@ def track(
 
     - pinnray track video.mkv --camera camera.json
     - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender
-    - pinnray track 0 --camera camera.json --live --force --young 11.4
+    - pinnray track 0 --camera camera.json --live --force --young 11.4 --publish -
 
     Args:
         source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
         live: Show the displacements of every frame as it comes.
+        publish: With --live, write a line of JSON for every frame, with the newest force if --force: a file,
+            a named pipe, or - for the standard output, whose tables then go to standard error.
         record: Keep the frames of a camera or a pipe as a video: .mkv (lossless), .avi or .mp4.
         without_video: Write no annotated video.
         out: Output folder.
@@ -49,12 +53,15 @@ def track(
         forces_of,
         write_forces,
     )
+    from compare.camera.publication import Publisher
     from compare.camera.track_film import displacement_line, track_film, track_table
     from compare.pipeline.shared_mesh import shared_mesh
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions
     from compare.runtime.stages import Stages
 
+    if publish is not None and not live:
+        raise UserError("--publish is for --live")
     design, settings = finger.read()
     if finger.mesh_size is None:
         settings = MESH
@@ -73,6 +80,8 @@ def track(
                 following = stack.enter_context(LiveForce(tracker, design.depth))
             line = stack.enter_context(Live(console=console, refresh_per_second=10)) if live else None
             watch = displacement_line(line, following) if line else None
+            if watch is not None and publish is not None:
+                watch = stack.enter_context(Publisher(publish, following)).after(watch)
             report = stack.enter_context(stages.stage("track"))
             tracking, observations = track_film(
                 film, design, folder, report, video=not without_video, record=record, watch=watch
@@ -96,9 +105,10 @@ def track(
         write_run(folder, provenance | {"seconds": stages.seconds})
     for warning in tracking.warnings:
         say(f"warning: {warning}")
-    Console().print(track_table(tracking, observations))
+    said = console if publish == "-" else Console()
+    said.print(track_table(tracking, observations))
     if forces:
-        Console().print(force_table(forces, design.depth, pace))
+        said.print(force_table(forces, design.depth, pace))
     for path in sorted(out.iterdir()):
-        print(path)
+        print(path, file=said.file)
     return 0

@@ -2,13 +2,16 @@
 
 import csv
 import json
+import os
 
 import cv2
 import numpy as np
 import pytest
 
 from compare.camera.force_estimate import FrameForce, LiveForce, LiveRate, force_line, force_rows, force_table
+from compare.camera.publication import FrameLine, PublishedForce, Publisher
 from compare.runtime.exits import BAD_INPUT
+from geometry.errors import UserError
 from pinnray.cli import main
 from solvers.identification.tracker import ForceReading
 from vision.discs.disc_detector import DiscDetections
@@ -122,6 +125,43 @@ def test_a_live_marker_that_is_hidden_or_was_not_seen_at_rest_has_no_displacemen
     np.testing.assert_array_equal(given[1][0][1:], 0.0)
 
 
+def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(capsys):
+    recorder = Recorder()
+    with LiveForce(recorder, DEPTH) as force, Publisher("-", force) as publisher:
+        see = publisher.after(force.watch)
+        see(Frame(0, 0.0, np.zeros((2, 2), dtype=np.uint8)), seen(REST))
+        while not force.forces:
+            pass
+        see(Frame(1, 0.1, np.zeros((2, 2), dtype=np.uint8)), seen(REST - np.array([0.0, 1.0]), hidden=[1]))
+    text = capsys.readouterr().out.splitlines()
+    first, second = (FrameLine.model_validate_json(line) for line in text)
+    raw, schema = json.loads(text[1]), FrameLine.model_json_schema()
+    assert raw["schema"] == 1
+    assert raw.keys() == schema["properties"].keys()
+    assert raw["force"].keys() == schema["$defs"]["PublishedForce"]["properties"].keys()
+    assert (first.frame, first.time_s, first.status) == (0, 0.0, "")
+    assert second.markers_mm == ((10.0, -2.0), None, (80.0, -4.0))
+    assert second.moved_mm == ((0.0, -1.0), None, (0.0, -1.0))
+    assert second.status == "hidden: marker 2"
+    assert second.force is not None
+    assert (second.force.frame, second.force.N_per_mm) == (0, 0.1)
+    assert second.force.N_per_mm_high == pytest.approx(0.11)
+    unknown = PublishedForce.of(FORCES[1])
+    assert (unknown.N_per_mm, unknown.N_per_mm_high, unknown.position_mm) == (None, None, None)
+    assert unknown.status.startswith("2 of 9 markers")
+
+
+def test_a_reader_that_has_gone_is_told_in_one_line():
+    reading_end, writing_end = os.pipe()
+    os.close(reading_end)
+    frame = Frame(0, 0.0, np.zeros((2, 2), dtype=np.uint8))
+    with Publisher(f"/dev/fd/{writing_end}") as publisher:
+        see = publisher.after(lambda *_: None)
+        with pytest.raises(UserError, match="the reader of /dev/fd/[0-9]+ has gone"):
+            see(frame, seen(REST))
+    os.close(writing_end)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -130,6 +170,7 @@ def test_a_live_marker_that_is_hidden_or_was_not_seen_at_rest_has_no_displacemen
         (["--force", "--young", "-1"], "young (E) = -1.0: input should be greater than 0"),
         (["--force", "--poisson", "0.5"], "poisson (nu) = 0.5: input should be less than 0.5"),
         (["--force", "--design", "nowhere"], "nowhere"),
+        (["--publish", "-"], "--publish is for --live"),
     ],
 )
 def test_options_that_make_no_sense_are_one_line(options, said, tmp_path, capsys):
@@ -193,7 +234,14 @@ def test_the_same_film_through_a_pipe_live(film, tmp_path, monkeypatch, capsys):
     out = tmp_path / "out"
     with (tmp_path / "pictures").open() as pipe:
         monkeypatch.setattr("sys.stdin", pipe)
-        assert main(["track", "-", *_camera(film), "--live", "--force", "--out", str(out)]) == 0
+        options = ["--live", "--force", "--publish", str(tmp_path / "lines"), "--out", str(out)]
+        assert main(["track", "-", *_camera(film), *options]) == 0
+    lines = [FrameLine.model_validate_json(line) for line in (tmp_path / "lines").read_text().splitlines()]
+    assert [line.frame for line in lines] == list(range(12))
+    published = {line.force.frame: line.force for line in lines if line.force}
+    for row in rows_of(out / "force.csv"):
+        if row["frame"] in map(str, published):  # the last one comes after the last line
+            assert published[int(row["frame"])].N_per_mm == pytest.approx(float(row["N_per_mm"]), rel=1e-9)
     error, place, _ = judged(film, out)
     # Frames come as fast as they are read: some are passed over, and the last one is not.
     assert error < 0.03

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from compare.camera.publication import FrameLine
 from compare.runtime.exits import BAD_INPUT
 from pinnray.cli import main
 from vision.frames.pictures import write_picture
@@ -87,9 +88,14 @@ def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatc
     files = ["--camera", str(film / "camera.json"), "--workspace", str(film / "workspace.json")]
     with (tmp_path / "pictures").open() as pipe:
         monkeypatch.setattr("sys.stdin", pipe)
-        assert main(["track", "-", *files, "--live", "--out", str(tmp_path / "out")]) == 0
+        options = ["--live", "--publish", "-", "--out", str(tmp_path / "out")]
+        assert main(["track", "-", *files, *options]) == 0
+    said = capsys.readouterr()
     # The pictures were encoded anew and lost the rig's mark, but its workspace has one, too.
-    assert "the workspace is that of a film of pinnray rig" in capsys.readouterr().err
+    assert "the workspace is that of a film of pinnray rig" in said.err
+    lines = [FrameLine.model_validate_json(line) for line in said.out.splitlines()]
+    assert [line.frame for line in lines] == list(range(len(pictures)))
+    assert all(line.force is None and None not in line.markers_mm for line in lines)
     assert (tmp_path / "out" / "observations.csv").read_text().startswith("# simulated\n")
     found, before = (
         read_measurements(folder / "observations.csv", marker_radius=0.8).displacements
