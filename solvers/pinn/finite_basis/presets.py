@@ -30,10 +30,10 @@ class PinnStdSolver(FiniteBasisSolver):
         gate_width: Width of the gates in spacings.
     """
 
-    wall_spacing: float = 0.8
-    corner_spacing: float = 0.02
-    growth: float = 0.55
-    gate_width: float = 1.0
+    wall_spacing: float = 0.9
+    corner_spacing: float = 0.022
+    growth: float = 0.6
+    gate_width: float = 0.8
     steepness: float = 0.5
     cell: float = 0.5
     name: ClassVar[str] = "pinn-std"
