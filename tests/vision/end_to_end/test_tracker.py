@@ -38,6 +38,11 @@ def tracking():
     return tracked(images())
 
 
+@pytest.fixture(scope="module")
+def without_camera():
+    return tracked(images(), camera=None)
+
+
 def test_a_tilted_camera_measures_a_jump_of_10_mm_to_hundredths_of_a_millimetre(tracking):
     observations = tracking.observations("rig")
     assert observations.visible.all()
@@ -125,8 +130,10 @@ def shifted(image, x, y):
 
 
 @pytest.mark.parametrize("camera", [CAMERA, None])
-def test_a_camera_that_moves_between_start_and_end_is_undone_by_the_fiducials(camera):
-    still = tracked(images(), camera=camera).observations("rig")
+def test_a_camera_that_moves_between_start_and_end_is_undone_by_the_fiducials(
+    camera, tracking, without_camera
+):
+    still = (tracking if camera else without_camera).observations("rig")
     moved = tracked([*images()[:3], *(shifted(image, 3, 2) for image in images()[3:])], camera=camera)
     observations = moved.observations("rig")
     np.testing.assert_allclose(observations.displacements, still.displacements, rtol=0, atol=0.01)  # of 0.38
@@ -150,17 +157,17 @@ def test_a_patch_a_little_lighter_than_the_wall_is_no_marker():
     assert error_of(observations) < 0.015
 
 
-@pytest.mark.parametrize("turns", [1, 2, 3])
+@pytest.mark.parametrize("turns", [1, 2])
 def test_a_camera_may_be_turned_if_the_fiducials_are_seen(turns):
     tracking = tracked([np.rot90(image, turns) for image in images()], camera=None)
     assert error_of(tracking.observations("rig")) < 0.2  # the lens is not undone
     assert any("no camera" in warning for warning in tracking.warnings)
 
 
-def test_without_a_camera_the_residual_of_the_fiducials_is_told():
-    tracking = tracked(images(), camera=None)
-    assert tracking.plane.residual > 0.1
-    assert any(f"{tracking.plane.residual:.3f} mm" in warning for warning in tracking.warnings)
+def test_without_a_camera_the_residual_of_the_fiducials_is_told(without_camera):
+    residual = without_camera.plane.residual
+    assert residual > 0.1
+    assert any(f"{residual:.3f} mm" in warning for warning in without_camera.warnings)
 
 
 def test_grey_images_do_as_well():
@@ -230,8 +237,7 @@ def without_fiducials(turns=0, design=DESIGN):
     return [np.rot90(painted_over(image, fiducials()), turns) for image in images(design=design)]
 
 
-@pytest.mark.parametrize("turns", [0, 1, 2, 3])
-@pytest.mark.parametrize("layout", ["joints", "front"])
+@pytest.mark.parametrize(("layout", "turns"), [("joints", 0), ("joints", 3), ("front", 1), ("front", 2)])
 def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_up(layout, turns):
     """Markers at the joints show the way up themselves; a row looks the same from both ends."""
     design = Design(marker_layout=layout)
