@@ -19,7 +19,6 @@ BENCHMARKS = {
     "trained": "networks.graded:trained",
     "scenes": "tracker.scenes:main",
     "stress": "tracker.stress:main",
-    "live": "tracker.live:main",
     "validation": "validation.document:main",
     "posterior": "validation.posterior:main",
     "reliability": "reliability.document:main",
@@ -43,6 +42,7 @@ SETTLED = (
     "dots",
     "sweep",
     "optimise",
+    "live",
 )
 """Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
 

@@ -1,12 +1,13 @@
 """Fixtures that the tests of several folders share."""
 
+import gc
 import os
 import resource
 import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -16,8 +17,14 @@ from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.processes import child_environment
+from solvers.solver import silent
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
+
+
+def pytest_collection_finish() -> None:
+    """What is loaded by now stays: the search for garbage, 3 % of the time, need not look at it."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -86,3 +93,14 @@ def start_ranks() -> Callable[..., subprocess.Popen[str]]:
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures take most of the time of a small run, and have tests of their own."""
     monkeypatch.setattr("compare.pipeline.pipeline.draw_all", lambda *_: [])
+
+
+@pytest.fixture
+def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tasks run one after the other in this process: a new one imports for seconds."""
+
+    def inline(_: object, work: object, tasks: Mapping[str, object], **__: object) -> Generator:
+        for name, each in tasks.items():
+            yield name, work(each, silent)
+
+    monkeypatch.setattr("geometry.processes.Pool.answers", inline)

@@ -20,6 +20,7 @@ from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.presets import FOLDER, load_design, preset_names
 from geometry.finger.section import marker_positions
 from geometry.mesh.settings import MeshSettings
+from pinnray.options.preset_jobs import JOBS, JobDefaults
 from solvers.solver import Solver
 
 ROOT = Path(__file__).parent.parent
@@ -147,6 +148,7 @@ def test_examples_pin_a_number(path):
 @pytest.mark.parametrize("block", TO_RUN, ids=id_of)
 def test_python_in_the_docs_runs(block, tmp_path, monkeypatch, without_pictures):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(JOBS, "", JobDefaults(solvers="fem,gp"))  # all have a test of the benchmark `default`
     padded = "\n" * block.line + block.text  # so that a traceback names the page's own line
     exec(compile(padded, str(block.page), "exec"), {"__name__": "__docs__"})
 
@@ -506,7 +508,7 @@ def test_the_docs_have_every_cad_file(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_docs_have_every_file_of_a_grid_search(tmp_path):
+def test_the_docs_have_every_file_of_a_grid_search(tmp_path, in_line):
     from pinnray.cli import main
 
     grid = "--learning-rates 1e-3 --bc-weights 10 --epochs 2 --mesh-size 1 --solver-set pinn-std.width=4"
@@ -520,7 +522,7 @@ def test_the_docs_have_every_file_of_a_grid_search(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_docs_have_every_file_of_a_cross_validation(tmp_path):
+def test_the_docs_have_every_file_of_a_cross_validation(tmp_path, in_line):
     from pinnray.cli import main
 
     study = "--solvers fem,fem-asm --schemes one-out --seeds 1 --mesh-size 1"

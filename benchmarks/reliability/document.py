@@ -7,7 +7,6 @@ Linux only. Trials that are kept are not run again; `--rows compare` makes those
 their names. All take some five hours of one core. The page's words are in `page.md`.
 """
 
-import csv
 import json
 import os
 import platform
@@ -33,7 +32,6 @@ HERE = Path(__file__).parent
 PAGE = DOCS / "reliability.md"
 FAULTS = ("job", "points", "killed", "torn write", "full disk", "failed call", "as promised", "left over")
 INPUTS = ("solver", "inputs", "solved", "not converged", "refused", "wrong", "slowest, s", "memory, MB")
-MEMORY = ("repeated", "times", "after a tenth, MB", "at the end, MB", "growth, kB each time")
 
 
 def main(rows: str = "") -> Table:
@@ -51,11 +49,6 @@ def page(rows: Sequence[Row]) -> str:
         (f"`{each.solver}`", *map(str, each[1:6]), f"{each.slowest:.1f}", f"{each.peak / 1e6:.0f}")
         for each in kept_rows(inputs.ROWS, inputs.Row)
     ]
-    with (HERE / "memory.csv").open(encoding="utf-8", newline="") as file:
-        memory = [
-            (job, f"{int(count):,}", *(f"{float(number):.1f}" for number in numbers))
-            for job, count, *numbers in list(csv.reader(file))[1:]
-        ]
     return Template((HERE / "page.md").read_text(encoding="utf-8")).substitute(
         machine=f"{platform.machine()}, Python {platform.python_version()}, numpy {version('numpy')}",
         faults=markdown(FAULTS, fault_rows(rows)),
@@ -63,7 +56,6 @@ def page(rows: Sequence[Row]) -> str:
         if wrong
         else "",
         inputs=markdown(INPUTS, tried),
-        memory=markdown(MEMORY, memory),
         **same_answer(),
     )
 

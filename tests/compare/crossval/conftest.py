@@ -1,6 +1,4 @@
-"""A truth, its markers, and tasks that run in this process."""
-
-from collections.abc import Generator, Mapping
+"""A truth and its markers."""
 
 import numpy as np
 import pytest
@@ -10,7 +8,6 @@ from geometry.observations import Observations
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 from solvers.solution import Solution
-from solvers.solver import silent
 
 NOISE = 0.005
 """Standard deviation of the markers' displacements, mm."""
@@ -27,14 +24,3 @@ def observations(coarse_mesh: TriangleMesh, truth: Solution) -> Observations:
     points = coarse_mesh.markers
     deviations, visible = np.full_like(points, NOISE), np.ones(9, dtype=bool)
     return Observations(points, truth.displacement(points), deviations, visible, "a test", True, 0.8)
-
-
-@pytest.fixture
-def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tasks one after the other in this process."""
-
-    def inline(_: object, work: object, tasks: Mapping[str, object], **__: object) -> Generator:
-        for name, each in tasks.items():
-            yield name, work(each, silent)
-
-    monkeypatch.setattr("geometry.processes.Pool.answers", inline)

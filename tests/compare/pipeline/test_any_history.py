@@ -191,7 +191,7 @@ def test_any_history_ends_with_the_numbers_of_a_fresh_folder(without_pictures, m
     run_state_machine_as_test(
         Histories,
         settings=settings(
-            max_examples=12,
+            max_examples=8,
             stateful_step_count=10,
             deadline=None,
             derandomize=True,

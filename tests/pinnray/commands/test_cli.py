@@ -74,6 +74,7 @@ def test_markers_that_no_finger_explains_are_said_first(folder, capsys, without_
     """They were in reverse order: the run had ended with 0, "converged" and no warning."""
     markers = Path(__file__).parents[2] / "data" / "second-renderer" / "reversed.csv"
     given = "--mesh-size 3 --set contact_position=36.5 --stroke 9.5 --solvers fem,fem-id --out here"
+    given += " --solver-set fem-id.law=given --solver-set fem-id.parameters=position,normal_force"
     assert main(["compare", *given.split(), "--measurements", str(markers)]) == NOT_CONVERGED
     told = json.loads(Path("here/metrics.json").read_text())
     assert told["solvers"]["fem-id"]["status"] == "not converged"

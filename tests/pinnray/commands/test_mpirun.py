@@ -8,7 +8,7 @@ import pytest
 from pinnray.cli import main
 from tests.pinnray.commands.programs import WITHOUT_PICTURES
 
-SMALL = "compare --design default --mesh-size 1 --solvers fem,fem-nonlinear --quiet"
+SMALL = "compare --design default --mesh-size 2 --solvers fem,fem-nonlinear --quiet"
 
 pytestmark = [pytest.mark.mpi, pytest.mark.slow]
 

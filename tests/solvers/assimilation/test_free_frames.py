@@ -10,6 +10,7 @@ from solvers.assimilation.pictures import FreePictures
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 from tests.solvers.conftest import observed_at
+from tests.solvers.contract.test_contract import QUICK
 
 KNOWN = Registration(turn=3.0, shift=0.3, scale=0.01, tilt=0.01)
 OFF = np.array([2.5, 0.3, -0.2, -0.012, 0.01, -0.005])  # degrees, mm, shares
@@ -179,8 +180,8 @@ def test_a_marker_is_left_out_of_the_frames_as_well(problem):
 def test_the_network_finds_the_frames_of_its_twin(problem):
     observed, _ = pictured(problem, OFF)
     found = [
-        make_solver(name, weights="precision").solve(replace(problem, observations=observed))
-        for name in ("fem-asm", "pinn-asm")
+        make_solver(name, weights="precision", **settings).solve(replace(problem, observations=observed))
+        for name, settings in (("fem-asm", {}), ("pinn-asm", QUICK["pinn-asm"]))
     ]
     turns = [each.stats["pressed_turn"] for each in found]
     assert turns[0] > 1  # of 2.5: at this scale the finger may bend for it

@@ -59,8 +59,8 @@ CASES = [
 """Networks on a curved base and on a divided one; on every body they are compared on the finer mesh."""
 
 NETWORKS = {
-    **dict.fromkeys(("ring", "tilted wedge", "thin ribs", "notched"), "fast"),
-    **dict.fromkeys(("beam", "feet and slot", "arch"), "local"),
+    **dict.fromkeys(("ring", "tilted wedge", "thin ribs", "arch"), "fast"),
+    **dict.fromkeys(("beam", "feet and slot", "notched"), "local"),
 }
 """Preset by body."""
 

@@ -9,22 +9,22 @@ from solvers.problem import Load, Material, Problem
 from tests.solvers.identification.twins import TRUE, marked, model_of, twin
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def problem(coarse_mesh):
     return Problem(coarse_mesh, Material(law="neo-hookean"), Load(displacement=(None, -6.0)))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def model(problem):
     return model_of(problem)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def markers(problem, model):
     return marked(model)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def identified(problem):
     """A twin of the neo-Hookean law, and what is found from its markers with noise."""
     observed, true = twin(problem, "neo-hookean", TRUE)
