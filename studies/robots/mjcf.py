@@ -102,7 +102,7 @@ def flex_mjcf(name: str, body: SolidMesh, material: Material, density: float, da
         damping: Its loss factor at the first vibration.
     """
     root = _model(name, FLEX_STEP, "discrete")
-    ET.SubElement(root, "size", memory="1G")
+    ET.SubElement(root, "size", memory="256M")
     finger = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="finger")
     flex = ET.SubElement(
         finger,

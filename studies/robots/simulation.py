@@ -26,6 +26,9 @@ MEAN = 0.2
 STEADY = 0.02
 """Largest standard deviation of the force there over its mean in a model at rest."""
 
+FAULTS = ("CONTACTFULL", "CNSTRFULL", "BADQPOS", "BADQVEL", "BADQACC")
+"""MuJoCo's warnings after which a state is not to be believed; after the last three it starts anew."""
+
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -48,7 +51,7 @@ class Rest:
 
     moved: FloatArray  #: Displacements of the front's points, shape (m, 2), mm
     force: FloatArray  #: On the model, shape (2,), N
-    steady: bool  #: Whether the force has settled
+    steady: bool  #: Whether the force has settled, and MuJoCo has not given up
     seconds: float  #: Computing time of one second of the model's time, s
 
 
@@ -133,12 +136,13 @@ def simulate(model: Model, load: Press, radius: float, depth: float, rest: Float
                 forces.append(_force(compiled, data))
                 places.append(model.front(compiled, data))
         seconds = (time.process_time() - started) / (RAMP + HOLD)
+    faults = sum(data.warning[getattr(mujoco.mjtWarning, f"mjWARN_{name}")].number for name in FAULTS)
     force = np.mean(forces, axis=0)
     spread = float(np.linalg.norm(np.std(forces, axis=0)))
     return Rest(
         moved=(np.mean(places, axis=0) - rest) / MM,
         force=force,
-        steady=bool(np.isfinite(force).all() and spread <= STEADY * np.linalg.norm(force)),
+        steady=bool(not faults and spread <= STEADY * np.linalg.norm(force)),
         seconds=seconds,
     )
 
@@ -160,7 +164,7 @@ def _force(model: Any, data: Any) -> FloatArray:
 
 @contextmanager
 def _silent_warnings() -> Iterator[None]:
-    """Keep MuJoCo from writing MUJOCO_LOG.TXT: whether a state is steady is judged by its force."""
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT; `FAULTS` are counted, others do not change the forces."""
     import mujoco
 
     before = mujoco.get_mju_user_warning()

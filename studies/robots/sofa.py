@@ -1,6 +1,6 @@
 """A SOFA scene of a finger: corotational tetrahedra that are held at the base, with a surface for contact.
 
-Component names are those of SOFA 24 and later, from its own examples: `TetrahedronFEMForceField.scn`,
+Component names are those of SOFA 24, from its own examples: `TetrahedronFEMForceField.scn`,
 `MeshGmshLoader.scn`, `Tetra2TriangleTopologicalMapping.scn`.
 """
 
@@ -47,10 +47,16 @@ def sofa_scene(mesh_file: str, body: SolidMesh, material: Material, density: flo
     ET.SubElement(finger, "EulerImplicitSolver", rayleighStiffness=f"{damping:.6g}", rayleighMass="0")
     ET.SubElement(finger, "SparseLDLSolver", template="CompressedRowSparseMatrixMat3x3d")
     ET.SubElement(finger, "MeshGmshLoader", name="loader", filename=mesh_file)
-    ET.SubElement(finger, "TetrahedronSetTopologyContainer", name="tetrahedra", src="@loader")
+    ET.SubElement(  # without the loader's triangles, which are those of two groups only
+        finger,
+        "TetrahedronSetTopologyContainer",
+        name="tetrahedra",
+        position="@loader.position",
+        tetrahedra="@loader.tetrahedra",
+    )
     ET.SubElement(finger, "TetrahedronSetTopologyModifier")
     ET.SubElement(finger, "TetrahedronSetGeometryAlgorithms", template="Vec3")
-    ET.SubElement(finger, "MechanicalObject", name="nodes", template="Vec3", src="@loader")
+    ET.SubElement(finger, "MechanicalObject", name="nodes", template="Vec3", position="@loader.position")
     ET.SubElement(finger, "UniformMass", totalMass=f"{density * body.volume:.6g}")
     ET.SubElement(
         finger,
