@@ -27,8 +27,9 @@ from solvers.fem.linear_solvers import Factorisation
 from solvers.identification.body import Linearised
 from solvers.identification.contradiction import with_doubts
 from solvers.identification.field import IdentifiedField
+from solvers.identification.fit import Fit
 from solvers.identification.model import ResponseModel
-from solvers.identification.result import Fit, Identified
+from solvers.identification.result import Identified
 from solvers.identification.search import Identifier
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.tracker import ForceTracker, LawTracker

@@ -8,8 +8,8 @@ import numpy as np
 from geometry.arrays import FloatArray
 from solvers.assimilation.estimation import Parameter, Prediction, estimate
 from solvers.elasticity import LawName
+from solvers.identification.fit import Fit
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
-from solvers.identification.result import Fit
 from solvers.solver import NoSolutionError, Progress, silent
 
 HELD = 1e-3

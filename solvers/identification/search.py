@@ -16,9 +16,10 @@ from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
 from solvers.identification.contradiction import MUCH_NEARER, likely_order
+from solvers.identification.fit import Fit
 from solvers.identification.law_fits import LawFits, LawModels
 from solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
-from solvers.identification.result import Fit, Identified
+from solvers.identification.result import Identified
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.unknowns import LAWS, Unknowns
 from solvers.problem import Problem

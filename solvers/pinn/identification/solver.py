@@ -12,8 +12,9 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.elasticity import LawName
 from solvers.identification.contradiction import with_doubts
+from solvers.identification.fit import Fit
 from solvers.identification.model import ResponseModel
-from solvers.identification.result import Fit, Identified
+from solvers.identification.result import Identified
 from solvers.identification.search import Identifier, carried
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
