@@ -29,13 +29,13 @@ def photographed(
     matrix = np.array([[FOCAL, 0, (SIZE[0] - 1) / 2], [0, FOCAL, (SIZE[1] - 1) / 2], [0, 0, 1]])
     to_pixels = matrix @ np.column_stack([turn.as_matrix()[:, :2], shift])
     y, x = (np.mgrid[: SIZE[1] * SAMPLES, : SIZE[0] * SAMPLES] + 0.5) / SAMPLES - 0.5
-    places = np.stack([x, y, np.ones_like(x)], axis=-1) @ np.linalg.inv(to_pixels).T
-    places = places[..., :2] / places[..., 2:]
+    places = np.column_stack([x.ravel(), y.ravel(), np.ones(x.size)]) @ np.linalg.inv(to_pixels).T
+    places = places[:, :2] / places[:, 2:]
     centres = board.corners[:, :2]
-    away = cKDTree(centres).query(places.reshape(-1, 2))[0].reshape(x.shape)
+    near = np.isfinite(cKDTree(centres).query(places, distance_upper_bound=radius)[0])
     rim = 1.5 * board.square
     sheet = ((places > centres.min(axis=0) - rim) & (places < centres.max(axis=0) + rim)).all(axis=-1)
-    grey = np.where(away < radius, 25.0, np.where(sheet, 220.0, 90.0))
+    grey = np.where(near, 25.0, np.where(sheet, 220.0, 90.0))
     grey = grey.reshape(SIZE[1], SAMPLES, SIZE[0], SAMPLES).mean(axis=(1, 3))
     image = np.rint(cv2.GaussianBlur(grey, (0, 0), 0.8)).astype(np.uint8)
     seen = np.column_stack([centres, np.ones(len(centres))]) @ to_pixels.T
