@@ -90,7 +90,8 @@ class FemNonlinearSolver(ElementSettings):
         followed = self.followed(coarse, path, progress)
         last, history, regions = path.points[-1], followed.history(), followed.regions()
         abscissa = path.force_abscissa(last)
-        path.equilibrium.factorise(last)
+        if followed is path:  # else the tangent there has just been factorised
+            path.equilibrium.factorise(last)
         unstable = path.equilibrium.unstable or 0
         abscissae = followed.abscissae()
         solved = time.perf_counter()
