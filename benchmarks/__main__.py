@@ -11,6 +11,7 @@ from geometry.errors import UserError
 BENCHMARKS = {
     "results": "results.default_run:main",
     "default": "results.default_time:main",
+    "growth": "results.growth:main",
     "fem": "elements.scikit_fem:main",
     "pinn": "networks.graded:pinn",
     "designs": "networks.graded:designs",
