@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pinnray.comparison import Comparison as Comparison
     from pinnray.designers import optimise as optimise
     from pinnray.designers import predict as predict
+    from pinnray.designers import predict_field as predict_field
     from pinnray.designers import sensitivity as sensitivity
     from pinnray.designers import sweep as sweep
     from pinnray.functions import compare as compare
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from solvers.physics import Material as Material
     from solvers.problem import Problem as Problem
     from solvers.registry import solver_names as solver_names
+    from studies.fields.prediction import PredictedField as PredictedField
     from studies.optimum.search import Optimum as Optimum
     from studies.robots.export import Exported as Exported
     from vision.calibration.camera_calibration import Calibration as Calibration

@@ -1,4 +1,4 @@
-"""Functions of the front door for designers: sensitivity, sweep, predict, optimise.
+"""Functions of the front door for designers: sensitivity, sweep, predict, predict_field, optimise.
 
 The worker processes run a calling script once more: in a script, what starts a sweep or a search must stand
 under `if __name__ == "__main__":`.
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from solvers.finger_figures.sensitivity import LocalSensitivity
+    from studies.fields.prediction import PredictedField
     from studies.optimum.search import Optimum
     from studies.sweep.study import Study
 
@@ -168,6 +169,26 @@ def predict(
         if fault := emulator.inputs.fault(finger):
             raise UserError(f"finger {place}: {fault}")
     return prediction_table(emulator, read, emulator.predict(read))
+
+
+def predict_field(sweep: str | Path, finger: Mapping[str, object], stroke: float) -> "PredictedField":
+    """Predict the whole field of one finger from a sweep that has kept fields; see `pinnray explore`.
+
+    Args:
+        sweep: Folder of a sweep, whose study has `strokes`.
+        finger: Values of every parameter that the sweep varies.
+        stroke: Travel of the indenter, mm.
+
+    Raises:
+        UserError: If the sweep has no fields or too few, or the finger or stroke is outside its ranges.
+    """
+    from studies.fields.store import fields_of
+
+    emulator = fields_of(as_path(sweep, "the sweep"))
+    read = emulator.inputs.read({name: str(value) for name, value in finger.items()})
+    if fault := emulator.fault(read, stroke):
+        raise UserError(fault)
+    return emulator.predict(read, stroke)
 
 
 def optimise(

@@ -4,8 +4,6 @@ The browser draws the fields with Plotly.js (MIT licence), which comes with the 
 packed into the page. Numbers have 16 bits: the range of a field, or of its difference, in 65,535 steps.
 """
 
-import base64
-import gzip
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
@@ -14,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from jinja2 import Template
-from numpy.typing import NDArray
 
 from compare.evaluation.certification import REGION_RADIUS
 from compare.evaluation.comparison import TRUTH, Results, unsupported_remarks
@@ -36,6 +33,7 @@ from compare.report.output_files import metrics
 from compare.report.summary import answers
 from compare.report.tables import millimetres, printed_rows, seconds, table_one
 from compare.runtime.html import picture_urls, template_environment
+from compare.runtime.packed import Packed, base64_text
 from compare.runtime.tables import distance, number, percent
 from geometry.arrays import FloatArray
 from geometry.atomic import write_text
@@ -43,34 +41,6 @@ from geometry.mesh.boundary import boundary_edges, edge_paths
 
 BUDGET = 6_000_000
 """Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""
-
-
-class Packed:
-    """Arrays in one piece of memory; `add` gives the place and type by which the browser reads one."""
-
-    def __init__(self) -> None:
-        self._pieces: list[bytes] = []
-        self._length = 0
-
-    def add(self, values: NDArray[Any]) -> dict[str, Any]:
-        """Append an array of float32, uint32 or uint16."""
-        data = values.tobytes()
-        place = {"kind": str(values.dtype), "offset": self._length, "length": values.size}
-        data += bytes(-len(data) % 4)
-        self._pieces.append(data)
-        self._length += len(data)
-        return place
-
-    def add_steps(self, values: FloatArray) -> dict[str, Any]:
-        """Append values as steps of their range: value = low + step * number."""
-        low, high = float(values.min()), float(values.max())
-        step = (high - low) / 65_535 or 1.0
-        steps = np.round((values - low) / step).astype("<u2")
-        return self.add(steps) | {"low": low, "step": step}
-
-    def text(self) -> str:
-        """All of it, compressed, in Base64."""
-        return _base64(b"".join(self._pieces))
 
 
 def viewer(comparison: Results) -> dict[str, Any] | None:
@@ -186,11 +156,7 @@ def _stop(share: float) -> list[Any]:
 @cache
 def _library() -> str:
     """Plotly.js, compressed, in Base64."""
-    return _base64(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes())
-
-
-def _base64(data: bytes) -> str:
-    return base64.b64encode(gzip.compress(data, compresslevel=6, mtime=0)).decode("ascii")
+    return base64_text(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes())
 
 
 def write_report(

@@ -4,17 +4,8 @@ const pinnrayFields = (() => {
   const byId = (name) => document.getElementById(name);
   const manifest = JSON.parse(byId("viewer-manifest").textContent);
 
-  async function unpacked(name) {
-    const bytes = Uint8Array.from(atob(byId(name).textContent.trim()), (letter) => letter.charCodeAt(0));
-    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
-  }
-
-  const kinds = { float32: Float32Array, uint32: Uint32Array, uint16: Uint16Array };
-  let buffer;
-  function numbers(place) {
-    const raw = new kinds[place.kind](buffer, place.offset, place.length);
-    return place.step === undefined ? raw : Float64Array.from(raw, (step) => place.low + place.step * step);
-  }
+  const { unpacked, reader } = pinnrayPacked;
+  let numbers;
 
   let points, triangles;
   const read = new Map();
@@ -103,7 +94,7 @@ const pinnrayFields = (() => {
   }
 
   async function load() {
-    buffer = await (await unpacked("viewer-data")).arrayBuffer();
+    numbers = await reader("viewer-data");
     points = numbers(manifest.points);
     triangles = numbers(manifest.triangles);
     pinnrayFields.mesh = { points, triangles };

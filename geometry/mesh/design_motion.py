@@ -1,7 +1,7 @@
 """The motion of a mesh as the parameters of its finger change: no element is made or lost.
 
-A node on the boundary stays at the same fraction of the same piece of the section. Between the boundaries the
-motion is harmonic.
+A node on the boundary stays at the same fraction of the same piece of the section. Between the
+boundaries it moves as an elastic body.
 """
 
 from dataclasses import replace
@@ -12,8 +12,8 @@ from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.finger.finger import Finger, outline_with_contact
 from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.elastic_motion import ElasticMotion
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.mesh.wall_motion import harmonic
 from geometry.section.loop import Loop
 
 ON_CURVE = 1e-6
@@ -33,6 +33,7 @@ class MovingMesh:
 
     def __init__(self, mesh: TriangleMesh, finger: Finger) -> None:
         self._mesh, self._loops = mesh, _loops(finger)
+        self._motion = ElasticMotion(mesh)
         self._nodes = np.unique(boundary_edges(mesh.triangles))
         points = mesh.points[self._nodes]
         self._loop = np.zeros(len(points), dtype=np.int64)
@@ -51,19 +52,28 @@ class MovingMesh:
         if nearest.max() > ON_CURVE:
             raise UserError(f"the mesh is not of the finger {finger.name!r}: its boundary is elsewhere")
 
-    def of(self, finger: Finger) -> TriangleMesh | None:
-        """The mesh of a finger with slightly other parameters; None if its section has other pieces."""
+    def of(self, finger: Finger, steps: int = 1) -> TriangleMesh | None:
+        """The mesh of a finger with other parameters; None if its section has other pieces.
+
+        Args:
+            finger: The finger.
+            steps: In which the boundary moves; a large motion in few steps would turn triangles over.
+
+        Raises:
+            UserError: If a triangle turns over.
+        """
         loops = _loops(finger)
         if [loop.names for loop in loops] != [loop.names for loop in self._loops]:
             return None
-        moved = np.zeros((1, len(self._mesh.points), 2))
+        moved = np.zeros((len(self._mesh.points), 2))
         for number, loop in enumerate(loops):
             own = self._loop == number
             places = _at(loop, self._piece[own], self._share[own])
-            moved[0, self._nodes[own]] = places - self._mesh.points[self._nodes[own]]
-        return replace(
-            self._mesh, points=self._mesh.points + harmonic(self._mesh, moved)[0], depth=finger.depth
-        )
+            moved[self._nodes[own]] = places - self._mesh.points[self._nodes[own]]
+        mesh = replace(self._mesh, points=self._mesh.points + self._motion.extended(moved / steps))
+        for _ in range(steps - 1):
+            mesh = replace(mesh, points=mesh.points + ElasticMotion(mesh).extended(moved / steps))
+        return replace(mesh, depth=finger.depth)
 
 
 def _loops(finger: Finger) -> tuple[Loop, ...]:

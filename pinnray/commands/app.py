@@ -21,6 +21,7 @@ from pinnray.commands.finger.sensitivity import sensitivity
 from pinnray.commands.finger.solve import solve
 from pinnray.commands.launch import EXIT_CODES
 from pinnray.commands.quiet import quietable
+from pinnray.commands.studies.explore import app, explore
 from pinnray.commands.studies.gridsearch import gridsearch
 from pinnray.commands.studies.optimise import optimise
 from pinnray.commands.studies.predict import predict
@@ -36,7 +37,8 @@ pinnray = App(
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = (
-    *(compare, report, design, mesh, material, solve, sensitivity, export, sweep, predict, optimise),
+    *(compare, report, design, mesh, material, solve, sensitivity, export),
+    *(sweep, predict, explore, app, optimise),
     *(gridsearch, crossval, solvers),
     *(fiducials, calibrate, pick, points, rig, track),
 )

@@ -18,6 +18,9 @@ from studies.emulator.frame import BeamFrame
 from studies.sweep.job import LEAST_MARKERS
 from studies.sweep.study import PHYSICS, WHOLE, Range, Study, Value, physics_of, unit_of
 
+STILL = ("contact_position", "depth")
+"""Parameters of a design that do not change its section."""
+
 WIDE = 1.8
 """Ratio of a range's ends from which the logarithm of the parameter is taken."""
 
@@ -99,7 +102,7 @@ class Inputs:
 
     def numbers(self, fingers: Sequence[Mapping[str, Value]], shapes: Sequence[Parameters]) -> Numbers:
         """The numbers of fingers and their parameters."""
-        columns = [self._column(name, [finger[name] for finger in fingers]) for name in self._columns]
+        columns = self.columns(fingers)
         phase = 2 * np.pi * np.array([_rib_phase(shape) for shape in shapes])
         answers, scales = self._frames(fingers, shapes)
         stress = np.log(np.maximum(answers[:, 6:9], LEAST_STRESS)) / STRESS_SCALE
@@ -117,10 +120,20 @@ class Inputs:
         }
         forces = dict.fromkeys(("force", "force_25", "force_50", "force_75"), modulus * depth)
         return Numbers(
-            np.concatenate([*columns, np.stack([np.cos(phase), np.sin(phase)], axis=1), stress], axis=1),
+            np.concatenate([columns, np.stack([np.cos(phase), np.sin(phase)], axis=1), stress], axis=1),
             bases,
             {**dict.fromkeys(bases, one), **forces},
         )
+
+    @property
+    def moves(self) -> bool:
+        """Whether the section of the fingers varies."""
+        return any(name in Parameters.model_fields and name not in STILL for name in self.study.varied)
+
+    def columns(self, fingers: Sequence[Mapping[str, Value]]) -> FloatArray:
+        """The varied parameters that are no mere factors, each with a standard deviation of about one."""
+        columns = [self._column(name, [finger[name] for finger in fingers]) for name in self._columns]
+        return np.concatenate([np.zeros((len(fingers), 0)), *columns], axis=1)
 
     @cached_property
     def _columns(self) -> list[str]:

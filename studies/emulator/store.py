@@ -1,19 +1,12 @@
 """The file of an emulator: arrays as safetensors, the rest as JSON in its header."""
 
-import hashlib
 import json
 from pathlib import Path
 
-import numpy as np
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save as to_bytes
-
 from compare.runtime.stages import Stages
-from geometry.arrays import FloatArray
-from geometry.atomic import write_bytes
 from geometry.content_hash import content_hash, sources_digest
-from geometry.errors import UserError
 from geometry.text_files import read_json
+from studies.emulator.arrays_file import read_arrays, write_arrays
 from studies.emulator.emulator import Emulator, Learnt, fitted_emulator
 from studies.emulator.gaussian_process import GaussianProcess
 from studies.emulator.inputs import Inputs
@@ -60,18 +53,18 @@ def digest_of(sweep: Sweep, inputs: Inputs) -> str:
 def save(file: Path, emulator: Emulator, digest: str) -> None:
     """Write an emulator atomically, with the digest of what it depends on."""
     arrays = {
-        f"{name}.{part}": np.ascontiguousarray(getattr(learnt.process, part))
+        f"{name}.{part}": getattr(learnt.process, part)
         for name, learnt in emulator.learnt.items()
         for part in PARTS
     }
-    header = {
-        "digest": digest,
-        "arrays": _arrays_digest(arrays),
-        "positive": json.dumps({name: learnt.positive for name, learnt in emulator.learnt.items()}),
-        "ratios": json.dumps(dict(emulator.ratios)),
-        "count": str(emulator.count),
-    }
-    write_bytes(file, to_bytes(arrays, metadata=header))
+    write_arrays(
+        file,
+        arrays,
+        digest,
+        positive=json.dumps({name: learnt.positive for name, learnt in emulator.learnt.items()}),
+        ratios=json.dumps(dict(emulator.ratios)),
+        count=str(emulator.count),
+    )
 
 
 def load(file: Path, inputs: Inputs, digest: str) -> Emulator | None:
@@ -80,29 +73,12 @@ def load(file: Path, inputs: Inputs, digest: str) -> Emulator | None:
     Raises:
         UserError: If the file is damaged.
     """
-    if not file.is_file():
+    if (content := read_arrays(file, digest)) is None:
         return None
-    try:
-        with safe_open(file, framework="numpy") as content:
-            header = content.metadata() or {}
-            if header["digest"] != digest:
-                return None
-            arrays = {name: content.get_tensor(name) for name in content.keys()}  # noqa: SIM118
-        if header["arrays"] != _arrays_digest(arrays):
-            raise ValueError("its numbers have changed")
-        learnt = {
-            name: Learnt(GaussianProcess(*(arrays[f"{name}.{part}"] for part in PARTS)), positive)
-            for name, positive in json.loads(header["positive"]).items()
-        }
-        ratios = {name: (other, ratio) for name, (other, ratio) in json.loads(header["ratios"]).items()}
-        return Emulator(inputs, learnt, ratios, int(header["count"]))
-    except (SafetensorError, KeyError, ValueError, OSError) as error:
-        reason = " ".join(str(error).split())
-        raise UserError(f"{file} is damaged ({reason}); let the emulator be fitted again (refit)") from None
-
-
-def _arrays_digest(arrays: dict[str, FloatArray]) -> str:
-    sha = hashlib.sha256()
-    for name in sorted(arrays):
-        sha.update(f"{name} {arrays[name].shape}".encode() + arrays[name].tobytes())
-    return sha.hexdigest()
+    arrays, texts = content
+    learnt = {
+        name: Learnt(GaussianProcess(*(arrays[f"{name}.{part}"] for part in PARTS)), positive)
+        for name, positive in json.loads(texts["positive"]).items()
+    }
+    ratios = {name: (other, ratio) for name, (other, ratio) in json.loads(texts["ratios"]).items()}
+    return Emulator(inputs, learnt, ratios, int(texts["count"]))

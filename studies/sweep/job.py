@@ -1,5 +1,6 @@
 """A study to run: where it is read and written, and its samples as tasks for workers."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +26,15 @@ LEAST_MARKERS = {name: float(parameter_info(name, "low")) for name in ("marker_d
 
 
 @dataclass(frozen=True)
+class FieldOrder:
+    """Where the field of a sample is kept, at how many strokes, and the finger whose mesh moves."""
+
+    file: Path
+    strokes: int
+    base: str  # As JSON
+
+
+@dataclass(frozen=True)
 class Task:
     """One sample as a worker gets it.
 
@@ -38,6 +48,7 @@ class Task:
         density: Of the material, g/cm^3.
         checkpoints: Folder of a training that can be resumed; None for none.
         time_limit: Time after which it is stopped, s; None for none.
+        fields: The field to keep; None for none.
     """
 
     number: int
@@ -49,6 +60,21 @@ class Task:
     density: float
     checkpoints: Path | None = None
     time_limit: float | None = None
+    fields: FieldOrder | None = None
+
+
+def field_base(study: Study, definition: Mapping[str, Any]) -> dict[str, Any]:
+    """The definition of the finger in the middle of a study's ranges, whose mesh follows all others."""
+    shape = {name: value for name, value in study.fixed.items() if name in Parameters.model_fields}
+    middle = {
+        name: sum(values.ends) / 2 for name, values in study.varied.items() if name in Parameters.model_fields
+    }
+    return {**definition, **shape, **LEAST_MARKERS, **middle, "name": study.name}
+
+
+def field_file(out: Path, number: int) -> Path:
+    """The file of a sample's field in the folder of its sweep."""
+    return out / "fields" / f"{number:06d}.npz"
 
 
 S = TypeVar("S", bound=Study)
@@ -106,7 +132,16 @@ class StudyJob(Generic[S]):
             study.density,
             checkpoints,
             study.time_limit,
+            self._field_order(number),
         )
+
+    def _field_order(self, number: int) -> FieldOrder | None:
+        """The field to keep of a sample; None where the study keeps none."""
+        study = self.study
+        if study.strokes is None:
+            return None
+        base = json.dumps(field_base(study, self._base.definition()))
+        return FieldOrder(field_file(self.out, number), study.strokes, base)
 
     def marked(self, task: Task) -> dict[str, Any]:
         """The definition of a task's finger with the markers of the study, smaller where they must be."""

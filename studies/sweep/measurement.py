@@ -11,12 +11,14 @@ from compare.evaluation.plausibility import problem_remarks
 from geometry.cache import finger_mesh
 from geometry.drawing.drawn_finger import finger_from
 from geometry.errors import UserError
+from geometry.finger.design import Design
 from geometry.finger.parameters import Parameters
 from geometry.finger.validation import broken_rule
 from solvers.finger_figures import FRACTIONS
 from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solver import Solver, TrainedSolver, TrainingContext, TrainingDiverged
+from studies.sweep.field_path import FieldPath, moved_mesh, stepping
 from studies.sweep.job import Task
 from studies.sweep.quantities import quantities
 from studies.sweep.study import physics_of
@@ -76,9 +78,14 @@ def measured(task: Task) -> Measurement:
             return ended("refused", fault)
         finger = finger_from(task.definition)
         material, load = physics_of(task.physics)
-        mesh = finger_mesh(finger, settings=task.mesh, keep=task.checkpoints is not None)
-        problem = Problem(mesh, material, load, finger=finger)
         solver: Solver = make_solver(task.solver, **task.settings)
+        if task.fields and isinstance(finger, Design):
+            mesh = moved_mesh(task.fields.base, task.mesh).of(finger)
+            load = load.model_copy(update={"position": finger.contact_abscissa})
+            solver = stepping(solver, task.fields.strokes)
+        else:
+            mesh = finger_mesh(finger, settings=task.mesh, keep=task.checkpoints is not None)
+        problem = Problem(mesh, material, load, finger=finger)
         if task.checkpoints and isinstance(solver, TrainedSolver):
             solver = solver.in_context(TrainingContext(task.checkpoints, resume=True))
         solution, values = quantities(finger, problem, solver, density=task.density, progress=progress)
@@ -88,6 +95,8 @@ def measured(task: Task) -> Measurement:
         return ended("failed" if task.checkpoints else "refused", str(error))
     except Exception as error:
         return ended("failed", f"{type(error).__name__}: {error}")
+    if task.fields and solution.status.converged:
+        FieldPath.of(solution, task.fields.strokes).save(task.fields.file)
     status, _ = DeformedBody(mesh).status(solution)
     said = "; ".join([status.message, *problem_remarks(problem)])
     if unknown := [name for name, value in values.items() if np.isnan(value) and name not in FRACTIONS]:

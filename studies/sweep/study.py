@@ -91,6 +91,8 @@ class Study(CheckedModel):
         sampling: `grid`: every combination; `latin`: a Latin hypercube; `sobol`: a scrambled Sobol sequence,
             which can be continued.
         samples: Number of samples, unless on a grid.
+        strokes: Number of equal strokes up to the full one at which each sample's displacement field is kept,
+            for `pinnray explore`; None keeps none. Needs a cylinder and `fem-nonlinear`.
         seed: Of the samples.
         fixed: Parameters with one value for all samples.
         varied: Parameters with a range of values, among them settings of the solver, such as
@@ -106,6 +108,7 @@ class Study(CheckedModel):
     time_limit: float | None = bounded(None, 0.1, 1e6, "s", "", "Longest time for a finger")
     sampling: Literal["grid", "latin", "sobol"] = "sobol"
     samples: int | None = bounded(None, 1, MOST, "", "", "Number of samples")
+    strokes: int | None = bounded(None, 2, 100, "", "", "Strokes at which a sample's field is kept")
     seed: int = bounded(0, 0, 2**32 - 1, "", "", "Seed of the samples")
     fixed: dict[str, Value] = Field(default_factory=dict)
     varied: dict[str, Range]
@@ -143,9 +146,23 @@ class Study(CheckedModel):
                 raise ValueError("a grid has no samples to choose; leave samples out")
         elif self.samples is None:
             raise ValueError(f"sampling = {self.sampling}: give the number of samples, such as samples = 256")
+        if self.strokes is not None:
+            self._check_fields()
         ends = {name: (values.values or (values.low,))[0] for name, values in settings.items()}
         self.made_solver({name: value for name, value in ends.items() if value is not None})
         return self
+
+    def _check_fields(self) -> None:
+        """Refuse what fields on one moving mesh do not allow."""
+        if self.solver != "fem-nonlinear" or self.fixed.get("load") != "cylinder":
+            raise ValueError("strokes: fields need solver = 'fem-nonlinear' and load = 'cylinder' fixed")
+        if "stroke" in self.varied:
+            raise ValueError("strokes: every sample goes to the full stroke; give stroke under [fixed]")
+        choices = [name for name, values in self.varied.items() if name in WHOLE or values.values is not None]
+        if choices:
+            raise ValueError(
+                f"strokes: {choices[0]} is a choice, between whose values no mesh moves; make a study for each"
+            )
 
     @property
     def settings_alone(self) -> bool:

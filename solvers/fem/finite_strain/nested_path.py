@@ -25,6 +25,9 @@ def coarser(problem: Problem) -> Problem | None:
         return None
     if problem.finger is None or len(problem.mesh.triangles) < FINE:
         return None
+    edge = np.sqrt(4 / np.sqrt(3) * np.median(problem.mesh.areas))
+    if edge > COARSE / np.sqrt(2):  # a coarse mesh, which takes seconds, would not have half as many
+        return None
     settings = MeshSettings(size=COARSE)
     try:
         mesh = finger_mesh(problem.finger, settings=settings)

@@ -1,0 +1,381 @@
+// The explorer: sliders, the deformed finger on a canvas, its figures and its force over the stroke.
+"use strict";
+(async () => {
+  const byId = (name) => document.getElementById(name);
+  const { manifest, load, finger, force, predicted, fault, at } = pinnrayModel;
+  const canvas = byId("explorer-canvas");
+  if (!canvas.getContext || !("DecompressionStream" in window)) return;
+  const mesh = await load();
+  byId("explorer-absent").hidden = true;
+  byId("explorer").hidden = false;
+
+  const digits = (value, count = 3) => String(Number(value.toPrecision(count))).replace("-", "−");
+  const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const element = (name, attributes = {}, text = "") => {
+    const made = Object.assign(document.createElement(name), { textContent: text });
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    return made;
+  };
+
+  // The sliders: the stroke, the study's parameters, and Young's modulus and depth, which are mere factors.
+  const factors = [
+    { name: "young", symbol: "E", meaning: "Young's modulus", unit: "MPa", low: 0.1, high: 1000, value: manifest.fixed.young, log: true },
+    { name: "depth", meaning: "Depth of the finger", unit: "mm", low: 1, high: 100, value: manifest.fixed.depth, log: true },
+  ].filter(({ name }) => !manifest.parameters.some((each) => each.name === name));
+  const stroke = { name: "stroke", meaning: "Travel of the indenter", unit: "mm", low: manifest.stroke / 200, high: manifest.stroke, value: manifest.stroke };
+  const controls = [stroke, ...manifest.parameters, ...factors];
+  const STEPS = 1000;
+  const toStep = ({ low, high, log }, value) => STEPS * (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low));
+  const toValue = ({ low, high, log }, step) => {
+    const value = log ? low * (high / low) ** (step / STEPS) : low + ((high - low) * step) / STEPS;
+    return Math.min(Math.max(Number(value.toPrecision(4)), low), high);
+  };
+  const values = { ...manifest.fixed };
+  const form = byId("explorer-sliders");
+  for (const control of controls) {
+    const { name, meaning, unit, symbol, low, high } = control;
+    const label = element("label", { for: `slider-${name}` });
+    label.append(element("span", {}, `${meaning}${symbol ? `, ${symbol}` : ""}`));
+    control.slider = element("input", { id: `slider-${name}`, type: "range", min: 0, max: STEPS, step: 1 });
+    control.box = element("input", { type: "number", step: "any", min: low, max: high, "aria-label": `${meaning}, ${unit}`, id: `value-${name}` });
+    const row = element("span", { class: "explorer-value" });
+    row.append(control.slider, control.box, element("span", { class: "unit" }, unit));
+    label.append(row);
+    form.append(label);
+    control.slider.addEventListener("input", () => set(control, toValue(control, Number(control.slider.value))));
+    control.box.addEventListener("change", () => {
+      const given = control.box.value.trim() === "" ? NaN : Number(control.box.value);
+      set(control, Number.isFinite(given) ? given : values[name]);
+    });
+  }
+  form.addEventListener("submit", (event) => event.preventDefault());
+
+  function show(control) {
+    const value = values[control.name];
+    control.slider.value = Math.round(toStep(control, value));
+    control.slider.setAttribute("aria-valuetext", `${digits(value, 4)} ${control.unit}`);
+    control.box.value = value;
+  }
+
+  // Why the study says nothing of these values; empty if it does.
+  function unknown() {
+    const out = controls.find(({ name, low, high }) => !(values[name] >= low && values[name] <= high));
+    if (!out) return fault(values);
+    return `${out.meaning} of ${digits(values[out.name])} ${out.unit} is outside the study, which has ${digits(out.low)} to ${digits(out.high)} ${out.unit}.`;
+  }
+
+  // One finger is computed once for all strokes; a frame is drawn when the browser is ready for it.
+  let known, asked, solved;
+  function set(control, value) {
+    values[control.name] = value;
+    show(control);
+    solved = undefined;
+    if (control !== stroke) known = undefined;
+    asked ??= requestAnimationFrame(draw);
+  }
+
+  const rows = new Map(manifest.figures.map(({ name, title, unit, meaning }) => {
+    const row = element("tr", { title: meaning });
+    const head = element("th", { scope: "row" }, title);
+    const cells = [element("td", { id: `figure-${name}` }), element("td", { class: "within" })];
+    row.append(head, ...cells);
+    byId("explorer-figures").tBodies[0].append(row);
+    return [name, { cells, unit }];
+  }));
+
+  function draw() {
+    asked = undefined;
+    const started = performance.now();
+    const why = solved ? "" : unknown();
+    byId("explorer-fault").hidden = !why;
+    byId("explorer-fault").textContent = why;
+    byId("explorer").classList.toggle("unknown", Boolean(why));
+    const inside = { ...values };
+    for (const { name, low, high } of controls) inside[name] = Math.min(Math.max(values[name], low), high);
+    known ??= finger(inside);
+    const now = solved ?? predicted(known, inside.stroke / manifest.stroke);
+    for (const { name, value, half } of now.figures) {
+      const { cells, unit } = rows.get(name);
+      cells[0].textContent = why ? "not known" : `${digits(value)} ${unit}`;
+      const least = name === "contact_width" ? Math.max(value - half, 0) : value - half;
+      cells[1].textContent = why ? "" : solved ? "finite elements" : `${digits(least)} to ${digits(value + half)}`;
+    }
+    picture(now);
+    curve(why);
+    compareMarkers(now);
+    byId("explorer-note").textContent = why ? "" : solved ? `True scale. Solved with finite elements: ${solved.message}` :
+      `True scale. Displacement within ${digits(100 * now.error, 2)} % in 19 of 20 cases (root mean square).`;
+    byId("explorer-copied").hidden = true;
+    byId("explorer").dataset.milliseconds = performance.now() - started;
+    state = now;
+  }
+  let state;
+
+  // The view holds every finger of the ranges: that of the middle at rest, with room for the stroke and cylinder.
+  const range = (() => {
+    const all = { x: [Infinity, -Infinity], y: [Infinity, -Infinity] };
+    for (let n = 0; n < mesh.count; n += 1) {
+      for (const [axis, name] of ["x", "y"].entries()) {
+        const value = mesh.points[2 * n + axis];
+        all[name] = [Math.min(all[name][0], value), Math.max(all[name][1], value)];
+      }
+    }
+    return { x: [all.x[0] - 4, all.x[1] + 6], y: [all.y[0] - 0.75 * manifest.stroke, all.y[1] + 1.2 * manifest.stroke + 4] };
+  })();
+
+  function picture({ points, moved, stress }) {
+    const ratio = window.devicePixelRatio || 1;
+    const width = canvas.clientWidth;
+    const foot = 44;
+    const scale = width / (range.x[1] - range.x[0]);
+    const height = scale * (range.y[1] - range.y[0]) + foot;
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+      canvas.style.height = `${height}px`;
+    }
+    const context = canvas.getContext("2d");
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    const [left, top] = [range.x[0], range.y[1]];
+    const X = (x) => (x - left) * scale;
+    const Y = (y) => (top - y) * scale;
+    const { cells } = mesh;
+    const xs = new Float64Array(mesh.count);
+    const ys = new Float64Array(mesh.count);
+    for (let n = 0; n < mesh.count; n += 1) {
+      xs[n] = X(points[2 * n] + moved[2 * n]);
+      ys[n] = Y(points[2 * n + 1] + moved[2 * n + 1]);
+    }
+    outline(context, (n) => [X(points[2 * n]), Y(points[2 * n + 1])], ink("--rule"));
+    // The triangles of a colour in one path.
+    const count = manifest.colours.length;
+    const top_ = manifest.colourStress * (values.young / manifest.baseYoung);
+    const paths = manifest.colours.map(() => new Path2D());
+    for (let t = 0; t < cells.length; t += 6) {
+      const [a, b, c] = [cells[t], cells[t + 1], cells[t + 2]];
+      const share = (stress[a] + stress[b] + stress[c]) / (3 * top_);
+      const path = paths[Math.min(count - 1, Math.max(0, Math.floor(share * count)))];
+      path.moveTo(xs[a], ys[a]);
+      path.lineTo(xs[b], ys[b]);
+      path.lineTo(xs[c], ys[c]);
+      path.closePath();
+    }
+    context.lineWidth = 0.6;
+    paths.forEach((path, k) => {
+      context.fillStyle = context.strokeStyle = manifest.colours[k];
+      context.fill(path);
+      context.stroke(path);
+    });
+    outline(context, (n) => [xs[n], ys[n]], ink("--ink"));
+    // The cylinder, and the way of its middle.
+    const angle = (values.direction * Math.PI) / 180;
+    const start = [values.contact_position, values.radius];
+    const end = [start[0] + values.stroke * Math.sin(angle), start[1] - values.stroke * Math.cos(angle)];
+    context.strokeStyle = ink("--ink");
+    context.fillStyle = ink("--soft");
+    context.lineWidth = 1.2;
+    context.beginPath();
+    context.arc(X(end[0]), Y(end[1]), values.radius * scale, 0, 2 * Math.PI);
+    context.globalAlpha = 0.55;
+    context.fill();
+    context.globalAlpha = 1;
+    context.stroke();
+    context.setLineDash([3, 3]);
+    context.beginPath();
+    context.moveTo(X(start[0]), Y(start[1]));
+    context.lineTo(X(end[0]), Y(end[1]));
+    context.stroke();
+    context.setLineDash([]);
+    drawMarkers(context, X, Y);
+    legend(context, width, height - foot, top_, scale);
+  }
+
+  function outline(context, place, colour) {
+    context.strokeStyle = colour;
+    context.lineWidth = 1;
+    context.beginPath();
+    for (const path of manifest.outlines) {
+      path.forEach((node, k) => (k ? context.lineTo(...place(node)) : context.moveTo(...place(node))));
+    }
+    context.stroke();
+  }
+
+  function legend(context, width, y, most, scale) {
+    const [length, at_] = [Math.min(0.5 * width, 260), 8];
+    manifest.colours.forEach((colour, k) => {
+      context.fillStyle = colour;
+      context.fillRect(at_ + (k * length) / manifest.colours.length, y + 6, length / manifest.colours.length + 1, 9);
+    });
+    context.fillStyle = ink("--ink");
+    context.font = "12px system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif";
+    context.textBaseline = "top";
+    context.textAlign = "left";
+    context.fillText("0", at_, y + 18);
+    context.textAlign = "right";
+    context.fillText(`${digits(most)} MPa`, at_ + length, y + 18);
+    context.textAlign = "center";
+    context.fillText(width > 500 ? "von Mises stress" : "stress", at_ + 0.5 * length, y + 18);
+    context.fillRect(width - 8 - 10 * scale, y + 10, 10 * scale, 3);
+    context.textAlign = "right";
+    context.fillText("10 mm", width - 8, y + 18);
+  }
+
+  // Force over the stroke with its interval; what is beyond the stroke is grey.
+  const svg = byId("explorer-curve");
+  function curve(why) {
+    svg.replaceChildren();
+    if (why) return;
+    const full = solved ? values.stroke : manifest.stroke;
+    const share = values.stroke / full;
+    const rest = { s: 0, value: 0, half: 0 };
+    const points = solved
+      ? [rest, ...solved.forces.map((value, k) => ({ s: (k + 1) / solved.forces.length, value, half: 0 }))]
+      : [rest, ...Array.from({ length: 32 }, (_, k) => (k + 1) / 32).map((s) => ({ s, ...force(known, s) }))];
+    const now = solved ? points.at(-1) : force(known, share);
+    const most = Math.max(...points.map(({ value, half }) => value + half), 1e-9);
+    const step = [1, 2, 5, 10].map((each) => each * 10 ** Math.floor(Math.log10(most / 4))).find((each) => most / each <= 5);
+    const high = step * Math.ceil(most / step);
+    const X = (s) => 46 + 300 * s;
+    const Y = (value) => 172 - 155 * Math.min(Math.max(value / high, 0), 1);
+    const line = (list) => list.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ");
+    const made = (name, attributes, text) => {
+      const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+      for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+      if (text !== undefined) node.textContent = text;
+      return node;
+    };
+    const band = [...points.map(({ s, value, half }) => [X(s), Y(value + half)]), ...points.toReversed().map(({ s, value, half }) => [X(s), Y(value - half)])];
+    const parts = [
+      made("polygon", { points: line(band), class: "band" }),
+      made("polyline", { points: line(points.map(({ s, value }) => [X(s), Y(value)])), class: "rest" }),
+      made("polyline", { points: line([...points.filter(({ s }) => s < share).map(({ s, value }) => [X(s), Y(value)]), [X(share), Y(now.value)]]), class: "gone" }),
+      made("circle", { cx: X(share), cy: Y(now.value), r: 4 }),
+      made("path", { d: "M46 12V172H350", class: "axis" }),
+      made("text", { x: 198, y: 206, "text-anchor": "middle" }, "stroke, mm"),
+      made("text", { x: 12, y: 92, "text-anchor": "middle", transform: "rotate(-90 12 92)" }, "force, N"),
+    ];
+    for (let value = 0; value <= high * 1.001; value += step) {
+      parts.push(made("text", { x: 40, y: Y(value) + 4, "text-anchor": "end" }, digits(value)));
+    }
+    for (const s of [0, 0.25, 0.5, 0.75, 1]) {
+      parts.push(made("text", { x: X(s), y: 188, "text-anchor": "middle" }, digits(s * full)));
+    }
+    svg.replaceChildren(...parts);
+  }
+
+  // Measured markers: where they were seen, and how far the prediction is from there.
+  let markers = [];
+  const columns = ["x_mm", "y_mm", "u_mm", "v_mm"];
+  function readMarkers(text, name) {
+    const lines = text.split(/\r?\n/).map((line) => line.trim()).filter((line) => line && !line.startsWith("#"));
+    const heads = (lines[0] ?? "").split(",").map((head) => head.trim());
+    const places = columns.map((column) => heads.indexOf(column));
+    if (places.includes(-1)) {
+      return `${name} lacks the column ${columns[places.indexOf(-1)]}; it needs ${columns.join(",")}.`;
+    }
+    const found = lines.slice(1).map((line) => places.map((place) => Number(line.split(",")[place] || NaN)));
+    const seen = found.filter((row) => row.every(Number.isFinite));
+    if (!seen.length) return `${name} has no marker with four numbers.`;
+    markers = seen;
+    return "";
+  }
+
+  async function takeFile(file) {
+    const said = readMarkers(await file.text(), file.name);
+    byId("explorer-said").textContent = said;
+    asked ??= requestAnimationFrame(draw);
+  }
+
+  function compareMarkers(now) {
+    if (!markers.length) return;
+    const all = markers.map(([x, y, u, v]) => ({ seen: [u, v], found: at(now, [x, y]) }));
+    const inside = all.filter(({ found }) => found);
+    const mean = inside.reduce((sum, { seen, found }) => sum + Math.abs(seen[0] - found[0]) + Math.abs(seen[1] - found[1]), 0) / inside.length;
+    const outside = all.length - inside.length;
+    byId("explorer-markers").textContent = inside.length
+      ? `${inside.length} markers: mean of |Δu| + |Δv| ${digits(mean)} mm at these sliders.${outside ? ` ${outside} lie outside the finger.` : ""}`
+      : "All markers lie outside the finger; x and y are of the finger at rest, mm from its base on the front face.";
+  }
+
+  function drawMarkers(context, X, Y) {
+    context.lineWidth = 1.5;
+    for (const [x, y, u, v] of markers) {
+      context.strokeStyle = "#d1495b";
+      context.beginPath();
+      context.arc(X(x + u), Y(y + v), 4, 0, 2 * Math.PI);
+      context.stroke();
+    }
+  }
+
+  byId("explorer-csv").addEventListener("change", ({ target }) => target.files[0] && takeFile(target.files[0]));
+  const page = byId("explorer");
+  page.addEventListener("dragover", (event) => event.preventDefault());
+  page.addEventListener("drop", (event) => {
+    event.preventDefault();
+    if (event.dataTransfer.files[0]) takeFile(event.dataTransfer.files[0]);
+  });
+
+  // The same finger for the command line, a file of options, and Python.
+  const shapes = () => manifest.shapeNames.concat("contact_position", "depth").filter((name, k, all) => all.indexOf(name) === k);
+  const loads = ["stroke", "radius", "direction", "friction", "young", "poisson"];
+  const copies = {
+    command: () => `pinnray solve fem-nonlinear --design ${manifest.design} --law ${manifest.law} --load cylinder`
+      + loads.map((name) => ` --${name} ${values[name]}`).join("")
+      + shapes().map((name) => ` --set ${name}=${values[name]}`).join("") + ` --mesh-size ${manifest.meshSize}`,
+    toml: () => ["[options]", `design = "${manifest.design}"`, `law = "${manifest.law}"`, 'load = "cylinder"',
+      ...loads.map((name) => `${name} = ${values[name]}`), `mesh-size = ${manifest.meshSize}`,
+      `set = [${shapes().map((name) => `"${name}=${values[name]}"`).join(", ")}]`, 'solvers = "fem-nonlinear"'].join("\n"),
+    python: () => `pr.solve("fem-nonlinear", "${manifest.design}", size=${manifest.meshSize}, load="cylinder", law="${manifest.law}", `
+      + [...loads, ...shapes()].map((name) => `${name}=${values[name]}`).join(", ") + ")",
+  };
+  for (const button of document.querySelectorAll("[data-copy]")) {
+    button.addEventListener("click", async () => {
+      const text = copies[button.dataset.copy]();
+      const shown = byId("explorer-copied");
+      shown.textContent = text;
+      shown.hidden = false;
+      try {
+        await navigator.clipboard.writeText(text);
+        byId("explorer-said").textContent = "copied";
+      } catch {
+        byId("explorer-said").textContent = "select and copy it below";
+      }
+    });
+  }
+
+  // With a server behind the page: what the study does not know is solved.
+  byId("explorer-solve")?.addEventListener("click", async ({ target }) => {
+    const asking = Object.fromEntries(controls.map(({ name }) => [name, values[name]]));
+    target.disabled = true;
+    byId("explorer-said").textContent = "solving …";
+    try {
+      const reply = await fetch("/solve", { method: "POST", headers: { "X-Pinnray": manifest.live }, body: JSON.stringify(asking) });
+      if (!reply.ok) throw new Error(`the server says ${reply.status}`);
+      const found = await reply.json();
+      byId("explorer-said").textContent = found.nodal ? "" : found.message;
+      if (found.nodal && controls.every(({ name }) => values[name] === asking[name])) {
+        const figures = manifest.figures.map(({ name }) => ({ name, value: found.figures[name], half: 0 }));
+        solved = { points: found.points, moved: found.nodal, stress: found.stress, figures, forces: found.forces, message: found.message };
+        draw();
+      }
+    } catch (error) {
+      byId("explorer-said").textContent = `no answer (${error.message}); is pinnray app still running?`;
+    }
+    target.disabled = false;
+  });
+
+  function middle() {
+    for (const control of controls) {
+      values[control.name] = control.value;
+      show(control);
+    }
+    known = solved = undefined;
+    draw();
+  }
+  byId("explorer-reset").addEventListener("click", middle);
+  new ResizeObserver(() => { asked ??= requestAnimationFrame(draw); }).observe(canvas.parentElement);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  window.pinnrayExplorer = { values, controls, draw, set, state: () => state };
+  middle();
+})();

@@ -1,0 +1,54 @@
+"""Write the explorer of a sweep's fields, or serve it with a solver behind it."""
+
+from pathlib import Path
+
+from geometry.errors import UserError
+from pinnray.options.shared import OptionalOutputPath
+
+
+def explore(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False) -> int:
+    """Write a page that shows the deformed finger at any load of a sweep, while sliders move.
+
+    The page is one file that needs no network. The study must have kept fields: strokes = 10 in its file.
+    An emulator is fitted the first time, and again when there are more samples.
+
+    Args:
+        sweep: Folder of `pinnray sweep`.
+        out: HTML file; default: explore.html in that folder.
+        refit: Fit the emulator again.
+    """
+    from compare.runtime.stages import Stages
+    from studies.fields.explorer import write_explorer
+    from studies.fields.store import fields_of
+
+    path = out or sweep / "explore.html"
+    if path.suffix.lower() != ".html":
+        raise UserError(f"--out {path}: give the name of an HTML file, such as explore.html")
+    with Stages() as stages:
+        emulator = fields_of(sweep, refit=refit, stages=stages)
+        with stages.stage("page"):
+            write_explorer(emulator, path)
+    print(path)
+    return 0
+
+
+def app(sweep: Path, *, port: int = 8765, refit: bool = False) -> int:
+    """Serve the explorer of a sweep, with `fem-nonlinear` behind it for what the sweep does not know.
+
+    Only this machine is served, and only pages that it has served itself. Ctrl-C ends it.
+
+    Args:
+        sweep: Folder of `pinnray sweep`.
+        port: Of this machine; 0 takes any that is free.
+        refit: Fit the emulator again.
+    """
+    from compare.runtime.stages import Stages
+    from studies.fields.live import serve
+    from studies.fields.store import fields_of
+
+    if not 0 <= port < 65536:
+        raise UserError(f"--port {port}: give a number from 0 to 65535")
+    with Stages() as stages:
+        emulator = fields_of(sweep, refit=refit, stages=stages)
+    serve(emulator, port, lambda address: print(f"{address}  (Ctrl-C ends)", flush=True))
+    return 0

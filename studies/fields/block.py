@@ -1,0 +1,123 @@
+"""Vectors that are predicted by modes: a Gaussian process for the coefficient of each, evaluated together.
+
+The kernel is Matérn's of order 5/2, with one length for every input: where a rib begins, what a load does has
+a kink. Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006:
+eq. 4.17, algorithm 2.1, eq. 5.12 (leave-one-out).
+"""
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from geometry.arrays import FloatArray
+from studies.fields.reduction import Modes
+
+WATCHED = 12
+"""Leading modes whose standard deviations are predicted: they cost more than all other numbers."""
+
+LANDMARKS = 100
+"""Samples at most from which the standard deviation at a point is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Modes of vectors, and a process for each of their r coefficients.
+
+    Attributes:
+        modes: Of the vectors.
+        inputs: Of the samples, shape (n, d).
+        rates: Inverse squared lengths of every process, shape (r, d).
+        weights: Shape (n, r).
+        numbers: Mean, standard deviation and noise's variance over it of every process, shape (3, r).
+        factors: Inverse Cholesky factors of the covariance of the first m samples, of the w leading modes,
+            shape (w, m, m).
+    """
+
+    modes: Modes
+    inputs: FloatArray
+    rates: FloatArray
+    weights: FloatArray
+    numbers: FloatArray
+    factors: FloatArray
+
+    @classmethod
+    def fitted(cls, inputs: FloatArray, modes: Modes, coefficients: FloatArray) -> Self:
+        """The block of samples whose coefficients (n, r) are known."""
+        count = min(len(inputs) // 2, LANDMARKS)
+        squares = (inputs[:, None] - inputs) ** 2
+        rates, weights, numbers = [], [], []
+        factors: list[FloatArray] = []
+        for column in coefficients.T:
+            mean, spread = float(column.mean()), float(column.std()) or 1.0
+            rate, noise = _learnt(inputs, (column - mean) / spread)
+            covariance = matern(squares @ rate) + noise * np.eye(len(inputs))
+            factor = cholesky(covariance, lower=True)
+            half = solve_triangular(factor, column - mean, lower=True)
+            rates.append(rate)
+            weights.append(solve_triangular(factor, half, lower=True, trans=1))
+            numbers.append((mean, spread, noise))
+            if len(factors) < WATCHED:
+                factors.append(np.linalg.inv(factor[:count, :count]))
+        shape = (0, count, count)
+        return cls(
+            modes,
+            inputs,
+            np.array(rates).reshape(-1, inputs.shape[1]),
+            np.array(weights).reshape(-1, len(inputs)).T,
+            np.array(numbers).reshape(-1, 3).T,
+            np.array(factors) if factors else np.zeros(shape),
+        )
+
+    def vector(self, inputs: FloatArray) -> FloatArray:
+        """The vector at inputs (d,)."""
+        covariance = matern((self.inputs - inputs) ** 2 @ self.rates.T)
+        return self.modes.combined(self.numbers[0] + np.einsum("nr,nr->r", covariance, self.weights))
+
+    @property
+    def landmarks(self) -> int:
+        """Number of the first samples, from which standard deviations are taken."""
+        return self.factors.shape[1]
+
+    def deviations(self, inputs: FloatArray) -> FloatArray:
+        """Standard deviations of the leading coefficients at inputs (d,), shape (w,)."""
+        squares = (self.inputs[: self.landmarks] - inputs) ** 2
+        covariance = matern(squares @ self.rates[: len(self.factors)].T)
+        known = ((self.factors @ covariance.T[..., None])[..., 0] ** 2).sum(axis=1)
+        _, spread, noise = self.numbers[:, : len(known)]
+        return np.asarray(spread * np.sqrt(np.maximum(1 - known, 0.0) + noise))
+
+    @cached_property
+    def left_out(self) -> FloatArray:
+        """Errors of the samples' coefficients, each predicted from all others, shape (n, r)."""
+        squares = (self.inputs[:, None] - self.inputs) ** 2
+        errors = np.empty_like(self.weights)
+        for mode, rates in enumerate(self.rates):
+            covariance = matern(squares @ rates) + self.numbers[2, mode] * np.eye(len(squares))
+            errors[:, mode] = self.weights[:, mode] / np.diag(np.linalg.inv(covariance))
+        return errors
+
+
+def matern(squares: FloatArray) -> FloatArray:
+    """The kernel of squared distances over the lengths."""
+    away = np.sqrt(5 * squares)
+    return np.asarray((1 + away + away**2 / 3) * np.exp(-away))
+
+
+def _learnt(inputs: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+    """Inverse squared length of every input and the noise's variance over the signal's, most likely ones."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+    lengths = Matern(np.full(inputs.shape[1], 2.0), (0.05, 1e3), nu=2.5)
+    kernel = ConstantKernel(10.0, (1e-2, 1e5)) * lengths + WhiteKernel(1e-4, (1e-10, 10.0))
+    process = GaussianProcessRegressor(kernel)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # that a length is at its bound
+        process.fit(inputs, values)
+    found = np.exp(process.kernel_.theta)
+    return 1 / found[1:-1] ** 2, float(found[-1] / found[0])

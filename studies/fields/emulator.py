@@ -1,0 +1,292 @@
+"""The emulator of fields: modes of whole load paths, a Gaussian process for the coefficient of each.
+
+A path is the displacement at all strokes, each divided by its stroke: nearly constant, so that small strokes
+are as accurate as large ones. Between two strokes is a cubic spline, which is linear in the path.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import hypot
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from compare.runtime.stages import Stages
+from geometry.arrays import FloatArray
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.elasticity import LawName
+from solvers.physics import Load, Material
+from solvers.problem import Problem
+from solvers.registry import make_solver
+from solvers.solver import with_law
+from studies.emulator.inputs import Inputs
+from studies.fields.block import Block
+from studies.fields.prediction import PredictedField
+from studies.fields.reader import FIGURES, FieldReader
+from studies.fields.reduction import Modes
+from studies.fields.snapshots import Snapshots
+from studies.sweep.study import Study, Value
+
+LEAST, LEAST_OF_PATHS = 1e-6, 1e-5
+"""Shares of the squared displacement gradients, and of those of paths about their mean, below which modes are
+left out: smaller ones follow the elements that touch the cylinder by turns, and no process learns them."""
+
+MOTION = 1e-10
+"""Share of the squared motion of meshes below which modes are left out: these are to be exact."""
+
+LEVEL = 0.95
+"""Probability of the intervals."""
+
+POWERS = np.array([1, 1, 2, 0, 0])
+"""Powers of the stroke by which the numbers of a path are divided."""
+
+
+@dataclass(frozen=True, eq=False)
+class FieldEmulator:
+    """Predicts whole fields of a study's fingers; made by `fitted_fields`.
+
+    Attributes:
+        inputs: Reads the parameters of a finger.
+        mesh: At rest in the middle of the ranges.
+        space: Modes of displacements, r of them, without a mean.
+        field: Their coefficients over the stroke along a path, vectors of k r.
+        numbers: Numbers of a path over powers of the stroke, in units of `units`, vectors of 5 k.
+        motion: Nodes of the mesh; None where no mesh moves.
+        units: Shape (5,).
+        known: Inputs of the samples with fields, shape (n, d).
+        lost: Inputs of samples without an equilibrium under the full load, shape (l, d).
+        errors: Of the samples' displacements at the full stroke, each predicted from all others, over the
+            displacements, shape (n,).
+        scales: Root mean squares over the samples of the displacement, then of `FIGURES`, shape (k, 1 + f).
+        reasons: Why these have none.
+        calibration: Half widths of their 95 % intervals over these and the indicator, shape (k, 1 + f).
+    """
+
+    inputs: Inputs
+    mesh: TriangleMesh
+    space: Modes
+    field: Block
+    numbers: Block
+    motion: Block | None
+    units: FloatArray
+    known: FloatArray
+    lost: FloatArray
+    scales: FloatArray
+    calibration: FloatArray
+    errors: FloatArray
+    reasons: Sequence[str] = ()
+
+    @property
+    def study(self) -> Study:
+        """The study."""
+        return self.inputs.study
+
+    @property
+    def stroke(self) -> float:
+        """The full stroke, mm."""
+        return float(self.study.fixed.get("stroke", 10.0))
+
+    @property
+    def shares(self) -> FloatArray:
+        """Strokes at which fields are known over the full one, shape (k,)."""
+        return np.arange(1, len(self.scales) + 1) / len(self.scales)
+
+    def fault(self, finger: Mapping[str, Value], stroke: float) -> str | None:
+        """The reason why a field cannot be predicted, or None."""
+        if fault := self.inputs.fault(finger):
+            return fault
+        if not 0 < stroke <= self.stroke * (1 + 1e-12):
+            return f"stroke = {stroke:g} is outside the sweep: above 0 to {self.stroke:g} mm"
+        at = places(self.inputs, [finger])[0]
+        away = ((self.lost - at) ** 2).sum(axis=1)
+        if len(away) and away.min() < ((self.known - at) ** 2).sum(axis=1).min():
+            return f"the nearest sample of the sweep has no field: {self.reasons[int(away.argmin())]}"
+        return None
+
+    def predict(self, finger: Mapping[str, Value], stroke: float) -> PredictedField:
+        """The field of a finger at a stroke, mm; see `fault`, which is not asked again."""
+        at, share = places(self.inputs, [finger])[0], stroke / self.stroke
+        weights = self.weights(share)
+        path = self.field.vector(at).reshape(len(weights), -1)
+        nodal = share * self.space.combined(weights @ path).reshape(-1, 2)
+        numbers = self.numbers.vector(at).reshape(len(weights), -1) * self.units
+        force_u, force_v, energy, abscissa, width = (weights @ numbers) * share**POWERS
+        problem = self.problem(finger, stroke, at)
+        young = problem.material.young / self.young
+        reaction = young * np.array([force_u, force_v])
+        stress = self.reader.stress(problem.mesh.points, nodal, self.law, problem.material.lame)
+        read = self.reader.figures(problem.mesh.points, nodal, stress, float(problem.load.position or 0))
+        values = (grip_force(reaction, problem.load) * problem.mesh.depth, *read, max(width, 0.0))
+        indicator = self.indicator(self.field.deviations(at), weights)
+        scales, calibration = (_between(each, self.shares, share) for each in (self.scales, self.calibration))
+        halves = indicator * scales * calibration
+        halves[1] *= young * problem.mesh.depth
+        halves[5] *= young
+        intervals = zip(FIGURES, values, halves[1:], strict=True)
+        return PredictedField(
+            problem=problem,
+            nodal=nodal,
+            von_mises=stress,
+            reaction=reaction,
+            energy=young * energy,
+            contact=(abscissa, max(width, 0.0)),
+            figures=dict(zip(FIGURES, values, strict=True)),
+            intervals={name: (value - half, value + half) for name, value, half in intervals},
+            error=float(halves[0] / np.sqrt(np.mean(nodal**2))),
+        )
+
+    def problem(self, finger: Mapping[str, Value], stroke: float, at: FloatArray) -> Problem:
+        """The problem that a prediction solves."""
+        from geometry.finger.design import Design
+
+        shape = Design(**self.inputs.parameters(finger).model_dump())
+        material, load = self.inputs.physics({**finger, "stroke": stroke})
+        load = load.model_copy(update={"position": shape.contact_abscissa})
+        mesh = self.mesh
+        if self.motion is not None or shape.depth != mesh.depth:
+            points = mesh.points if self.motion is None else self.motion.vector(at).reshape(-1, 2)
+            mesh = replace(mesh, points=points, depth=shape.depth)
+        return Problem(mesh, material.model_copy(update={"law": self.law}), load, finger=shape)
+
+    def weights(self, share: float) -> FloatArray:
+        """Weights of the strokes in the cubic spline at a share of the full one, shape (k,)."""
+        return np.asarray(self.spline(share))
+
+    def indicator(self, deviations: FloatArray, weights: FloatArray) -> float:
+        """Expected root mean square of the displacement's error over the stroke, from modes' deviations."""
+        lengths = ((self.error_modes[: len(deviations)] @ weights) ** 2).sum(axis=1)
+        return float(np.sqrt(lengths @ deviations**2))
+
+    @cached_property
+    def spline(self) -> CubicSpline:
+        """Weights of the strokes as functions of the share of the full one."""
+        return CubicSpline(self.shares, np.eye(len(self.shares)))
+
+    @cached_property
+    def reader(self) -> FieldReader:
+        """Reads stress and figures from displacements."""
+        return FieldReader(self.mesh)
+
+    @property
+    def young(self) -> float:
+        """Young's modulus of which `numbers` are, MPa."""
+        middle = {name: sum(values.ends) / 2 for name, values in self.study.varied.items() if name == "young"}
+        return self.inputs.physics(middle)[0].young
+
+    @cached_property
+    def law(self) -> LawName:
+        """The material's law: the solver's first where the study has none of its own."""
+        return with_law(self.inputs.physics({})[0], make_solver(self.study.solver)).law
+
+    @cached_property
+    def error_modes(self) -> FloatArray:
+        """Modes of paths whose squared lengths are mean squares of the displacement, (p, r, k)."""
+        rows = self.space.vectors
+        lengths = np.linalg.cholesky(rows @ rows.T / rows.shape[1])
+        vectors = self.field.modes.vectors
+        found = vectors.reshape(len(vectors), len(self.shares), -1) @ lengths
+        return np.ascontiguousarray(found.transpose(0, 2, 1))
+
+
+def places(inputs: Inputs, fingers: Sequence[Mapping[str, Value]]) -> FloatArray:
+    """Inputs of fingers, shape (n, d): their parameters, the contact's place as it is half way.
+
+    For what counts is where the indenter meets the ribs, and with its direction it goes along the finger.
+    """
+    moved = []
+    for finger in fingers:
+        if "contact_position" in finger:
+            travel = inputs.physics(finger)[1].displacement[0] or 0.0
+            finger = {**finger, "contact_position": float(finger["contact_position"]) + 0.5 * travel}
+        moved.append(finger)
+    return inputs.columns(moved)
+
+
+def grip_force(reaction: FloatArray, load: Load) -> float:
+    """Force along the indenter's travel, N/mm."""
+    u, v = (value or 0.0 for value in load.displacement)
+    return float((reaction[..., 0] * u + reaction[..., 1] * v) / hypot(u, v))
+
+
+def fitted_fields(known: Snapshots, stages: Stages | None = None) -> FieldEmulator:
+    """The emulator of fields, with intervals from samples that are each predicted from all others."""
+    with (stages or Stages(quiet=True)).stage("emulator") as progress:
+        inputs = places(known.inputs, known.samples)
+        count, strokes, nodes, _ = known.nodal.shape
+        space, coefficients = Modes.of_fields(known.nodal.reshape(-1, nodes, 2), known.space, LEAST)
+        progress(0.2, f"{len(space.vectors)} modes of {count} paths")
+        paths = coefficients.reshape(count, strokes, -1) / known.shares[:, None]
+        field = Block.fitted(inputs, *Modes.of(paths.reshape(count, -1), LEAST_OF_PATHS))
+        progress(0.6, "force and contact")
+        numbers = known.numbers / known.shares[:, None] ** POWERS
+        numbers[..., :3] /= known.factors[:, None, None]
+        units = np.abs(numbers).mean(axis=(0, 1)) + 1e-12
+        block = Block.fitted(inputs, *Modes.of((numbers / units).reshape(count, -1), LEAST_OF_PATHS))
+        progress(0.8, "mesh")
+        motion = None
+        if known.inputs.moves:
+            motion = Block.fitted(inputs, *Modes.of(known.points.reshape(count, -1), MOTION))
+        progress(0.9, "intervals")
+        ones = np.ones((strokes, 1 + len(FIGURES)))
+        made = FieldEmulator(
+            inputs=known.inputs,
+            mesh=known.known.meshes.mesh,
+            space=space,
+            field=field,
+            numbers=block,
+            motion=motion,
+            units=units,
+            known=inputs,
+            lost=places(known.inputs, known.known.lost),
+            reasons=known.known.reasons,
+            scales=ones,
+            calibration=ones,
+            errors=np.zeros(count),
+        )
+        return _calibrated(made, known, paths)
+
+
+def _calibrated(made: FieldEmulator, known: Snapshots, paths: FloatArray) -> FieldEmulator:
+    """The emulator with its intervals."""
+    count, strokes, _ = paths.shape
+    path_errors = (made.field.left_out @ made.field.modes.vectors).reshape(paths.shape)
+    number_errors = (made.numbers.left_out @ made.numbers.modes.vectors).reshape(count, strokes, -1)
+    values = np.zeros((2, count, strokes, 1 + len(FIGURES)))
+    indicators = np.zeros((count, strokes))
+    reader = made.reader
+    for sample, finger in enumerate(known.samples):
+        points = known.points[min(sample, len(known.points) - 1)]
+        material, load = known.inputs.physics(finger)
+        position = known.inputs.parameters(finger).contact_abscissa
+        deviations = made.field.deviations(made.known[sample])
+        for stroke, share in enumerate(known.shares):
+            indicators[sample, stroke] = made.indicator(deviations, np.eye(strokes)[stroke])
+            true = known.nodal[sample, stroke]
+            path = share * (paths[sample, stroke] - path_errors[sample, stroke])
+            guess = made.space.combined(path).reshape(-1, 2)
+            scaled = known.numbers[sample, stroke] / known.factors[sample] ** (POWERS > 0)
+            missed = scaled - number_errors[sample, stroke] * made.units * share**POWERS
+            for kind, nodal, numbers in ((0, true, scaled), (1, guess, missed)):
+                stress = reader.stress(points, nodal, made.law, _unit(material, made.young).lame)
+                figures = reader.figures(points, nodal, stress, position)
+                values[kind, sample, stroke, 1:] = (grip_force(numbers[:2], load), *figures, numbers[4])
+            values[0, sample, stroke, 0] = np.sqrt(np.mean(true**2))
+            values[1, sample, stroke, 0] = values[0, sample, stroke, 0] + np.sqrt(
+                np.mean((guess - true) ** 2)
+            )
+    scales = np.sqrt((values[0] ** 2).mean(axis=0))
+    off, expected = np.abs(values[1] - values[0]), scales * indicators[..., None]
+    # Those from which the deviations are taken would have none.
+    ratios = np.divide(off, expected, out=np.zeros_like(off), where=expected > 0)[made.field.landmarks :]
+    rank = min(int(np.ceil(LEVEL * (len(ratios) + 1))), len(ratios)) - 1
+    relative = (values[1, :, -1, 0] - values[0, :, -1, 0]) / values[0, :, -1, 0]
+    return replace(made, scales=scales, calibration=np.sort(ratios, axis=0)[rank], errors=relative)
+
+
+def _unit(material: Material, young: float) -> Material:
+    return material.model_copy(update={"young": young})
+
+
+def _between(rows: FloatArray, shares: FloatArray, share: float) -> FloatArray:
+    return np.array([np.interp(share, shares, column) for column in rows.T])

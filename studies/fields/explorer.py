@@ -1,0 +1,183 @@
+"""The explorer: one page with the emulator of a study's fields, which the browser evaluates."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import to_hex
+
+from compare.runtime import html
+from compare.runtime.packed import Packed
+from compare.runtime.provenance import package_versions
+from geometry.arrays import FloatArray
+from geometry.finger.parameters import SYMBOLS, Parameters
+from geometry.mesh.boundary import boundary_edges, edge_paths
+from solvers.finger_figures import QUANTITIES
+from solvers.lagrange import LagrangeSpace
+from solvers.physics import Physics
+from studies.emulator.inputs import WIDE
+from studies.fields.block import Block
+from studies.fields.emulator import FieldEmulator
+from studies.fields.reader import FIGURES
+from studies.sweep.study import PHYSICS, Range, Value, unit_of
+
+COLOURS = 32
+"""Colours of the stress."""
+
+STEP = 2e-5
+"""Steps in which the page keeps displacements, mm: of a strain of 5 %, over half an element, a thousandth."""
+
+LARGEST = 0.75
+"""Stress of the last colour over the root mean square of the samples' largest one: few walls reach it."""
+
+TITLES = {
+    "force": "Grip force",
+    "tip_u": "Tip along the finger",
+    "tip_v": "Tip across it",
+    "wrap": "Wrap",
+    "von_mises": "Largest von Mises stress",
+    "contact_width": "Contact zone",
+}
+"""What the page calls the figures."""
+
+MEANINGS = {"contact_width": "deformed length of the front that touches the cylinder"}
+UNITS = {"contact_width": "mm"}
+
+
+def write_explorer(emulator: FieldEmulator, path: Path, live: str = "") -> Path:
+    """Write the page, atomically.
+
+    Args:
+        emulator: Of the study's fields.
+        path: HTML file.
+        live: Secret with which the page may ask the server that sends it for solutions; empty for none.
+    """
+    packed = Packed()
+    content = manifest(emulator, packed) | {"live": live}
+    return html.write_html(
+        path,
+        "explorer.html.j2",
+        title=f"Explorer: {emulator.study.name}",
+        study=emulator.study,
+        count=len(emulator.known),
+        stroke=emulator.stroke,
+        law=emulator.law,
+        median_error=float(np.median(emulator.errors)),
+        manifest=content,
+        data=packed.text(),
+        versions=package_versions(),
+    )
+
+
+def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
+    """Everything that the browser needs, with arrays' places in the packed numbers."""
+    study, mesh, reader = emulator.study, emulator.mesh, emulator.reader
+    middle = _middle(emulator)
+    material, load = emulator.inputs.physics(middle)
+    unit = material.model_copy(update={"young": 1.0}).lame
+    shape = emulator.inputs.parameters(middle)
+    lower = np.tril_indices(emulator.field.landmarks)
+    colours = mpl.colormaps["viridis"](np.linspace(0, 1, COLOURS))
+    return {
+        "name": study.name,
+        "design": study.design,
+        "law": emulator.law,
+        "plane": material.plane,
+        "meshSize": study.mesh_size,
+        "stroke": emulator.stroke,
+        "shares": emulator.shares.tolist(),
+        "spline": np.transpose(emulator.spline.c, (1, 2, 0)).tolist(),
+        "parameters": [_parameter(name, values, middle[name]) for name, values in study.varied.items()],
+        "fixed": {
+            "young": material.young,
+            "depth": shape.depth,
+            "radius": load.radius,
+            "direction": study.fixed.get("direction", 0.0),
+            "contact_position": shape.contact_abscissa,
+            "friction": load.friction,
+            "poisson": material.poisson,
+            **{name: value for name, value in study.fixed.items() if name in Parameters.model_fields},
+        },
+        "shapeNames": [name for name in (*study.varied, *study.fixed) if name in Parameters.model_fields],
+        "baseYoung": emulator.young,
+        "lame": [unit.λ, unit.μ],
+        "figures": [
+            {
+                "name": name,
+                "title": TITLES[name],
+                "unit": QUANTITIES[name].unit if name in QUANTITIES else UNITS[name],
+                "meaning": QUANTITIES[name].meaning if name in QUANTITIES else MEANINGS[name],
+            }
+            for name in FIGURES
+        ],
+        "colours": [to_hex(each) for each in colours],
+        "colourStress": float(LARGEST * emulator.scales[-1, 1 + FIGURES.index("von_mises")]),
+        "thickness": reader.thickness,
+        "contactWidth": reader.contact_width,
+        "outlines": [path.tolist() for path in edge_paths(boundary_edges(mesh.triangles))],
+        "points": packed.add(mesh.points.astype("<f8")),
+        "cells": packed.add(LagrangeSpace(mesh, 2).cell_nodes.astype("<u4")),
+        "front": packed.add(reader.front.astype("<u4")),
+        "base": packed.add(np.unique(mesh.boundary("base")).astype("<u4")),
+        "away": packed.add(reader.away.astype("<u2")),
+        "space": [
+            packed.add_steps(vector, STEP / size)
+            for vector, size in zip(emulator.space.vectors, _amplitudes(emulator), strict=True)
+        ],
+        "field": {
+            **_block(emulator.field, packed),
+            "factors": [packed.add(factor[lower]) for factor in emulator.field.factors],
+        },
+        "numbers": _block(emulator.numbers, packed),
+        "motion": None if emulator.motion is None else _block(emulator.motion, packed),
+        "units": emulator.units.tolist(),
+        "errors": packed.add(emulator.error_modes[: len(emulator.field.factors)].astype("<f4")),
+        "known": packed.add(emulator.known.astype("<f8")),
+        "lost": packed.add(emulator.lost.astype("<f8")),
+        "reasons": list(emulator.reasons),
+        "scales": emulator.scales.tolist(),
+        "calibration": emulator.calibration.tolist(),
+    }
+
+
+def _block(block: Block, packed: Packed) -> dict[str, Any]:
+    """A block's arrays; vectors in steps of their own range, for they are most of the page."""
+    return {
+        "inputs": packed.add(block.inputs.astype("<f8")),
+        "rates": packed.add(block.rates.astype("<f8")),
+        "weights": packed.add(block.weights.astype("<f8")),
+        "numbers": packed.add(block.numbers.astype("<f8")),
+        "mean": packed.add(block.modes.mean.astype("<f8")),
+        "vectors": [packed.add_steps(vector) for vector in block.modes.vectors],
+    }
+
+
+def _amplitudes(emulator: FieldEmulator) -> FloatArray:
+    """Largest coefficients of the displacement's modes at the full stroke, over the samples, shape (r,)."""
+    paths = [emulator.field.vector(at).reshape(len(emulator.shares), -1)[-1] for at in emulator.known]
+    return np.asarray(np.abs(paths).max(axis=0))
+
+
+def _parameter(name: str, values: Range, middle: Value) -> dict[str, Any]:
+    low, high = values.ends
+    model = Parameters if name in Parameters.model_fields else Physics
+    described = model.model_fields[name].description or name
+    symbols = {parameter: symbol for symbol, parameter in SYMBOLS.items()}
+    return {
+        "name": name,
+        "symbol": symbols.get(name, ""),
+        "meaning": described.split(" [")[0].split("; none")[0].replace("`", ""),
+        "unit": unit_of(name),
+        "low": low,
+        "high": high,
+        "value": middle,
+        "log": low > 0 and high / low >= WIDE,
+        "factor": name in ("young", "depth"),
+        "shape": name not in PHYSICS,
+    }
+
+
+def _middle(emulator: FieldEmulator) -> dict[str, Value]:
+    """The finger in the middle of the ranges."""
+    return {name: sum(values.ends) / 2 for name, values in emulator.study.varied.items()}

@@ -1,0 +1,116 @@
+"""A finger's deformation along its load path, on a mesh that moves with the finger's walls."""
+
+import json
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from geometry.arrays import FloatArray
+from geometry.atomic import write_arrays
+from geometry.cache import finger_mesh
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.design_motion import MovingMesh
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.lagrange import LagrangeField
+from solvers.solution import Solution
+from solvers.solver import Solver
+
+NUMBERS = ("force_u", "force_v", "energy", "force_abscissa", "contact_width")
+"""Of a body along its load path: force on it, N/mm, energy, N mm/mm, and where it is pressed, mm."""
+
+
+STEPS = 4
+"""In which a mesh moves to the finger of a sample; in one step, triangles at joints turn over."""
+
+
+@dataclass(frozen=True, eq=False)
+class FieldPath:
+    """Displacements of the nodes of quadratic elements at k equal strokes up to the full one.
+
+    Attributes:
+        nodal: Shape (k, N, 2), mm.
+        numbers: Values of `NUMBERS`, shape (k, 5).
+    """
+
+    nodal: FloatArray
+    numbers: FloatArray
+
+    @classmethod
+    def of(cls, solution: Solution, strokes: int) -> Self:
+        """The path of a solution whose load grew from rest to the full one.
+
+        Between two equilibria of which none is at the stroke, a cubic spline in the load is taken.
+        """
+        history = solution.history
+        nodal = [state.values for state in solution.states if isinstance(state, LagrangeField)]
+        known = np.column_stack(
+            [
+                *(history[name] for name in ("reaction_x", "reaction_y", "energy")),
+                *(
+                    history.get(name, np.zeros(len(nodal)))
+                    for name in ("force_abscissa_mm", "contact_width_mm")
+                ),
+            ]
+        )
+        spline = CubicSpline(history["load_fraction"], np.array(nodal).reshape(len(nodal), -1))
+        shares = np.arange(1, strokes + 1) / strokes
+        return cls(
+            spline(shares).reshape(strokes, -1, 2),
+            np.column_stack([np.interp(shares, history["load_fraction"], column) for column in known.T]),
+        )
+
+    def save(self, file: Path) -> None:
+        """Write the path atomically; displacements in single precision, of which seven digits are enough."""
+        write_arrays(file, {"nodal": self.nodal.astype(np.float32), "numbers": self.numbers})
+
+    @classmethod
+    def load(cls, file: Path) -> Self:
+        """The path in a file.
+
+        Raises:
+            UserError: If it is damaged.
+        """
+        try:
+            with np.load(file, allow_pickle=False) as arrays:
+                return cls(arrays["nodal"].astype(np.float64), arrays["numbers"])
+        except (OSError, ValueError, KeyError) as error:
+            raise UserError(f"{file} is damaged ({error}); remove it and run the sweep again") from None
+
+
+class MovedMesh:
+    """The mesh of a base finger, moved to the sections of other fingers; its boundary `contact` stays."""
+
+    def __init__(self, base: Design, settings: MeshSettings) -> None:
+        self.base, self.mesh = base, finger_mesh(base, settings=settings)
+        self._moving = MovingMesh(self.mesh, base)
+
+    def of(self, finger: Design) -> TriangleMesh:
+        """The mesh of a finger.
+
+        Raises:
+            UserError: If the sections have other pieces, or a triangle would turn over.
+        """
+        moved = self._moving.of(finger.replaced(contact_position=self.base.contact_abscissa), STEPS)
+        if moved is None:
+            raise UserError("its section has other pieces than that in the middle of the ranges; narrow them")
+        return moved
+
+
+def stepping(solver: Solver, strokes: int) -> Solver:
+    """The solver of finite strain with its load steps at equal strokes, where it needs no shorter ones."""
+    assert isinstance(solver, FemNonlinearSolver)
+    step = 1 / strokes
+    return replace(solver, first_step=step, max_step=step, min_step=min(step, solver.min_step))
+
+
+@lru_cache(maxsize=1)
+def moved_mesh(base: str, settings: MeshSettings) -> MovedMesh:
+    """The moved meshes of a base finger, whose definition is given as JSON; the last one is kept."""
+    return MovedMesh(Design(**json.loads(base)), settings)

@@ -1,0 +1,170 @@
+"""The explorer as a reader has it: its numbers against the emulator's, its sliders, files and faults."""
+
+import json
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from http.server import ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from geometry.errors import UserError
+from studies.fields.emulator import FieldEmulator, fitted_fields
+from studies.fields.explorer import write_explorer
+from studies.fields.live import HOST, handler
+from tests.compare.report.browser import chromium, opened
+from tests.studies.fields.synthetic import known, snapshots, study
+
+VARIED = {
+    "contact_position": {"from": 30, "to": 60},
+    "radius": {"from": 4, "to": 16},
+    "direction": {"from": -10, "to": 10},
+}
+
+
+@pytest.fixture(scope="module")
+def emulator() -> FieldEmulator:
+    given = study(VARIED, 24)
+    lost = [{"contact_position": 59.9, "radius": 15.9, "direction": 9.9}]
+    assert known(given, lost).lost == lost
+    return fitted_fields(snapshots(given, lost))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def written(emulator: FieldEmulator, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_explorer(emulator, tmp_path_factory.mktemp("explorer") / "explore.html")
+
+
+@pytest.fixture
+def page(browser: Browser, written: Path) -> Iterator[Page]:
+    found = opened(browser, written)
+    found.page.wait_for_selector("#explorer:not([hidden])")
+    yield found.page
+    assert (found.complaints, found.asked) == ([], [])
+    found.page.close()
+
+
+def give(page: Page, **values: float) -> None:
+    for name, value in values.items():
+        page.fill(f"#value-{name}", str(value))
+        page.press(f"#value-{name}", "Tab")
+    page.evaluate("pinnrayExplorer.draw()")
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_moved_values_change_the_picture_and_give_the_emulators_numbers(browser, written, emulator, width):
+    found = opened(browser, written, width=width)
+    page = found.page
+    page.wait_for_selector("#explorer:not([hidden])")
+    before = page.evaluate("document.getElementById('explorer-canvas').toDataURL()")
+    give(page, stroke=6.5, contact_position=41, radius=9, direction=-4, young=3, depth=12)
+    assert page.evaluate("document.getElementById('explorer-canvas').toDataURL()") != before
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    shown = page.evaluate("pinnrayExplorer.state().figures")
+    wanted = emulator.predict({"contact_position": 41.0, "radius": 9.0, "direction": -4.0}, 6.5)
+    force, stress = 3 / 11.4 * 12 / 20, 3 / 11.4
+    factors = {"force": force, "von_mises": stress}
+    for each in shown:
+        factor = factors.get(each["name"], 1.0)
+        assert each["value"] == pytest.approx(factor * wanted.figures[each["name"]], rel=1e-3, abs=1e-4)
+        half = factor * (wanted.intervals[each["name"]][1] - wanted.figures[each["name"]])
+        assert each["half"] == pytest.approx(half, rel=5e-3, abs=1e-9)
+    assert page.evaluate("pinnrayExplorer.state().error") == pytest.approx(wanted.error, rel=5e-3)
+    moved = page.evaluate("Array.from(pinnrayExplorer.state().moved)")
+    assert moved == pytest.approx(wanted.nodal.ravel(), abs=2e-3)  # steps of 16 bits of 8 mm, in each mode
+    assert (found.complaints, found.asked) == ([], [])
+    page.close()
+
+
+def test_the_keyboard_moves_a_slider(page):
+    before = page.inner_text("#figure-force")
+    page.focus("#slider-stroke")
+    for _ in range(40):
+        page.keyboard.press("PageDown")
+    page.evaluate("pinnrayExplorer.draw()")
+    assert page.inner_text("#figure-force") != before
+
+
+def test_out_of_range_says_why_and_gives_no_number(page):
+    give(page, radius=30)
+    assert "Radius of a cylinder of 30 mm is outside the study" in page.inner_text("#explorer-fault")
+    assert page.inner_text("#figure-force") == "not known"
+    give(page, radius=16, contact_position=60, direction=10)
+    assert "no equilibrium" in page.inner_text("#explorer-fault")
+    page.click("#explorer-reset")
+    assert page.is_hidden("#explorer-fault")
+
+
+def test_markers_that_lie_where_the_finger_is_have_no_error(page, emulator, tmp_path):
+    middle = {"contact_position": 45.0, "radius": 10.0, "direction": 0.0}
+    solution = emulator.predict(middle, 10.0).solution()
+    places = solution.problem.mesh.points[[20, 60, 90]]
+    rows = [",".join(map(str, [*place, *solution.displacement(place[None])[0]])) for place in places]
+    file = tmp_path / "markers.csv"
+    file.write_text("\n".join(["x_mm,y_mm,u_mm,v_mm", *rows]), encoding="utf-8")
+    page.set_input_files("#explorer-csv", file)
+    page.wait_for_function("document.getElementById('explorer-markers').textContent")
+    said = page.inner_text("#explorer-markers")
+    assert said.startswith("3 markers")
+    assert float(said.partition("| ")[2].partition("| ")[2].split()[0]) < 2e-3
+    file.write_text("x,y\n1,2\n", encoding="utf-8")
+    page.set_input_files("#explorer-csv", [])
+    page.set_input_files("#explorer-csv", file)
+    page.wait_for_function("document.getElementById('explorer-said').textContent")
+    assert "lacks the column x_mm" in page.inner_text("#explorer-said")
+
+
+def test_the_finger_is_copied_as_command_options_and_python(page):
+    give(page, radius=7, stroke=4)
+    for kind, part in (
+        ("command", "--radius 7"),
+        ("toml", "radius = 7"),
+        ("python", "radius=7, direction=0"),
+    ):
+        page.click(f"[data-copy={kind}]")
+        assert part in page.inner_text("#explorer-copied")
+
+
+def test_the_server_answers_its_own_page_alone():
+    asked = []
+
+    def answer(values):
+        asked.append(values)
+        if values["stroke"] < 0:
+            raise UserError("stroke -1: the indenter presses")
+        return {"message": "done"}
+
+    server = ThreadingHTTPServer((HOST, 0), handler(b"<p>page", "secret", answer))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    address = f"http://{HOST}:{server.server_port}"
+
+    def reply(path: str, data: object = None, **headers: str) -> tuple[int, bytes]:
+        content = None if data is None else json.dumps(data).encode()
+        request = urllib.request.Request(address + path, content, headers)
+        try:
+            with urllib.request.urlopen(request) as response:
+                return response.status, response.read()
+        except urllib.error.HTTPError as error:
+            return error.code, error.read()
+
+    own = {"X-Pinnray": "secret"}
+    assert reply("/") == (200, b"<p>page")
+    assert reply("/", Host="elsewhere.example")[0] == 403  # a name that somebody has made to lead here
+    assert reply("/etc/passwd")[0] == 404
+    assert reply("/solve", {"stroke": 3})[0] == 403
+    assert reply("/solve", {"stroke": 3}, **own) == (200, b'{"message": "done"}')
+    assert b"presses" in reply("/solve", {"stroke": -1}, **own)[1]
+    for wrong in ([1], {"stroke": "x"}, "x" * 20_000):
+        assert reply("/solve", wrong, **own)[0] == 400
+    assert asked == [{"stroke": 3.0}, {"stroke": -1.0}]
+    server.shutdown()
+    server.server_close()
