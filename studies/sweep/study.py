@@ -158,10 +158,10 @@ class Study(CheckedModel):
             raise ValueError("strokes: fields need solver = 'fem-nonlinear' and load = 'cylinder' fixed")
         if "stroke" in self.varied:
             raise ValueError("strokes: every sample goes to the full stroke; give stroke under [fixed]")
-        choices = [name for name, values in self.varied.items() if name in WHOLE or values.values is not None]
+        choices = [name for name, each in self.varied.items() if name in WHOLE or each.values is not None]
         if choices:
             raise ValueError(
-                f"strokes: {choices[0]} is a choice, between whose values no mesh moves; make a study for each"
+                f"strokes: {choices[0]} is a choice, between which no mesh moves; make a study of each"
             )
 
     @property
