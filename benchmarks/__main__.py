@@ -12,6 +12,7 @@ BENCHMARKS = {
     "results": "results.default_run:main",
     "default": "results.default_time:main",
     "growth": "results.growth:main",
+    "fields": "results.fields:main",
     "fem": "elements.scikit_fem:main",
     "pinn": "networks.graded:pinn",
     "designs": "networks.graded:designs",

@@ -37,6 +37,7 @@ def test_every_kind_of_cached_result_has_a_key():
         "compare.crossval",  # truths, folds
         "studies.sweep",
         "studies.emulator",
+        "studies.fields",
         "studies.gridsearch",
         "studies.optimum",
     }

@@ -54,7 +54,7 @@ def serve(emulator: FieldEmulator, port: int, started: Callable[[str], None]) ->
         try:
             server = ThreadingHTTPServer((HOST, port), handler(page, secret, live.answer))
         except OSError as error:
-            raise UserError(f"--port {port}: {error.strerror}; take another one, or 0 for any") from None
+            raise UserError(f"port {port}: {error.strerror}; take another one, or 0 for any") from None
         started(f"http://{HOST}:{server.server_port}/")
         try:
             server.serve_forever()
