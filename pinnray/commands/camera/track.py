@@ -40,7 +40,7 @@ def track(
         source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
         live: Show the displacements of every frame as it comes.
         publish: With --live, write a line of JSON for every frame, with the newest force if --force: a file,
-            a named pipe, or - for the standard output, whose tables then go to standard error.
+            a named pipe, or - for the standard output, whose tables then go to standard error; default: none.
         record: Keep the frames of a camera or a pipe as a video: .mkv (lossless), .avi or .mp4.
         without_video: Write no annotated video.
         out: Output folder.
