@@ -18,6 +18,7 @@ from geometry.notebook import brief
 from studies.emulator.emulator import fitted_emulator
 from studies.emulator.inputs import Inputs
 from studies.optimum.front import hypervolume, reference_point, unbeaten
+from studies.optimum.gradient_step import stepped
 from studies.optimum.question import ENOUGH, Question
 from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement
@@ -79,6 +80,7 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
         "objectives": dict(question.objectives),
         "constraints": {name: limit.model_dump() for name, limit in question.constraints.items()},
         "runs": question.runs,
+        **({"steps": question.steps} if question.steps else {}),
     }
     check_resumable_folder(job.out / QUESTION_FILE, definition, job="search", free={"study.name"})
     job.out.mkdir(parents=True, exist_ok=True)
@@ -101,7 +103,13 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
                 finish(tasks, journal, workers, progress)
             done = len(fingers)
             if done >= question.runs:
-                return _optimum(question, fingers, journal)
+                found = _optimum(question, fingers, journal)
+                more = [] if done > question.runs else _steps(job, found, stages)
+                if not more:
+                    return found
+                fingers = fingers + more
+                _keep_fingers(job.out / FINGERS_FILE, fingers)
+                continue
             count = min(-(-(question.runs - start) // ROUNDS), question.runs - done)
             with stages.stage(f"proposals after {done}") as progress:
                 progress(0.0, "the emulator is fitted and searched")
@@ -156,6 +164,22 @@ def _proposed(
             seed=question.seed + len(fingers),
         )
     return found + more[: count - len(found)]
+
+
+def _steps(job: StudyJob[Question], found: Optimum, stages: Stages) -> list[dict[str, Value]]:
+    """Fingers a step along the derivatives from some of the front, evenly chosen."""
+    count = min(job.study.steps, len(found.front))
+    if not count:
+        return []
+    chosen = np.unique(np.linspace(0, len(found.front) - 1, count).round().astype(int))
+    more = []
+    with stages.stage("derivatives") as progress:
+        for number, place in enumerate(chosen):
+            run = found.front[place]
+            progress(number / len(chosen), f"of finger {place + 1} of the front")
+            if (finger := stepped(job, found.fingers[run], found.measurements[run])) is not None:
+                more.append(finger)
+    return more
 
 
 def is_allowed(question: Question, run: Measurement) -> bool:
