@@ -76,9 +76,12 @@ ALL_BLOCKS = [block for page in PAGES for block in blocks(page)]
 TO_RUN = [
     block
     for block in ALL_BLOCKS
-    if block.language == "python" and not is_plugin(block) and block.page.name != "notebook.md"
+    if block.language == "python"
+    and not is_plugin(block)
+    and block.page.name not in ("notebook.md", "explore.md")
 ]
-"""Those of the notebook page run, with their output, in `tests/pinnray/test_notebook.py`."""
+"""Those of the notebook page run, with their output, in `tests/pinnray/test_notebook.py`; that of the explorer's
+page needs a sweep of a quarter of an hour, and what it calls has tests in `tests/studies/fields`."""
 
 
 def table(page: Path, first_column: str, after: str = "") -> list[list[str]]:

@@ -106,13 +106,6 @@ class FemBody:
             self._factors.update()
         return self._factors
 
-    def force(self, state: FloatArray, lame: Lame, changes: FloatArray) -> FloatArray | None:
-        """By quadrature; see `Body`."""
-        if not self._admissible(state, changes):
-            return None
-        self._set(state, lame, changes)
-        return np.where(self._clamped, 0.0, self._distributed.assemble_nodal(self._force))
-
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -41,10 +41,6 @@ class Body(Protocol):
         """The force at a state and the tangent, factorised; None if a point is turned inside out."""
         ...
 
-    def force(self, state: FloatArray, lame: Lame, changes: FloatArray) -> FloatArray | None:
-        """F at a state, N/mm; None if a point is turned inside out. The last linearisation stays valid."""
-        ...
-
     @property
     def feet(self) -> FloatArray:
         """States (f, *shape) that are zero but at the base, which has a unit of each motion of `Feet`."""

@@ -103,15 +103,6 @@ class NetworkBody:
         tangent = _tangent_pulled_back(tangent, metric)
         return Linearised(force.numpy(), partial(self._solved, tangent), partial(self._negative, tangent))
 
-    def force(self, state: FloatArray, lame: Lame, changes: FloatArray) -> FloatArray | None:
-        """The force at a state; None if a point is turned inside out."""
-        metric = self._metric(changes)
-        with pool():
-            if (gradient := self._admissible(state, metric)) is None:
-                return None
-            stress, _ = piola_stress_and_tangent(gradient, lame, self._law)
-            return self._forces(_pulled_back(stress, metric)[None])[0].numpy()
-
     def _admissible(self, state: FloatArray, metric: WallMetric) -> torch.Tensor | None:
         """G of a state at the quadrature points, (q, 2, 2); None if a point is turned inside out."""
         gradient = self._gradient(state) @ metric.inverse
