@@ -80,8 +80,8 @@ TO_RUN = [
     and not is_plugin(block)
     and block.page.name not in ("notebook.md", "explore.md")
 ]
-"""Those of the notebook page run, with their output, in `tests/pinnray/test_notebook.py`. That of the explorer's
-needs a sweep of a quarter of an hour; what it calls has tests in `tests/studies/fields`."""
+"""Those of the notebook page run, with output, in `tests/pinnray/test_notebook.py`. The explorer's needs
+a sweep of a quarter of an hour; what it calls has tests in `tests/studies/fields`."""
 
 
 def table(page: Path, first_column: str, after: str = "") -> list[list[str]]:
