@@ -1,4 +1,4 @@
-"""How processor time and memory grow with the number of unknowns, for three solvers; about ten minutes.
+"""Growth of processor time and memory with the number of unknowns, for three solvers; about ten minutes.
 
 Each size of each solver is solved in a process of its own, on one core, on the default finger. `fem` and
 `fem-nonlinear` have quadratic elements of ever smaller size, `pinn-std` windows of ever smaller spacing. The

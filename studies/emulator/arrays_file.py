@@ -13,13 +13,13 @@ from geometry.atomic import write_bytes
 from geometry.errors import UserError
 
 
-def write_arrays(file: Path, arrays: Mapping[str, FloatArray], digest: str, **texts: str) -> None:
+def keep_arrays(file: Path, arrays: Mapping[str, FloatArray], digest: str, **texts: str) -> None:
     """Write arrays atomically, with the digest of what they depend on and further texts."""
     whole = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     write_bytes(file, to_bytes(whole, metadata={"digest": digest, "arrays": _digest(whole), **texts}))
 
 
-def read_arrays(file: Path, digest: str) -> tuple[dict[str, FloatArray], dict[str, str]] | None:
+def kept_arrays(file: Path, digest: str) -> tuple[dict[str, FloatArray], dict[str, str]] | None:
     """The arrays of a file and its texts; None if there is none, or one of something else.
 
     Raises:

@@ -6,7 +6,7 @@ from pathlib import Path
 from compare.runtime.stages import Stages
 from geometry.content_hash import content_hash, sources_digest
 from geometry.text_files import read_json
-from studies.emulator.arrays_file import read_arrays, write_arrays
+from studies.emulator.arrays_file import keep_arrays, kept_arrays
 from studies.emulator.emulator import Emulator, Learnt, fitted_emulator
 from studies.emulator.gaussian_process import GaussianProcess
 from studies.emulator.inputs import Inputs
@@ -57,7 +57,7 @@ def save(file: Path, emulator: Emulator, digest: str) -> None:
         for name, learnt in emulator.learnt.items()
         for part in PARTS
     }
-    write_arrays(
+    keep_arrays(
         file,
         arrays,
         digest,
@@ -73,7 +73,7 @@ def load(file: Path, inputs: Inputs, digest: str) -> Emulator | None:
     Raises:
         UserError: If the file is damaged.
     """
-    if (content := read_arrays(file, digest)) is None:
+    if (content := kept_arrays(file, digest)) is None:
         return None
     arrays, texts = content
     learnt = {

@@ -36,7 +36,7 @@ LARGEST_QUESTION = 10_000
 """Bytes of a question at most."""
 
 
-def serve(emulator: FieldEmulator, port: int, started: Callable[[str], None]) -> None:
+def serve_explorer(emulator: FieldEmulator, port: int, started: Callable[[str], None]) -> None:
     """Serve the explorer until it is interrupted.
 
     Args:

@@ -1,4 +1,4 @@
-"""What a displacement field says of a finger: von Mises stress at the nodes, tip, wrap and largest stress."""
+"""The reader of a displacement field: von Mises stress at the nodes, tip, wrap and largest stress."""
 
 from functools import cached_property
 from itertools import product

@@ -7,7 +7,7 @@ from typing import Any
 from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.content_hash import content_hash, sources_digest
-from studies.emulator.arrays_file import read_arrays, write_arrays
+from studies.emulator.arrays_file import keep_arrays, kept_arrays
 from studies.fields.block import Block
 from studies.fields.emulator import FieldEmulator, fitted_fields
 from studies.fields.reduction import Modes
@@ -40,11 +40,11 @@ def fields_of(folder: Path, *, refit: bool = False, stages: Stages | None = None
             "program": sources_digest(__name__),
         }
     )
-    kept = None if refit else read_arrays(file, digest)
+    kept = None if refit else kept_arrays(file, digest)
     if kept is not None:
         return _assembled(kept[0], known)
     made = fitted_fields(Snapshots.load(known), stages)
-    write_arrays(file, _parts(made), digest)
+    keep_arrays(file, _parts(made), digest)
     return made
 
 

@@ -43,12 +43,12 @@ def app(sweep: Path, *, port: int = 8765, refit: bool = False) -> int:
         refit: Fit the emulator again.
     """
     from compare.runtime.stages import Stages
-    from studies.fields.live import serve
+    from studies.fields.live import serve_explorer
     from studies.fields.store import fields_of
 
     if not 0 <= port < 65536:
         raise UserError(f"--port {port}: give a number from 0 to 65535")
     with Stages() as stages:
         emulator = fields_of(sweep, refit=refit, stages=stages)
-    serve(emulator, port, lambda address: print(f"{address}  (Ctrl-C ends)", flush=True))
+    serve_explorer(emulator, port, lambda address: print(f"{address}  (Ctrl-C ends)", flush=True))
     return 0
