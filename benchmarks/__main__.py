@@ -11,7 +11,6 @@ from geometry.errors import UserError
 BENCHMARKS = {
     "results": "results.default_run:main",
     "default": "results.default_time:main",
-    "growth": "results.growth:main",
     "fields": "results.fields:main",
     "fem": "elements.scikit_fem:main",
     "pinn": "networks.graded:pinn",
@@ -45,6 +44,7 @@ SETTLED = (
     "sweep",
     "optimise",
     "live",
+    "growth",
 )
 """Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
 

@@ -28,7 +28,8 @@ def wheels_mpi(prefix: Path, package: Path) -> Path | None:
 if (mpi := wheels_mpi(Path(sys.prefix), Path(petsc4py.__file__))) is not None:
     ctypes.CDLL(str(mpi), mode=ctypes.RTLD_GLOBAL)
 
-petsc4py.init(["", "-skip_petscrc"])
+# Its handler of signals would end the process at a closed pipe.
+petsc4py.init(["", "-skip_petscrc", "-no_signal_handler"])
 
 from petsc4py import PETSc  # noqa: E402
 
