@@ -29,6 +29,12 @@ const pinnrayModel = (() => {
     return Math.sqrt(12) * ((scale(values[name] + way) - scale(low)) / (scale(high) - scale(low)) - 0.5);
   });
 
+  // What forces and energies are predicted over: the exponential of a quadratic polynomial of the inputs.
+  function strengthOf(at) {
+    const powers = [1, ...at, ...at.flatMap((one, k) => at.slice(k).map((other) => one * other))];
+    return Math.exp(powers.reduce((sum, power, k) => sum + power * manifest.strength[k], 0));
+  }
+
   // Matérn's kernel of order 5/2, of a squared distance over the lengths.
   const matern = (square) => {
     const away = Math.sqrt(5 * square);
@@ -223,7 +229,7 @@ const pinnrayModel = (() => {
     const numbers = combined(mesh.numbers, coefficients(mesh.numbers, at));
     return {
       values, points: mesh.motion ? combined(mesh.motion, coefficients(mesh.motion, at)) : mesh.points,
-      path: combined(mesh.field, coefficients(mesh.field, at)), deviations: deviations(mesh.field, at),
+      strength: strengthOf(at), path: combined(mesh.field, coefficients(mesh.field, at)), deviations: deviations(mesh.field, at),
       numbers: numbers.map((value, k) => value * manifest.units[k % 5]),
     };
   }
@@ -248,11 +254,11 @@ const pinnrayModel = (() => {
 
   // Force along the travel, N, with half of its interval, at a share of the full stroke.
   function force(known, share) {
-    const { values, numbers } = known;
+    const { values, numbers, strength } = known;
     const chosen = weights(share);
     const [u, v] = mixed(numbers, 5, chosen).map((value) => value * share);
     const angle = (values.direction * Math.PI) / 180;
-    const factor = (values.young / manifest.baseYoung) * values.depth;
+    const factor = strength * (values.young / manifest.baseYoung) * values.depth;
     const half = indicator(known, chosen) * between(manifest.scales, share)[1] * between(manifest.calibration, share)[1];
     return { value: factor * (u * Math.sin(angle) - v * Math.cos(angle)), half: factor * half };
   }
@@ -277,7 +283,7 @@ const pinnrayModel = (() => {
     const level = indicator(known, chosen);
     const [scales, calibration] = [manifest.scales, manifest.calibration].map((rows) => between(rows, share));
     const found = [force(known, share).value, moved[2 * tip], moved[2 * tip + 1], wrap(points, moved, position), largest, width];
-    const units = [ratio * values.depth, 1, 1, 1, ratio, 1];
+    const units = [known.strength * ratio * values.depth, 1, 1, 1, ratio, 1];
     const figures = manifest.figures.map(({ name }, k) => ({
       name, value: found[k], half: level * scales[k + 1] * calibration[k + 1] * units[k],
     }));

@@ -38,6 +38,9 @@ MOTION = 1e-10
 LEVEL = 0.95
 """Probability of the intervals."""
 
+RIDGE = 1e-2
+"""Penalty on the coefficients of the strength, of which few samples may have fewer than they are."""
+
 POWERS = np.array([1, 1, 2, 0, 0])
 """Powers of the stroke by which the numbers of a path are divided."""
 
@@ -51,7 +54,10 @@ class FieldEmulator:
         mesh: At rest in the middle of the ranges.
         space: Modes of displacements, r of them, without a mean.
         field: Their coefficients over the stroke along a path, vectors of k r.
-        numbers: Numbers of a path over powers of the stroke, in units of `units`, vectors of 5 k.
+        strength: Coefficients of `powers`: logarithm of the force over the stroke, half way. Forces and
+            energies are predicted over it, for they span an order of magnitude where walls vary.
+        numbers: Numbers of a path over powers of the stroke and over the strength, in units of `units`,
+            vectors of 5 k.
         motion: Nodes of the mesh; None where no mesh moves.
         units: Shape (5,).
         known: Inputs of the samples with fields, shape (n, d).
@@ -67,6 +73,7 @@ class FieldEmulator:
     mesh: TriangleMesh
     space: Modes
     field: Block
+    strength: FloatArray
     numbers: Block
     motion: Block | None
     units: FloatArray
@@ -114,14 +121,15 @@ class FieldEmulator:
         force_u, force_v, energy, abscissa, width = (weights @ numbers) * share**POWERS
         problem = self.problem(finger, stroke, at)
         young = problem.material.young / self.young
-        reaction = young * np.array([force_u, force_v])
+        strength = young * float(np.exp(powers(at) @ self.strength))
+        reaction = strength * np.array([force_u, force_v])
         stress = self.reader.stress(problem.mesh.points, nodal, self.law, problem.material.lame)
         read = self.reader.figures(problem.mesh.points, nodal, stress, float(problem.load.position or 0))
         values = (grip_force(reaction, problem.load) * problem.mesh.depth, *read, max(width, 0.0))
         indicator = self.indicator(self.field.deviations(at), weights)
         scales, calibration = (_between(each, self.shares, share) for each in (self.scales, self.calibration))
         halves = indicator * scales * calibration
-        halves[1] *= young * problem.mesh.depth
+        halves[1] *= strength * problem.mesh.depth
         halves[5] *= young
         intervals = zip(FIGURES, values, halves[1:], strict=True)
         return PredictedField(
@@ -129,7 +137,7 @@ class FieldEmulator:
             nodal=nodal,
             von_mises=stress,
             reaction=reaction,
-            energy=young * energy,
+            energy=strength * energy,
             contact=(abscissa, max(width, 0.0)),
             figures=dict(zip(FIGURES, values, strict=True)),
             intervals={name: (value - half, value + half) for name, value, half in intervals},
@@ -219,8 +227,7 @@ def fitted_fields(known: Snapshots, stages: Stages | None = None) -> FieldEmulat
         paths = coefficients.reshape(count, strokes, -1) / known.shares[:, None]
         field = Block.fitted(inputs, *Modes.of(paths.reshape(count, -1), LEAST_OF_PATHS))
         progress(0.6, "force and contact")
-        numbers = known.numbers / known.shares[:, None] ** POWERS
-        numbers[..., :3] /= known.factors[:, None, None]
+        strength, numbers = _scaled(known, inputs)
         units = np.abs(numbers).mean(axis=(0, 1)) + 1e-12
         block = Block.fitted(inputs, *Modes.of((numbers / units).reshape(count, -1), LEAST_OF_PATHS))
         progress(0.8, "mesh")
@@ -234,6 +241,7 @@ def fitted_fields(known: Snapshots, stages: Stages | None = None) -> FieldEmulat
             mesh=known.known.meshes.mesh,
             space=space,
             field=field,
+            strength=strength,
             numbers=block,
             motion=motion,
             units=units,
@@ -247,6 +255,26 @@ def fitted_fields(known: Snapshots, stages: Stages | None = None) -> FieldEmulat
         return _calibrated(made, known, paths)
 
 
+def powers(inputs: FloatArray) -> FloatArray:
+    """One, the inputs (..., d) and their products two by two, shape (..., p)."""
+    first, second = np.triu_indices(inputs.shape[-1])
+    one = np.ones_like(inputs[..., :1])
+    return np.concatenate([one, inputs, inputs[..., first] * inputs[..., second]], axis=-1)
+
+
+def _scaled(known: Snapshots, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients of the strength, and the samples' numbers over it and powers of the stroke, (s, k, 5)."""
+    numbers = known.numbers / known.shares[:, None] ** POWERS
+    numbers[..., :3] /= known.factors[:, None, None]
+    forces = np.linalg.norm(numbers[:, numbers.shape[1] // 2, :2], axis=1)
+    levels = np.log(np.maximum(forces, 1e-6 * forces.max()))
+    terms = powers(inputs)
+    penalty = RIDGE * np.eye(terms.shape[1])
+    strength = np.linalg.solve(terms.T @ terms + penalty, terms.T @ levels)
+    numbers[..., :3] /= np.exp(terms @ strength)[:, None, None]
+    return strength, numbers
+
+
 def _calibrated(made: FieldEmulator, known: Snapshots, paths: FloatArray) -> FieldEmulator:
     """The emulator with its intervals."""
     count, strokes, _ = paths.shape
@@ -254,7 +282,7 @@ def _calibrated(made: FieldEmulator, known: Snapshots, paths: FloatArray) -> Fie
     number_errors = (made.numbers.left_out @ made.numbers.modes.vectors).reshape(count, strokes, -1)
     values = np.zeros((2, count, strokes, 1 + len(FIGURES)))
     indicators = np.zeros((count, strokes))
-    reader = made.reader
+    reader, scales_of = made.reader, known.factors * np.exp(powers(made.known) @ made.strength)
     for sample, finger in enumerate(known.samples):
         points = known.points[min(sample, len(known.points) - 1)]
         material, load = known.inputs.physics(finger)
@@ -265,7 +293,7 @@ def _calibrated(made: FieldEmulator, known: Snapshots, paths: FloatArray) -> Fie
             true = known.nodal[sample, stroke]
             path = share * (paths[sample, stroke] - path_errors[sample, stroke])
             guess = made.space.combined(path).reshape(-1, 2)
-            scaled = known.numbers[sample, stroke] / known.factors[sample] ** (POWERS > 0)
+            scaled = known.numbers[sample, stroke] / scales_of[sample] ** (POWERS > 0)
             missed = scaled - number_errors[sample, stroke] * made.units * share**POWERS
             for kind, nodal, numbers in ((0, true, scaled), (1, guess, missed)):
                 stress = reader.stress(points, nodal, made.law, _unit(material, made.young).lame)

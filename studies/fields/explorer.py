@@ -131,6 +131,7 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
         },
         "numbers": _block(emulator.numbers, packed),
         "motion": None if emulator.motion is None else _block(emulator.motion, packed),
+        "strength": emulator.strength.tolist(),
         "units": emulator.units.tolist(),
         "errors": packed.add(emulator.error_modes[: len(emulator.field.factors)].astype("<f4")),
         "known": packed.add(emulator.known.astype("<f8")),

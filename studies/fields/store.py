@@ -14,7 +14,7 @@ from studies.fields.reduction import Modes
 from studies.fields.snapshots import KnownSamples, Snapshots
 
 FILE = "fields.safetensors"
-ARRAYS = ("units", "known", "lost", "scales", "calibration", "errors")
+ARRAYS = ("strength", "units", "known", "lost", "scales", "calibration", "errors")
 BLOCKS = ("field", "numbers", "motion")
 PARTS = ("inputs", "rates", "weights", "numbers", "factors")
 
