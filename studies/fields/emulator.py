@@ -23,7 +23,7 @@ from solvers.solver import with_law
 from studies.emulator.inputs import Inputs
 from studies.fields.block import Block
 from studies.fields.prediction import PredictedField
-from studies.fields.reader import FIGURES, FieldReader
+from studies.fields.reader import FIGURES, FieldReader, stress_at
 from studies.fields.reduction import Modes
 from studies.fields.snapshots import Snapshots
 from studies.sweep.study import Study, Value
@@ -116,14 +116,19 @@ class FieldEmulator:
         at, share = places(self.inputs, [finger])[0], stroke / self.stroke
         weights = self.weights(share)
         path = self.field.vector(at).reshape(len(weights), -1)
-        nodal = share * self.space.combined(weights @ path).reshape(-1, 2)
+        factors = (share * (weights @ path)).astype(np.float32)
+        nodal = (factors @ self.vectors).reshape(-1, 2).astype(np.float64)
         numbers = self.numbers.vector(at).reshape(len(weights), -1) * self.units
         force_u, force_v, energy, abscissa, width = (weights @ numbers) * share**POWERS
         problem = self.problem(finger, stroke, at)
         young = problem.material.young / self.young
         strength = young * float(np.exp(powers(at) @ self.strength))
         reaction = strength * np.array([force_u, force_v])
-        stress = self.reader.stress(problem.mesh.points, nodal, self.law, problem.material.lame)
+        if self.motion is None:
+            gradients = (factors @ self.gradients).reshape(-1, 2, 2)
+        else:
+            gradients = self.reader.gradients(problem.mesh.points, nodal[None])[0]
+        stress = stress_at(gradients, self.law, problem.material.lame)
         read = self.reader.figures(problem.mesh.points, nodal, stress, float(problem.load.position or 0))
         values = (grip_force(reaction, problem.load) * problem.mesh.depth, *read, max(width, 0.0))
         indicator = self.indicator(self.field.deviations(at), weights)
@@ -170,6 +175,17 @@ class FieldEmulator:
     def spline(self) -> CubicSpline:
         """Weights of the strokes as functions of the share of the full one."""
         return CubicSpline(self.shares, np.eye(len(self.shares)))
+
+    @cached_property
+    def vectors(self) -> FloatArray:
+        """Vectors of `space` in single precision, of which seven digits are enough, shape (r, 2 N)."""
+        return self.space.vectors.astype(np.float32)
+
+    @cached_property
+    def gradients(self) -> FloatArray:
+        """Gradients of the vectors at the nodes of the mesh, where it does not move: shape (r, 4 n)."""
+        nodal = self.space.vectors.reshape(len(self.vectors), -1, 2)
+        return self.reader.gradients(self.mesh.points, nodal).reshape(len(nodal), -1).astype(np.float32)
 
     @cached_property
     def reader(self) -> FieldReader:

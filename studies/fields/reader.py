@@ -55,21 +55,25 @@ class FieldReader:
 
     def stress(self, points: FloatArray, nodal: FloatArray, law: LawName, lame: Lame) -> FloatArray:
         """Von Mises stress at the nodes (n, 2), by the gradient's mean over their triangles: (n,), MPa."""
+        return stress_at(self.gradients(points, nodal[None])[0], law, lame)
+
+    def gradients(self, points: FloatArray, nodal: FloatArray) -> FloatArray:
+        """Means over a node's triangles of the gradients of displacements (s, N, 2): shape (s, n, 2, 2)."""
         triangles, count = self.mesh.triangles.T, len(points)
         corners = points[triangles]  # (3, t, 2)
         opposite = np.roll(corners, -2, axis=0) - np.roll(corners, -1, axis=0)
         slopes = np.stack([-opposite[..., 1], opposite[..., 0]])  # along x and y, times twice the area
         double = slopes[0, 0] * slopes[1, 1] - slopes[1, 0] * slopes[0, 1]
-        moved = nodal[self._cells]  # (6, t, 2)
-        by_λ = (self._corner_gradients @ moved.reshape(6, -1)).reshape(3, 3, *moved.shape[1:])
         # The mean is weighted by areas: gradients times twice the area are summed.
         nodes, weights = triangles.ravel(), np.bincount(triangles.ravel(), np.tile(double, 3), count)
-        gradient = np.empty((count, 2, 2))
-        for axis, along in product(range(2), range(2)):
-            found = np.einsum("clt,lt->ct", by_λ[..., axis], slopes[along])
-            gradient[:, axis, along] = np.bincount(nodes, found.ravel(), count) / weights
-        stress, across = stress_of(law, gradient, lame)
-        return von_mises(stress, stress_zz=across)
+        gradients = np.empty((len(nodal), count, 2, 2))
+        for gradient, each in zip(gradients, nodal, strict=True):
+            moved = each[self._cells]  # (6, t, 2)
+            by_λ = (self._corner_gradients @ moved.reshape(6, -1)).reshape(3, 3, *moved.shape[1:])
+            for axis, along in product(range(2), range(2)):
+                found = np.einsum("clt,lt->ct", by_λ[..., axis], slopes[along])
+                gradient[:, axis, along] = np.bincount(nodes, found.ravel(), count) / weights
+        return gradients
 
     def counted(self, points: FloatArray, position: float) -> BoolArray:
         """Mask of the nodes away from singular points and from a contact about an abscissa, mm, (n,)."""
@@ -90,3 +94,9 @@ class FieldReader:
         counted = self.counted(points, position)
         u, v = map(float, nodal[tip])
         return u, v, turn(after) - turn(before), float(stress[counted].max())
+
+
+def stress_at(gradients: FloatArray, law: LawName, lame: Lame) -> FloatArray:
+    """Von Mises stress of displacement gradients (n, 2, 2), shape (n,), MPa."""
+    stress, across = stress_of(law, gradients, lame)
+    return von_mises(stress, stress_zz=across)
