@@ -11,7 +11,8 @@ from geometry.errors import UserError
 BENCHMARKS = {
     "results": "results.default_run:main",
     "default": "results.default_time:main",
-    "fields": "results.fields:main",
+    "fields": "results.fields:loads",
+    "fingers": "results.fields:fingers",
     "fem": "elements.scikit_fem:main",
     "pinn": "networks.graded:pinn",
     "designs": "networks.graded:designs",

@@ -21,10 +21,10 @@ from studies.robots.chain import MM, Chain
 from studies.robots.mjcf import Damping, chain_mjcf, flex_mjcf, with_header
 from studies.robots.picture import draw_score
 from studies.robots.presses import PLACES, PressedFinger, at_rest, press
-from studies.robots.score import Score, scored
+from studies.robots.score import ModelScore, scored
 from studies.robots.simulation import Model, chain_front, check_mujoco, flex_front
 from studies.robots.sofa import sofa_scene
-from studies.robots.solid_files import write_material, write_msh, write_stl, write_vtk
+from studies.robots.solid_files import write_material, write_msh, write_surface, write_vtk
 from studies.robots.solid_mesh import SolidMesh
 from studies.robots.springs import Springs, fitted_springs
 
@@ -77,7 +77,7 @@ class Exported:
     """
 
     files: tuple[Path, ...]
-    scores: tuple[Score, ...] = ()
+    scores: tuple[ModelScore, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
@@ -117,7 +117,7 @@ def export_finger(
     if kind == "mesh":
         files += [out / "finger.vtk", out / "finger.stl"]
         write_vtk(files[2], body)
-        write_stl(files[3], body)
+        write_surface(files[3], body)
         return Exported(tuple(files))
     with stages.stage("first vibration"):
         _, _, damping = _chain(at_rest(problem), density, settings)
@@ -161,7 +161,7 @@ def _mujoco(
     if not tried.steady or not 0 < factor < np.inf:
         raise UserError("the flexible body does not come to rest; take a smaller stroke, or more layers")
     models = [Model("chain", hinges, chain_front(chain, rest)), flexible(factor)]
-    scores: list[Score] = []
+    scores: list[ModelScore] = []
     if settings.score:
         with stages.stage("score"):
             scores = [scored(model, pressed, pressed.held_out) for model in models]
@@ -195,7 +195,11 @@ def _header(pressed: PressedFinger, fit: str, settings: ExportSettings) -> Seque
 
 
 def _document(
-    pressed: PressedFinger, factor: float, density: float, settings: ExportSettings, scores: Sequence[Score]
+    pressed: PressedFinger,
+    factor: float,
+    density: float,
+    settings: ExportSettings,
+    scores: Sequence[ModelScore],
 ) -> dict[str, Any]:
     problem = pressed.problem
     return {

@@ -8,13 +8,13 @@ from compare.figures.style import axes_at, solver_colour, write_heading
 from geometry.figure import INK, MUTED, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
 from studies.robots.presses import PressedFinger
-from studies.robots.score import Score
+from studies.robots.score import ModelScore
 
 SHOWN = (0, 2, 4)
 """Places, from the base, whose largest loads are drawn."""
 
 
-def draw_score(finger: PressedFinger, scores: Sequence[Score]) -> Figure:
+def draw_score(finger: PressedFinger, scores: Sequence[ModelScore]) -> Figure:
     """Draw the front face at rest, by finite elements and by each model, at three loads."""
     mesh = finger.problem.mesh
     edges = mesh.points[boundary_edges(mesh.triangles)]

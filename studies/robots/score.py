@@ -11,7 +11,7 @@ from compare.runtime.tables import Cell, terminal_table
 from geometry.arrays import FloatArray
 from studies.robots.chain import MM
 from studies.robots.presses import Press, PressedFinger
-from studies.robots.simulation import Model, Rest, simulate
+from studies.robots.simulation import Model, Rest, pressed_in_mujoco
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class ScoredPress:
 
 
 @dataclass(frozen=True, eq=False)
-class Score:
+class ModelScore:
     """Errors of a model at all loads."""
 
     model: str
@@ -94,15 +94,15 @@ class Score:
         return {**self.values(), "steady": self.steady, "loads": [each.row() for each in self.presses]}
 
 
-def scored(model: Model, finger: PressedFinger, loads: Sequence[Press]) -> Score:
+def scored(model: Model, finger: PressedFinger, loads: Sequence[Press]) -> ModelScore:
     """Press a model under loads and compare with the finite elements."""
     rest: FloatArray = MM * finger.front
     depth = finger.problem.mesh.depth
-    found = (simulate(model, load, finger.radius, depth, rest) for load in loads)
-    return Score(model.name, tuple(ScoredPress(*pair) for pair in zip(loads, found, strict=True)))
+    found = (pressed_in_mujoco(model, load, finger.radius, depth, rest) for load in loads)
+    return ModelScore(model.name, tuple(ScoredPress(*pair) for pair in zip(loads, found, strict=True)))
 
 
-def score_table(scores: Sequence[Score]) -> Table:
+def score_table(scores: Sequence[ModelScore]) -> Table:
     """All loads of all models, for the terminal."""
     names = ("model", "x mm", "stroke", "front moves", "off mm", "force N", "FEM N", "off %")
     rows = [

@@ -98,7 +98,7 @@ def flex_front(body: SolidMesh, rest: FloatArray) -> Callable[[Any, Any], FloatA
     return places
 
 
-def simulate(model: Model, load: Press, radius: float, depth: float, rest: FloatArray) -> Rest:
+def pressed_in_mujoco(model: Model, load: Press, radius: float, depth: float, rest: FloatArray) -> Rest:
     """Press a model as a load says.
 
     Args:

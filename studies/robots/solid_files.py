@@ -41,7 +41,7 @@ def write_vtk(path: Path, body: SolidMesh) -> None:
         grid.save(partial)
 
 
-def write_stl(path: Path, body: SolidMesh) -> None:
+def write_surface(path: Path, body: SolidMesh) -> None:
     """Write the surface, for programs that make tetrahedra of their own."""
     faces = np.insert(body.skin, 0, 3, axis=1)
     with atomic_path(path) as partial:
