@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from geometry.errors import UserError as UserError
     from geometry.finger.design import Design as Design
     from geometry.finger.finger import Finger as Finger
+    from geometry.finger.markers import marker_positions as marker_positions
     from geometry.finger.presets import load_design as load_design
     from geometry.finger.presets import parse_overrides as parse_overrides
     from geometry.finger.presets import preset_names as preset_names
     from geometry.finger.section import finger_section as finger_section
-    from geometry.finger.section import marker_positions as marker_positions
     from geometry.finger.validation import allowed_range as allowed_range
     from geometry.mesh.boundary import elements_through_thickness as elements_through_thickness
     from geometry.mesh.point_location import LocatedPoints as LocatedPoints

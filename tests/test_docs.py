@@ -16,9 +16,9 @@ import pytest
 from pydantic import BaseModel
 
 from geometry.cache import CAD_FORMATS
+from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.presets import FOLDER, load_design, preset_names
-from geometry.finger.section import marker_positions
 from geometry.mesh.settings import MeshSettings
 from pinnray.options.preset_jobs import JOBS, JobDefaults
 from solvers.solver import Solver

@@ -40,7 +40,7 @@ NEEDED = {
         "solvers.pinn.finite_basis.sparse_cholesky:BlockMatrix.factorised",
     ),
     PRODUCTS: ("solvers.pinn.finite_basis.energy:NetworkEnergy.hessian",),
-    "renders": ("compare.figures.canvas:Canvas._cover",),
+    "renders": ("compare.figures.pyvista_canvas:Canvas._cover",),
     "fields written": ("compare.report.output_files:_write",),
     "pictures encoded": ("PIL.Image:Image.save",),
 }

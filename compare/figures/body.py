@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from compare.evaluation.evaluation import weighted_percentile
-from compare.figures.canvas import Canvas, Extent, Pixels
+from compare.figures.pyvista_canvas import Canvas, Extent, Pixels
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import INK, MUTED, SMALL
 from geometry.mesh.triangle_mesh import TriangleMesh

@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from compare.figures import body
-from compare.figures.canvas import Extent
 from compare.figures.dimensions import CENTRE_LINE, Draughtsman, upright
+from compare.figures.pyvista_canvas import Extent
 from compare.figures.style import arrow, axes_at, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, MEASURED, SMALL, WIDTH, Figure, figure

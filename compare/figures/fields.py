@@ -11,7 +11,7 @@ from compare.evaluation.evaluation import Evaluation, field_difference, weighted
 from compare.evaluation.metrics import COMPONENTS
 from compare.figures import body
 from compare.figures.body import PERCENT, ColourScale, diverging, sequential, symmetric
-from compare.figures.canvas import Canvas
+from compare.figures.pyvista_canvas import Canvas
 from compare.figures.style import axes_at, write_heading
 from compare.runtime.tables import percent, significant
 from geometry.arrays import FloatArray

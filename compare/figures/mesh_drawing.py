@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Rectangle
 
 from compare.figures import body
-from compare.figures.canvas import Extent
+from compare.figures.pyvista_canvas import Extent
 from compare.figures.style import HALO, axes_at, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure

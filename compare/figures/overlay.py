@@ -13,7 +13,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import body
 from compare.figures.body import ColourScale
-from compare.figures.canvas import Canvas, Extent
+from compare.figures.pyvista_canvas import Canvas, Extent
 from compare.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure

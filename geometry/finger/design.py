@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import model_validator
 
 from geometry.arrays import FloatArray
+from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import (
     MARKER,
     SYMBOLS,
@@ -14,7 +15,7 @@ from geometry.finger.parameters import (
     with_unit,
 )
 from geometry.finger.rules import fitting_marker
-from geometry.finger.section import finger_section, marker_positions
+from geometry.finger.section import finger_section
 from geometry.finger.validation import check
 from geometry.notebook import fact_table
 from geometry.section.section import Section

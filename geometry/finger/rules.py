@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 from scipy.spatial.distance import pdist
 
+from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import MARKER, Parameters, parameter_info
 from geometry.finger.section import (
     back_line,
@@ -14,7 +15,6 @@ from geometry.finger.section import (
     cells,
     corner_angles,
     finger_outline,
-    marker_positions,
     rib_pitch,
     rib_slope,
     tip_line,

@@ -1,4 +1,4 @@
-"""The finger's section from its parameters, in closed form: walls, ribs, cavities and markers; no CAD."""
+"""The finger's section from its parameters, in closed form: walls, ribs and cavities; no CAD."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -130,27 +130,6 @@ def rib_axes(p: Parameters) -> FloatArray:
     return np.stack([lines.meets(end) for end in ends], axis=1)
 
 
-@lru_cache(maxsize=64)
-def marker_positions(p: Parameters) -> FloatArray:
-    """Centres of the markers, ordered from base to tip, shape (m, 2), mm.
-
-    `joints`: where each rib's axis meets either wall's centre line, and one in the middle of the solid tip,
-    on the bisector of the apex: 2 rib_count + 1. `front`: `marker_count` of them on the front wall's centre
-    line, evenly along the front face.
-
-    The paper shows nine markers, printed with the finger, without positions; its group tracks the eight rib
-    ends and the tip in later code (csiro-robotics/Sim2Real_CFM_Soft_robotic).
-    """
-    if p.marker_layout == "front":
-        x = (p.height - tip_tangent(p)) * np.arange(1, p.marker_count + 1) / (p.marker_count + 1)
-        points = np.stack([x, np.full_like(x, -p.front_thickness / 2)], axis=1)
-    else:
-        points = np.concatenate([rib_axes(p).reshape(-1, 2), _tip_middle(p)[None]])
-        points = points[np.lexsort((-points[:, 1], points[:, 0]))]
-    points.setflags(write=False)  # the cache hands out one array
-    return np.asarray(points, dtype=np.float64)
-
-
 def apex_angle(p: Parameters) -> float:
     """Angle between front and back face, radians."""
     along = back_line(p, 0.0).direction
@@ -243,7 +222,7 @@ def _without_steps(points: list[FloatArray], names: list[str]) -> tuple[list[Flo
     return [points[which] for which in kept], [names[which] for which in kept]
 
 
-def _tip_middle(p: Parameters) -> FloatArray:
+def tip_middle(p: Parameters) -> FloatArray:
     """The middle of the solid tip, on the bisector of the apex, shape (2,), mm.
 
     It is half way, in x, between the tip line's front end and the rounding's extreme point.

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from geometry.finger.markers import marker_positions
 from geometry.finger.presets import load_design
-from geometry.finger.section import marker_positions
 from tests.test_docs import ROOT
 from vision.measurements import read_measurements
 

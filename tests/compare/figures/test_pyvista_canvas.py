@@ -3,7 +3,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from compare.figures.canvas import Canvas, Extent
+from compare.figures.pyvista_canvas import Canvas, Extent
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 RED, BLUE = (200, 10, 20), (10, 20, 200)
