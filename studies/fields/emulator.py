@@ -125,7 +125,7 @@ class FieldEmulator:
         strength = young * float(np.exp(powers(at) @ self.strength))
         reaction = strength * np.array([force_u, force_v])
         if self.motion is None:
-            gradients = (factors @ self.gradients).reshape(-1, 2, 2)
+            gradients = (factors @ self.gradients).reshape(2, 2, -1).transpose(2, 0, 1)
         else:
             gradients = self.reader.gradients(problem.mesh.points, nodal[None])[0]
         stress = stress_at(gradients, self.law, problem.material.lame)
@@ -183,9 +183,13 @@ class FieldEmulator:
 
     @cached_property
     def gradients(self) -> FloatArray:
-        """Gradients of the vectors at the nodes of the mesh, where it does not move: shape (r, 4 n)."""
+        """Gradients of the vectors at the nodes of the mesh, where it does not move: shape (r, 4 n).
+
+        Component by component, which halves the time of the stress.
+        """
         nodal = self.space.vectors.reshape(len(self.vectors), -1, 2)
-        return self.reader.gradients(self.mesh.points, nodal).reshape(len(nodal), -1).astype(np.float32)
+        found = self.reader.gradients(self.mesh.points, nodal).transpose(0, 2, 3, 1)
+        return np.ascontiguousarray(found.reshape(len(nodal), -1), dtype=np.float32)
 
     @cached_property
     def reader(self) -> FieldReader:
