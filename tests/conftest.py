@@ -16,8 +16,12 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.processes import child_environment
+from geometry.processes import child_environment, leave_signals_alone
 from solvers.solver import silent
+
+leave_signals_alone(
+    os.environ
+)  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 

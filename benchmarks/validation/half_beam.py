@@ -7,17 +7,16 @@ and z up from 0 to 30 mm. Loads, clamp and body are symmetric in y = 15 mm.
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import dolfinx
-import dolfinx.fem.petsc
 import numpy as np
 import ufl
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy.spatial import cKDTree
 
 from benchmarks.validation.laws import LAWS
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
+from solvers.fem.dolfinx_compat import dolfinx
+from solvers.petsc import PETSc
 
 LENGTH, WIDTH, HEIGHT = 100.0, 30.0, 30.0
 """Of the beam, mm."""
