@@ -1,7 +1,7 @@
 """Fields that an emulator predicts against fields that it has not seen; their sweeps are kept in `out/`.
 
 - `fields`: loads of one finger, docs/examples/loads.toml; half an hour on two cores, then two minutes.
-- `fingers`: fingers of other walls, docs/examples/fingers.toml; an hour and a half, then ten minutes.
+- `fingers`: fingers of other walls, docs/examples/fingers.toml; an hour on two cores, then five minutes.
 """
 
 from pathlib import Path
