@@ -181,4 +181,4 @@ def _parameter(name: str, values: Range, middle: Value) -> dict[str, Any]:
 
 def _middle(emulator: FieldEmulator) -> dict[str, Value]:
     """The finger in the middle of the ranges."""
-    return {name: sum(values.ends) / 2 for name, values in emulator.study.varied.items()}
+    return {name: round(sum(values.ends) / 2, 9) for name, values in emulator.study.varied.items()}
