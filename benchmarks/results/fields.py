@@ -43,8 +43,11 @@ def _judged(name: str, paths: int) -> Table:
     known, others = Path("out") / name, Path("out") / f"{name}-unseen"
     for each, folder in ((study, known), (unseen, others)):
         run_sweep(StudyJob(each, file.parent, folder, processes=2))
-    errors, within = _compared(fields_of(known), Snapshots.load(KnownSamples.of(others)))
-    table = Table("", "median", "95 %", "within", title=f"{len(errors)} fields that {file.name} has not seen")
+    true = Snapshots.load(KnownSamples.of(others))
+    errors, within = _compared(fields_of(known), true)
+    every = true.numbers[..., 0].size
+    title = f"{every} fields that {file.name} has not seen, {every - len(errors)} of them refused"
+    table = Table("", "median", "95 %", "within", title=title)
     for measure, column, held in zip(MEASURES, errors.T, within.T, strict=True):
         share = "" if np.isnan(held).any() else f"{held.mean():.1%}"
         table.add_row(measure, f"{np.median(column):.2%}", f"{np.quantile(column, 0.95):.2%}", share)
