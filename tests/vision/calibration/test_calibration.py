@@ -352,7 +352,8 @@ def test_a_photograph_can_be_left_out(folder, tmp_path, capsys):
         ("{0}/9.png --board 5x4 --square 10", "No such file"),
         ("{0}/*.bmp --board 5x4 --square 10", "there is no such picture"),
         ("{0} --board 5x4 --square 10 --without 9.png", "there is no photograph 9.png to leave out"),
-        ("{0} --board 4x4 --square 10", "4x4 inner corners; 5 seem to show 5x4"),
+        # OpenCV's exhaustive search finds the most oblique of the six boards on some processors only.
+        ("{0} --board 4x4 --square 10", "4x4 inner corners; [56] seem to show 5x4"),
         (
             "{0} --board charuco:5x4 --square 10 --marker 7",
             "0 of 7 photographs show the board of 5x4 squares",
