@@ -20,13 +20,13 @@ PRESETS = {
         "fast": "solvers.pinn.finite_basis.presets:PinnStdSolver",
         "local": "solvers.pinn.finite_basis.presets:PinnLocalSolver",
         "paper": "solvers.pinn.paper.solver:PaperPinnSolver",
-        "trained": "solvers.pinn.trained.solver:TrainedPinnSolver",
+        "trained": "solvers.pinn.finite_basis.presets:TrainedPinnSolver",
     },
     "pinn-asm": {
         "fast": "solvers.pinn.finite_basis.presets:PinnAsmSolver",
         "local": "solvers.pinn.finite_basis.presets:PinnLocalAsmSolver",
         "paper": "solvers.pinn.paper.solver:PaperPinnAsmSolver",
-        "trained": "solvers.pinn.trained.solver:TrainedPinnAsmSolver",
+        "trained": "solvers.pinn.finite_basis.presets:TrainedPinnAsmSolver",
     },
 }
 """Presets of our solvers, the default first. Each is a class with its own settings."""

@@ -363,8 +363,8 @@ def test_the_docs_have_the_settings_of_assimilation_as_they_are(name, settings):
     documented = {key: row[1] for key, row in zip(names(rows), rows, strict=True)}
     own, shared = (make_solver(which, **settings).settings() for which in (name, GIVEN_MARKERS[name]))
     assert own.items() >= shared.items()
-    if settings.get("preset") in ("paper", "trained"):  # the rows say so
-        documented["marker_radius"] = "0.0" if settings["preset"] == "paper" else "None"
+    if settings.get("preset") == "paper":  # the rows say so
+        documented["marker_radius"] = "0.0"
         del documented["choose"], documented["contact_deviation"]
     assert {key: str(own[key]) for key in own if key not in shared} == documented
 

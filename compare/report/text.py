@@ -40,7 +40,7 @@ def material_rows(comparison: Results) -> list[tuple[str, str]]:
 PRESET_WORDS = {
     "fast": "network with random hidden weights, output layer solved exactly (preset fast)",
     "paper": "the paper’s training (preset paper)",
-    "trained": "the paper’s networks, all weights trained by Gauss-Newton steps (preset trained)",
+    "trained": "network of small windows, all weights trained on the energy (preset trained)",
 }
 
 

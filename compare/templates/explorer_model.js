@@ -10,11 +10,28 @@ const pinnrayModel = (() => {
     vectors: places.vectors.map(read), factors: (places.factors ?? []).map(read),
   };
 
+  // Displacements at all nodes: those in the middles of edges are kept less the mean of the edge's ends.
+  function atNodes([corners, middles]) {
+    const [cells, nodal] = [read(manifest.cells), new Float64Array(corners.length + middles.length)];
+    nodal.set(corners);
+    nodal.set(middles, corners.length);
+    for (let t = 0; t < cells.length; t += 6) {
+      for (let k = 0; k < 3; k += 1) {
+        const [one, other, middle] = [cells[t + k], cells[t + ((k + 1) % 3)], cells[t + 3 + k]];
+        for (const axis of [0, 1]) {
+          const mean = 0.5 * (corners[2 * one + axis] + corners[2 * other + axis]);
+          nodal[2 * middle + axis] = mean + middles[2 * middle + axis - corners.length];
+        }
+      }
+    }
+    return nodal;
+  }
+
   async function load() {
     read = await pinnrayPacked.reader("explorer-data");
     mesh = {
       points: read(manifest.points), cells: read(manifest.cells), front: read(manifest.front), base: read(manifest.base),
-      away: read(manifest.away), space: manifest.space.map(read), errors: read(manifest.errors),
+      away: read(manifest.away), space: manifest.space.map((parts) => atNodes(parts.map(read))), errors: read(manifest.errors),
       known: read(manifest.known), lost: read(manifest.lost),
       field: block(manifest.field), numbers: block(manifest.numbers), motion: block(manifest.motion),
     };

@@ -7,13 +7,18 @@ const pinnrayPacked = (() => {
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
   }
 
-  // A function that gives the array at a place; one in steps of its range as values.
-  const kinds = { float64: Float64Array, float32: Float32Array, uint32: Uint32Array, uint16: Uint16Array };
+  // A function that gives the array at a place; one in steps of its range, low bytes first, as values.
+  const kinds = {
+    float64: Float64Array, float32: Float32Array, uint32: Uint32Array, uint16: Uint16Array, uint8: Uint8Array,
+  };
   async function reader(name) {
     const buffer = await (await unpacked(name)).arrayBuffer();
     return (place) => {
       const raw = new kinds[place.kind](buffer, place.offset, place.length);
-      return place.step === undefined ? raw : Float64Array.from(raw, (step) => place.low + place.step * step);
+      if (place.step === undefined) return raw;
+      const count = raw.length / 2;
+      const value = (_, k) => place.low + place.step * (raw[k] + 256 * raw[count + k]);
+      return Float64Array.from({ length: count }, value);
     };
   }
 

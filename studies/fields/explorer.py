@@ -13,6 +13,7 @@ from compare.runtime.provenance import package_versions
 from geometry.arrays import FloatArray
 from geometry.finger.parameters import SYMBOLS, Parameters
 from geometry.mesh.boundary import boundary_edges, edge_paths
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.finger_figures import QUANTITIES
 from solvers.lagrange import LagrangeSpace
 from solvers.physics import Physics
@@ -26,7 +27,8 @@ COLOURS = 32
 """Colours of the stress."""
 
 STEP = 2e-5
-"""Steps in which the page keeps displacements, mm: of a strain of 5 %, over half an element, a thousandth."""
+"""Least steps of displacements and places of nodes in the page, mm: over half an element, a thousandth of a
+strain of 4 %."""
 
 LARGEST = 0.75
 """Stress of the last colour over the root mean square of the samples' largest one: few walls reach it."""
@@ -122,7 +124,7 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
         "base": packed.add(np.unique(mesh.boundary("base")).astype("<u4")),
         "away": packed.add(reader.away.astype("<u2")),
         "space": [
-            packed.add_steps(vector, STEP / size)
+            [packed.add_steps(part, STEP / size) for part in _corners_and_middles(vector, mesh)]
             for vector, size in zip(emulator.space.vectors, _amplitudes(emulator), strict=True)
         ],
         "field": {
@@ -130,7 +132,7 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
             "factors": [packed.add(factor[lower]) for factor in emulator.field.factors],
         },
         "numbers": _block(emulator.numbers, packed),
-        "motion": None if emulator.motion is None else _block(emulator.motion, packed),
+        "motion": None if emulator.motion is None else _block(emulator.motion, packed, STEP),
         "strength": emulator.strength.tolist(),
         "units": emulator.units.tolist(),
         "errors": packed.add(emulator.error_modes[: len(emulator.field.factors)].astype("<f4")),
@@ -142,15 +144,28 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
     }
 
 
-def _block(block: Block, packed: Packed) -> dict[str, Any]:
-    """A block's arrays; vectors in steps of their own range, for they are most of the page."""
+def _corners_and_middles(vector: FloatArray, mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+    """Displacements of the corners of elements, and of the middles of edges less the mean of the edge's ends.
+
+    These, three nodes in four, are small: they are of the second derivatives.
+    """
+    corners, middles = np.split(vector.reshape(-1, 2), [len(mesh.points)])
+    return corners, middles - corners[mesh.edges].mean(axis=1)
+
+
+def _block(block: Block, packed: Packed, step: float = 0.0) -> dict[str, Any]:
+    """A block's arrays; vectors in steps of their own range, or of `step` in what they are combined to."""
+    spreads = block.numbers[1]
     return {
         "inputs": packed.add(block.inputs.astype("<f8")),
         "rates": packed.add(block.rates.astype("<f8")),
         "weights": packed.add(block.weights.astype("<f8")),
         "numbers": packed.add(block.numbers.astype("<f8")),
         "mean": packed.add(block.modes.mean.astype("<f8")),
-        "vectors": [packed.add_steps(vector) for vector in block.modes.vectors],
+        "vectors": [
+            packed.add_steps(vector, step / spread)
+            for vector, spread in zip(block.modes.vectors, spreads, strict=True)
+        ],
     }
 
 

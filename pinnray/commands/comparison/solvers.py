@@ -6,7 +6,7 @@ PRESET_MEANINGS = {
     "fast": "random hidden weights, output layer solved exactly",
     "local": "the same with small overlapping windows in place of gates",
     "paper": "the paper's training",
-    "trained": "the paper's networks, all weights trained by Gauss-Newton steps",
+    "trained": "small windows, every weight trained",
 }
 
 
@@ -15,7 +15,7 @@ def solvers() -> int:
 
     The networks pinn-std and pinn-asm have random hidden weights and an output layer that is solved exactly,
     in the preset fast with gates and in the preset local with windows. The preset paper is the paper's
-    training; the preset trained trains every weight of the paper's networks by Gauss-Newton steps.
+    training; the preset trained is local with fewer windows, whose hidden weights are trained too.
     """
     from rich.table import Table
 

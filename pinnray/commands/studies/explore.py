@@ -26,8 +26,9 @@ def explore(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False)
         raise UserError(f"--out {path}: give the name of an HTML file, such as explore.html")
     with Stages() as stages:
         emulator = fields_of(sweep, refit=refit, stages=stages)
-        with stages.stage("page"):
-            write_explorer(emulator, path)
+        with stages.stage("page") as progress:
+            size = write_explorer(emulator, path).stat().st_size
+            progress(1.0, f"{size / 1e6:.1f} MB")
     print(path)
     return 0
 

@@ -1,5 +1,6 @@
 """Energy of a finite-basis network plus quadratic terms for load and markers, and its Newton step."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -33,6 +34,29 @@ class NewtonIterate(NamedTuple):
     energy: float | None = None
 
 
+class PointSprings(NamedTuple):
+    """Springs that pull k weighted means of the displacement at q points, each by a of its components."""
+
+    points: FloatArray  # Shape (q, 2), mm
+    weights: FloatArray  # Shape (k, q)
+    axes: list[int]  # The components, (a,)
+
+    def functionals(self, basis: FiniteBasis) -> FloatArray:
+        """Functionals of the output layer, those of a mean's components together, shape (k a, U)."""
+        count = len(self.weights), len(self.axes)
+        found = np.zeros((*count, basis.windows.count, 2, basis.per_window))
+        means = basis.functionals(self.points, self.weights)
+        for number, axis in enumerate(self.axes):
+            found[:, number, :, axis] = means
+        return found.reshape(-1, 2 * basis.size)
+
+    def neuron_slopes(self, basis: FiniteBasis, forces: FloatArray, output: torch.Tensor) -> torch.Tensor:
+        """Derivatives by the neurons, (3, m, c), of the work that forces (k a,) do, N mm/mm."""
+        weights = np.zeros((len(self.points), 2))
+        weights[:, self.axes] = self.weights.T @ forces.reshape(-1, len(self.axes))
+        return basis.slopes_of_values(self.points, weights, output)
+
+
 class LinearResponse(NamedTuple):
     """Response of a network that is linearised at some output layer."""
 
@@ -55,8 +79,9 @@ class ConstrainedNetwork:
     functionals: FloatArray  # Of the output layer, shape (n, U): the load's, then the markers'
     targets: FloatArray  # Their prescribed or observed values, shape (n,), mm
     compliance: FloatArray  # Of the springs, shape (n,), mm per N/mm
-    load_shape: tuple[int, ...]  # Shape (a, k) of the load's functionals: k for each of a components
+    springs: tuple[PointSprings, ...]  # Where these functionals come from: the load, then the markers
     weighting: MarkerWeighting | None  # Chooses a factor of the markers' weights; None without markers
+    factor: float | None = None  # That factor, where it is held
 
     @classmethod
     def of(
@@ -66,24 +91,29 @@ class ConstrainedNetwork:
         weighting: MarkerWeighting | None = None,
     ) -> "ConstrainedNetwork":
         """The network of an energy under the load and, with a weighting, the markers of a problem."""
-        basis, conditions = energy.basis, load_conditions(problem)
-        functionals = _functionals(basis, conditions.points, conditions.weights, problem.load.prescribed)
-        size, targets = functionals.shape[-1], conditions.values.ravel()
-        functionals, compliance = functionals.reshape(-1, size), np.zeros(len(targets))
+        conditions = load_conditions(problem)
+        springs = [PointSprings(conditions.points, conditions.weights, problem.load.prescribed)]
+        targets = conditions.values.T.ravel()
+        compliance = np.zeros(len(targets))
         misfit = None if weighting is None else weighting.misfit(problem)
         if weighting is not None and misfit is not None:
-            of_markers = _functionals(basis, *misfit.sampling(), [0, 1]).swapaxes(0, 1).reshape(-1, size)
-            functionals = np.concatenate([functionals, of_markers])
+            springs.append(PointSprings(*misfit.sampling(), [0, 1]))
             targets = np.concatenate([targets, misfit.observed.ravel()])
             compliance = np.concatenate([compliance + weighting.slack, 1 / misfit.weights.ravel()])
         return cls(
             energy,
-            functionals,
+            _functionals(springs, energy.basis),
             targets,
             compliance,
-            conditions.values.shape,
+            tuple(springs),
             weighting if misfit else None,
         )
+
+    def with_neurons(self, neurons: torch.Tensor, factor: float) -> "ConstrainedNetwork":
+        """The network with other neurons (3, m, c), the factor of the markers' weights held."""
+        basis = replace(self.energy.basis, neurons=neurons)
+        functionals = _functionals(self.springs, basis)
+        return replace(self, energy=self.energy.with_basis(basis), functionals=functionals, factor=factor)
 
     @property
     def zero_output(self) -> torch.Tensor:
@@ -99,13 +129,12 @@ class ConstrainedNetwork:
 
     @property
     def load_count(self) -> int:
-        """Number of springs of the load, a k: the first ones."""
-        return int(np.prod(self.load_shape))
+        """Number of springs of the load: the first ones."""
+        return len(self.springs[0].axes) * len(self.springs[0].weights)
 
     def reaction(self, forces: FloatArray) -> FloatArray:
         """The indenter's force for each prescribed component, shape (a,), N/mm, from the springs' (n,)."""
-        of_load: FloatArray = forces[: self.load_count].reshape(self.load_shape)
-        return of_load[:, 0]
+        return forces[: len(self.springs[0].axes)]
 
     def marker_stats(self, state: NewtonIterate) -> dict[str, float]:
         """The factor of the weights, the misfit, N mm / mm, and the largest force at a marker, N/mm."""
@@ -180,7 +209,7 @@ class ConstrainedNetwork:
         springs = ConstrainedElimination(self.functionals, unit, self.compliance)
         values = fraction * self.targets - springs.values(output.numpy())
         markers = self._marker_forces(springs, values - springs.values(free))
-        factor = self.weighting.factor(markers) if self.weighting and markers else 1.0
+        factor = self.factor or (self.weighting.factor(markers) if self.weighting and markers else 1.0)
         scaled = np.append(self.compliance[: self.load_count], self.compliance[self.load_count :] / factor)
         springs = replace(springs, compliance=scaled)
         change, forces = springs.solution(free, values)
@@ -197,6 +226,20 @@ class ConstrainedNetwork:
             springs.unstable(negative),
             0.5 * float(derivative @ reached.numpy().ravel()) if self.energy.quadratic else None,
         )
+
+    def least(self, state: NewtonIterate) -> tuple[float, torch.Tensor]:
+        """Energy with that of the springs at an equilibrium, N mm/mm, and its derivatives by the neurons.
+
+        The output layer minimises it, so that only the neurons' own part counts. Source: G. Golub,
+        V. Pereyra, Inverse Problems 19 (2003) R1-R26 (variable projection).
+        """
+        soft = self.compliance.copy()
+        soft[self.load_count :] /= state.factor
+        value, slopes = self.energy.with_neuron_slopes(state.output)
+        parts = np.split(state.forces, [self.load_count])
+        for springs, forces in zip(self.springs, parts, strict=False):
+            slopes -= springs.neuron_slopes(self.energy.basis, forces, state.output)
+        return value + 0.5 * float(soft @ state.forces**2), slopes
 
     def energy_with_springs(self, output: torch.Tensor, fraction: float = 1.0) -> float:
         """Energy per depth with that of the springs that are not rigid, under a fraction of the load."""
@@ -225,9 +268,6 @@ class ConstrainedNetwork:
         return self.zero_output if found is None else found.output
 
 
-def _functionals(basis: FiniteBasis, points: FloatArray, weights: FloatArray, axes: list[int]) -> FloatArray:
-    """Sums of weights (k, q) times components of the displacement at points (q, 2): (a, k, U)."""
-    found = np.zeros((len(axes), len(weights), basis.windows.count, 2, basis.per_window))
-    for row, axis in enumerate(axes):
-        found[row, :, :, axis] = basis.functionals(points, weights)
-    return found.reshape(len(axes), len(weights), 2 * basis.size)
+def _functionals(springs: Sequence[PointSprings], basis: FiniteBasis) -> FloatArray:
+    """Functionals of the output layer of all springs, shape (n, U)."""
+    return np.concatenate([each.functionals(basis) for each in springs])

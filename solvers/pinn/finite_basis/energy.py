@@ -4,7 +4,7 @@ Source of stress and tangent: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanic
 2nd ed., sections 6.4.3 (neo-Hookean, with d(F^-T) = -F^-T dF^T F^-T) and 6.4.1 (St Venant-Kirchhoff).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from functools import cached_property
 from itertools import product
@@ -25,7 +25,7 @@ REGULARISATION = 1e-12
 """Added to the unit diagonal of the scaled Hessian, against nearly dependent basis functions."""
 
 KEPT = 2**30
-"""Most bytes of basis gradients that an energy of finite strain keeps for its next evaluation.
+"""Most bytes of basis gradients that an energy of finite strain, or in training, keeps for its next use.
 
 The two levels of `pinn-std` on the default finger have 0.12 and 0.4 GB of them. Above the limit they are
 computed anew for every evaluation.
@@ -60,6 +60,7 @@ class NetworkEnergy:
     weights: torch.Tensor  # Of the points, shape (q,), mm^2
     rows: IntArray  # First window of every pair that a patch has, shape (b,)
     columns: IntArray  # Second window, not before the first, shape (b,)
+    small: bool  # Whether the patches' basis gradients take at most `KEPT`
     origin: FiniteBasisField | None = None  # Displacement of zero energy; None for zero
     # Basis gradients of the patches met so far, by their numbers; None if they are not kept
     kept: dict[int, torch.Tensor] | None = dataclass_field(default=None, repr=False)
@@ -84,7 +85,7 @@ class NetworkEnergy:
             start = rows.stop
             used += 16 * len(places) * len(near) * basis.per_window
         order = np.concatenate([numbers for numbers, *_ in cuts])
-        keep = material.law != "linear" and used <= KEPT
+        small = used <= KEPT
         return cls(
             basis=basis,
             material=material,
@@ -92,8 +93,13 @@ class NetworkEnergy:
             weights=torch.from_numpy(weights[order]),
             rows=known.numpy() // count,
             columns=known.numpy() % count,
-            kept={} if keep else None,
+            small=small,
+            kept={} if small and material.law != "linear" else None,
         )
+
+    def with_basis(self, basis: FiniteBasis) -> "NetworkEnergy":
+        """The energy of a network of the same windows, with which much is done."""
+        return replace(self, basis=basis, kept={} if self.small else None)
 
     @property
     def points(self) -> int:
@@ -173,6 +179,22 @@ class NetworkEnergy:
             for near, here in imap_in_threads(task, range(len(self.patches))):
                 found.index_add_(0, near, here)
         return found.permute(2, 0, 3, 1).contiguous()
+
+    def with_neuron_slopes(self, output: torch.Tensor) -> tuple[float, torch.Tensor]:
+        """The energy of an output layer (c, 2, m + 1), and its derivatives by the neurons, (3, m, c)."""
+        gradient, law = self.gradients(output[None])[0], (self.material.lame, self.material.law)
+        stress, _ = piola_stress_and_tangent(gradient, *law)
+        weighted = self.weights[:, None, None] * stress
+
+        def task(patch: QuadraturePatch) -> tuple[torch.Tensor, torch.Tensor]:
+            return patch.near, self.basis.slopes_of_gradients(
+                patch.points, patch.near, weighted[patch.rows], output[patch.near]
+            )
+
+        found = torch.zeros_like(self.basis.neurons)
+        for near, here in imap_in_threads(task, self.patches):
+            found.index_add_(2, near, here)
+        return float(self.weights @ energy_density(gradient, *law)), found
 
     def gradient_operator(self) -> csr_matrix:
         """The matrix from coefficients of the functions to gradients at the points, (2 q, c (m + 1)), 1/mm.

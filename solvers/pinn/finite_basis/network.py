@@ -112,6 +112,55 @@ class FiniteBasis:
             found.index_add_(1, near, torch.einsum("knx,xnwu->kwu", of_patch, along))
         return np.asarray(found)
 
+    def slopes_of_values(self, points: FloatArray, weights: FloatArray, output: torch.Tensor) -> torch.Tensor:
+        """Derivatives by the neurons, (3, m, c), of the sum of weights (n, 2) times the displacement.
+
+        Args:
+            points: Shape (n, 2), mm.
+            weights: Of the displacement's components there.
+            output: The output layer, shape (c, 2, m + 1), mm.
+        """
+        found = torch.zeros_like(self.neurons)
+        for patch, place, near in self.patches(points):
+            window = self.windows.values(place, near).mul_(self.constraint.at(place)[0])
+            neuron = self._unwindowed(place, near)[:, 1:]
+            here = torch.einsum("ni,wim->nmw", torch.from_numpy(weights[patch]), output[near, :, 1:])
+            here.mul_(1 - neuron.square()).mul_(window[:, None])
+            found.index_add_(2, near, torch.einsum("nmw,nx->xmw", here, with_one(place)))
+        return found
+
+    def slopes_of_gradients(
+        self, points: torch.Tensor, near: torch.Tensor, weights: torch.Tensor, output: torch.Tensor
+    ) -> torch.Tensor:
+        """Derivatives by the neurons `near` of the sum of weights times the displacement gradient.
+
+        With t = w·x + b, N = tanh t and the window g, a neuron adds c_i (N ∂g/∂x_j + g (1 - N²) w_j) to
+        ∂u_i/∂x_j.
+
+        Args:
+            points: Shape (n, 2), mm.
+            near: Numbers of the windows that reach them, shape (w,).
+            weights: Of the components of the gradient, shape (n, 2, 2).
+            output: The output layer of these windows, shape (w, 2, m + 1), mm.
+
+        Returns:
+            Shape (3, m, w).
+        """
+        window, along = self.windows.values_and_gradients(points, near)
+        factor, *slopes = self.constraint.at(points)
+        along = along.mul_(factor)
+        for part, slope in zip(along, slopes, strict=True):
+            part.addcmul_(slope, window)
+        neuron = self._unwindowed(points, near)[:, 1:]
+        rate = 1 - neuron.square()
+        pulled = torch.einsum("nij,wim->jnmw", weights, output[:, :, 1:])
+        steep = (pulled * self.neurons[:2, None, :, near]).sum(dim=0)
+        rate_in_window = rate * window.mul_(factor)[:, None]
+        by_argument = rate * (pulled * along[:, :, None]).sum(dim=0) - 2 * neuron * rate_in_window * steep
+        found = torch.einsum("nmw,nx->xmw", by_argument, with_one(points))
+        found[:2] += (pulled * rate_in_window).sum(dim=1)
+        return found
+
     def evaluated(
         self, points: FloatArray, quantity: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
     ) -> FloatArray:
@@ -137,6 +186,11 @@ class FiniteBasis:
         # tanh(t) = 2 σ(2 t) - 1: torch's logistic function was measured to be ten times as fast as its tanh.
         hidden.mul_(2).sigmoid_().mul_(2).sub_(1)
         return function
+
+
+def with_one(points: torch.Tensor) -> torch.Tensor:
+    """Points (n, 2) and one, by which a bias is multiplied, (n, 3)."""
+    return torch.cat([points, torch.ones_like(points[:, :1])], dim=1)
 
 
 @dataclass(frozen=True, eq=False)

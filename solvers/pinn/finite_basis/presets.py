@@ -1,8 +1,8 @@
-"""Presets `fast` and `local` of `pinn-std` and `pinn-asm`: random hidden weights, exact output layer."""
+"""Presets `fast`, `local` and `trained` of `pinn-std` and `pinn-asm`: output layers that are exact."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 import torch
@@ -11,11 +11,16 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.misfit import MarkerSettings
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from solvers.pinn.finite_basis.network import FiniteBasisField
+from solvers.pinn.finite_basis.newton import LoadStep
 from solvers.pinn.finite_basis.solver import FiniteBasisSolver
+from solvers.pinn.finite_basis.training import with_trained_neurons
 from solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
 from solvers.problem import Problem
 from solvers.shared_work import SharedWork
 from solvers.solution import Solution
+from solvers.solver import Progress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +76,33 @@ class PinnLocalSolver(FiniteBasisSolver):
         return ShepardWindows(torch.from_numpy(centres), torch.from_numpy(self.radius * spacing))
 
 
+@dataclass(frozen=True, kw_only=True)
+class TrainedPinnSolver(PinnLocalSolver):
+    """Preset `trained`: the network of preset `local` with a quarter of its windows, every weight trained.
+
+    Attributes:
+        steps: Of the training on each level.
+    """
+
+    wall_spacing: float = 1.0
+    corner_spacing: float = 0.012
+    growth: float = 1.0
+    steps: int = 40
+    name: ClassVar[str] = "pinn-std"
+    preset: ClassVar[str] = "trained"
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+
+    def equilibrium(
+        self, network: ConstrainedNetwork, coarse: FiniteBasisField | None, progress: Progress
+    ) -> tuple[ConstrainedNetwork, LoadStep]:
+        """The network whose neurons are trained; see `FiniteBasisSolver`."""
+        network, start = super().equilibrium(network, coarse, progress)
+        if start.fraction < 1:
+            return network, start
+        windows = cast(ShepardWindows, network.energy.basis.windows)
+        return with_trained_neurons(network, start, windows, self.steps, progress)
+
+
 def _refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[Observations], Solution]:
     """See `Refittable`; one factorisation of each level for all observations if the law is linear."""
     work = SharedWork()
@@ -100,3 +132,11 @@ class PinnLocalAsmSolver(MarkerSettings, PinnLocalSolver):
     twin: ClassVar[str] = "fem-asm"
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     refitter = _refitter
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainedPinnAsmSolver(MarkerSettings, TrainedPinnSolver):
+    """The network and the training of `TrainedPinnSolver` with the markers' misfit."""
+
+    name: ClassVar[str] = "pinn-asm"
+    twin: ClassVar[str] = "fem-asm"

@@ -123,11 +123,17 @@ class FiniteBasisSolver(NetworkSolver):
                     coarse = rough.field(last.state.output)
                 last = _press(PressedNetwork.of(network, problem), last, coarse, progress)
             else:
-                last = _train(network, coarse, progress)
+                network, last = self.equilibrium(network, coarse, progress)
             return network, last
 
         with pool():
             return self.trained(problem, train, progress)
+
+    def equilibrium(
+        self, network: ConstrainedNetwork, coarse: FiniteBasisField | None, progress: Progress
+    ) -> tuple[ConstrainedNetwork, LoadStep]:
+        """A level's network and its equilibrium without a cylinder, from that of a coarser level if given."""
+        return network, _train(network, coarse, progress)
 
     def _framed(self, problem: Problem, progress: Progress) -> Solution | None:
         """The solution with the pictures' frames by the coarsest level; None where they are fixed.

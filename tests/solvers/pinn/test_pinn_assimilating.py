@@ -87,7 +87,7 @@ def test_it_has_the_least_energy_plus_misfit(problem, weights):
 
     least = level.step(level.zero_output)
     drawn = np.random.default_rng(0).normal(size=level.functionals.shape[1])
-    load = level.functionals[: np.prod(level.load_shape)]
+    load = level.functionals[: level.load_count]
     drawn -= load.T @ np.linalg.solve(load @ load.T, load @ drawn)
     direction = torch.from_numpy(drawn).view_as(least.output)
     quadratic = level.energy.total(direction) + misfit.value(misfit.observed + seen(direction))
@@ -112,7 +112,7 @@ def test_finite_strain_has_the_least_energy_plus_misfit_nearby(bent):
 
     least, _ = find_equilibrium(level, solution.field.output, 1.0)
     drawn = np.random.default_rng(0).normal(size=level.functionals.shape[1])
-    load = level.functionals[: np.prod(level.load_shape)]
+    load = level.functionals[: level.load_count]
     drawn -= load.T @ np.linalg.solve(load @ load.T, load @ drawn)
     direction = 1e-4 * torch.from_numpy(drawn).view_as(least.output)
     ahead, here, behind = (total(least.output + size * direction) for size in (1, 0, -1))
