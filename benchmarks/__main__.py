@@ -12,6 +12,7 @@ BENCHMARKS = {
     "results": "results.default_run:main",
     "default": "results.default_time:main",
     "fields": "results.fields:loads",
+    "friction": "results.fields:friction",
     "fingers": "results.fields:fingers",
     "fem": "elements.scikit_fem:main",
     "pinn": "networks.graded:pinn",

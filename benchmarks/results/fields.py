@@ -1,6 +1,7 @@
 """Fields that an emulator predicts against fields that it has not seen; their sweeps are kept in `out/`.
 
 - `fields`: loads of one finger, docs/examples/loads.toml; half an hour on two cores, then two minutes.
+- `friction`: the same with friction, docs/examples/friction.toml; as long.
 - `fingers`: fingers of other walls, docs/examples/fingers.toml; an hour on two cores, then five minutes.
 """
 
@@ -27,7 +28,12 @@ MEASURES = ("displacement", "von Mises stress away from corners", *FIGURES)
 
 def loads() -> Table:
     """Loads of one finger."""
-    return _judged("loads", 48)
+    return _judged("loads", 72)
+
+
+def friction() -> Table:
+    """Loads of one finger with friction."""
+    return _judged("friction", 72)
 
 
 def fingers() -> Table:

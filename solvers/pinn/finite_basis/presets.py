@@ -78,16 +78,16 @@ class PinnLocalSolver(FiniteBasisSolver):
 
 @dataclass(frozen=True, kw_only=True)
 class TrainedPinnSolver(PinnLocalSolver):
-    """Preset `trained`: the network of preset `local` with a quarter of its windows, every weight trained.
+    """Preset `trained`: the network of preset `local` with two fifths of its windows, every weight trained.
 
     Attributes:
         steps: Of the training on each level.
     """
 
-    wall_spacing: float = 1.0
-    corner_spacing: float = 0.012
-    growth: float = 1.0
-    steps: int = 40
+    wall_spacing: float = 0.8
+    corner_spacing: float = 0.01
+    growth: float = 0.8
+    steps: int = 25
     name: ClassVar[str] = "pinn-std"
     preset: ClassVar[str] = "trained"
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
