@@ -29,7 +29,7 @@ def test_the_page_has_every_key_of_a_study_and_of_a_question() -> None:
     assert names(table(PAGE, "key of a question")) == own
 
 
-@pytest.mark.parametrize("name", ["ribs.toml", "loads.toml"])
+@pytest.mark.parametrize("name", ["ribs.toml", "loads.toml", "friction.toml", "fingers.toml"])
 def test_the_example_study_can_be_read(name: str) -> None:
     from studies.sweep.study import load_study
 
