@@ -28,8 +28,8 @@ CARRIED = 40
 PENETRATION, ON_THE_WAY = 1e-5, 1e-3
 """Largest gap of a node in contact and penetration of any node, mm, under the full load and below it.
 
-On the way without friction that changes forces by some 2e-4, and takes a fifth of the time off; what follows a
-state with friction depends on it."""
+On the way without friction that changes forces by some 2e-4, and takes a fifth of the time off; what follows
+a state with friction depends on it."""
 SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
 """A finger whose contact is so many times stiffer than itself takes a step first with a contact that is only
 SOFTEST times as stiff, which is hardened by factors of at most HARDER. For a node leaves the contact within
