@@ -8,7 +8,7 @@ import shapely
 from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray
-from geometry.drawing.formats.chain import straightened
+from geometry.drawing.formats.closed_loops import straightened
 from geometry.drawing.formats.drawing import place
 from geometry.drawing.placement import on_curve
 from geometry.errors import UserError

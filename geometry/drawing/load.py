@@ -14,7 +14,7 @@ from geometry.drawing import proposal
 from geometry.drawing.checks import body, check_contact, check_markers
 from geometry.drawing.description import Description, description_beside, load_description
 from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.drawing.formats.chain import straightened
+from geometry.drawing.formats.closed_loops import straightened
 from geometry.drawing.formats.drawing import LABELS, Drawing, label_of, place
 from geometry.drawing.placement import placed, with_part
 from geometry.drawing.ready_mesh import ready_mesh

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray, frozen_array
-from geometry.drawing.formats.chain import corner_at, cut_at, nearest_piece, run_between
+from geometry.drawing.formats.closed_loops import corner_at, cut_at, nearest_piece, run_between
 from geometry.drawing.formats.drawing import place
 from geometry.errors import UserError
 from geometry.section.loop import STRAIGHT, Loop

@@ -21,7 +21,7 @@ from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solver import with_law
 from studies.emulator.inputs import Inputs
-from studies.fields.block import Block
+from studies.fields.gaussian_processes import Block
 from studies.fields.prediction import PredictedField
 from studies.fields.reader import FIGURES, FieldReader, stress_at
 from studies.fields.reduction import Modes

@@ -18,8 +18,8 @@ from solvers.finger_figures import QUANTITIES
 from solvers.lagrange import LagrangeSpace
 from solvers.physics import Physics
 from studies.emulator.inputs import WIDE
-from studies.fields.block import Block
 from studies.fields.emulator import FieldEmulator
+from studies.fields.gaussian_processes import Block
 from studies.fields.reader import FIGURES
 from studies.sweep.study import PHYSICS, Range, Value, unit_of
 

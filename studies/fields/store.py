@@ -8,8 +8,8 @@ from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.content_hash import content_hash, sources_digest
 from studies.emulator.arrays_file import keep_arrays, kept_arrays
-from studies.fields.block import Block
 from studies.fields.emulator import FieldEmulator, fitted_fields
+from studies.fields.gaussian_processes import Block
 from studies.fields.reduction import Modes
 from studies.fields.snapshots import KnownSamples, Snapshots
 

@@ -10,7 +10,7 @@ import ezdxf
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.drawing.formats.chain import Marks
+from geometry.drawing.formats.closed_loops import Marks
 from geometry.drawing.formats.drawing import Drawing, label_of
 from geometry.drawing.formats.dxf_blocks import Walk, sound
 from geometry.drawing.formats.dxf_file import document_of, dxf_scale

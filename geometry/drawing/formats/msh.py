@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import BarycentricInterpolator
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.drawing.formats.chain import Closed, closed_loops, straightened
+from geometry.drawing.formats.closed_loops import Closed, closed_loops, straightened
 from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, Scale, label_of
 from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, line
 from geometry.drawing.formats.planes import axes_across, plane_text

@@ -14,7 +14,7 @@ from OCP.BRep import BRep_Tool
 from OCP.GeomLProp import GeomLProp_SLProps
 
 from geometry.arrays import FloatArray
-from geometry.drawing.formats.chain import closed_loops
+from geometry.drawing.formats.closed_loops import closed_loops
 from geometry.drawing.formats.drawing import UNITS, Drawing, Scale
 from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
 from geometry.drawing.formats.planes import axes_across, plane_of, plane_text

@@ -10,7 +10,7 @@ import numpy as np
 import svgelements
 
 from geometry.arrays import FloatArray
-from geometry.drawing.formats.chain import Marks
+from geometry.drawing.formats.closed_loops import Marks
 from geometry.drawing.formats.drawing import LABELS, Drawing, label_of
 from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
 from geometry.drawing.formats.svg_tree import NAMESPACE, drawn, svg_scale, tag_of

@@ -15,7 +15,7 @@ import torch
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.mesh.point_location import LocatedPoints
-from solvers.pinn.finite_basis.base_distance import HardConstraint
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
 from solvers.pinn.threading import boxes_around, cut_into_patches, imap_in_threads
 

@@ -15,9 +15,9 @@ from solvers.assimilation.marker_forces import MarkerFit
 from solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
 from solvers.assimilation.pictures import FreePictures
 from solvers.cylinder_contact import CONTACT_AT_END
-from solvers.pinn.finite_basis.base_distance import HardConstraint
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.energy import NetworkEnergy
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
 from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
 from solvers.pinn.finite_basis.point_spacing import (

@@ -10,7 +10,7 @@ from geometry import UserError
 from geometry.drawing.checks import body
 from geometry.drawing.description import Description
 from geometry.drawing.drawn_finger import description_lines
-from geometry.drawing.formats.chain import closed_loops
+from geometry.drawing.formats.closed_loops import closed_loops
 from geometry.drawing.formats.pieces import line
 from geometry.drawing.load import finger_from_file, read_drawing
 from tests.geometry.drawing.files import BEAM, write_dxf

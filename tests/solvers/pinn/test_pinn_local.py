@@ -17,8 +17,8 @@ from solvers import stability
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import newton
-from solvers.pinn.finite_basis.base_distance import HardConstraint
 from solvers.pinn.finite_basis.energy import NetworkEnergy
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from geometry.mesh.boundary import boundary_edges
-from solvers.pinn.finite_basis.base_distance import CurveDistance, LineDistance, base_distance
+from solvers.pinn.finite_basis.hard_constraint import CurveDistance, LineDistance, base_distance
 from tests.solvers.bodies import BODIES, body_mesh
 
 
