@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 
 from geometry.arrays import FloatArray
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium
+from solvers.pinn.finite_basis.newton import SETTLED, LoadStep, find_equilibrium
 from solvers.pinn.finite_basis.windows import ShepardWindows
 from solvers.solver import Progress
 
@@ -53,7 +53,7 @@ def with_trained_neurons(
         callback=report,
         options={"maxiter": steps, "maxcor": MEMORY, "ftol": 0.0, "gtol": 0.0},
     )
-    return trained.network, trained.reached
+    return trained.network, trained.settled()
 
 
 @dataclass(eq=False)
@@ -67,6 +67,14 @@ class _Training:
 
     def __post_init__(self) -> None:
         self.lowest, _ = self.network.least(self.reached.state)
+
+    def settled(self) -> LoadStep:
+        """The equilibrium of the best network, of which the training asked less at finite strain."""
+        if self.network.energy.material.law == "linear" or not self.count:
+            return self.reached
+        state, iterations = find_equilibrium(self.network, self.reached.state.output, 1.0)
+        iterations += self.reached.iterations
+        return self.reached._replace(state=state or self.reached.state, iterations=iterations)
 
     def places(self, neurons: torch.Tensor) -> torch.Tensor:
         """Weights of the position in radii from a window's centre, and the bias there, shape (3, m, c)."""
@@ -87,7 +95,7 @@ class _Training:
         if network.energy.material.law == "linear":
             state, iterations = network.step(network.zero_output), 1
         else:
-            state, iterations = find_equilibrium(network, self.reached.state.output, 1.0)
+            state, iterations = find_equilibrium(network, self.reached.state.output, 1.0, SETTLED)
         iterations += self.reached.iterations
         if state is None or state.unstable:
             self.reached = self.reached._replace(iterations=iterations)
