@@ -5,6 +5,7 @@
 - `fingers`: fingers of other walls, docs/examples/fingers.toml; an hour on two cores, then five minutes.
 """
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,21 +25,6 @@ STROKES, SEED = 7, 11
 """Of what is unseen: strokes between those of the samples."""
 
 MEASURES = ("displacement", "von Mises stress away from corners", *FIGURES)
-
-
-def loads() -> Table:
-    """Loads of one finger."""
-    return _judged("loads", 72)
-
-
-def friction() -> Table:
-    """Loads of one finger with friction."""
-    return _judged("friction", 72)
-
-
-def fingers() -> Table:
-    """Fingers of other walls, height and base."""
-    return _judged("fingers", 500)
 
 
 def _judged(name: str, paths: int) -> Table:
@@ -88,3 +74,7 @@ def _compared(emulator: FieldEmulator, true: Snapshots) -> tuple[FloatArray, Flo
 
 def _relative(found: FloatArray, true: FloatArray) -> float:
     return float(np.linalg.norm(found - true) / np.linalg.norm(true))
+
+
+loads, friction = partial(_judged, "loads", 72), partial(_judged, "friction", 72)
+fingers = partial(_judged, "fingers", 500)
