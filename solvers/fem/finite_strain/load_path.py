@@ -25,11 +25,8 @@ BESIDE = 0.05
 further away is of another branch."""
 CARRIED = 40
 """Newton iterations from an equilibrium on coarser elements; the first ones undo stretching of thin walls."""
-PENETRATION, ON_THE_WAY = 1e-5, 1e-3
-"""Largest gap of a node in contact and penetration of any node, mm, under the full load and below it.
-
-On the way without friction that changes forces by some 2e-4, and takes a fifth of the time off; what follows
-a state with friction depends on it."""
+PENETRATION = 1e-5
+"""Largest gap of a node in contact and penetration of any node, mm."""
 SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
 """A finger whose contact is so many times stiffer than itself takes a step first with a contact that is only
 SOFTEST times as stiff, which is hardened by factors of at most HARDER. For a node leaves the contact within
@@ -213,7 +210,6 @@ class LoadPath:
     def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
         """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""
         hardest, final = 0, self.equilibrium.contact
-        rough = guess.fraction < 1 and not self.equilibrium.problem.load.friction
         softer = [] if final is None else [replace(final, stiffness=each) for each in self._softer]
         for contact in (*softer, final):
             self.equilibrium.contact = contact
@@ -227,7 +223,7 @@ class LoadPath:
                 if contact is None:
                     return result.state, hardest
                 guess, off = contact.settled(result.state)
-                if contact is final and off <= (ON_THE_WAY if rough else PENETRATION):
+                if contact is final and off <= PENETRATION:
                     return guess, hardest
         self._reason = "the contact does not settle"
         return None, hardest
