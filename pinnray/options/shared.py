@@ -219,7 +219,7 @@ class SolverOptions:
             exactly. local: likewise, with windows in place of gates. paper: the paper's training, 60,000
             epochs, many hours on a CPU; also takes the paper's uniform mesh of 91,006 nodes and --load point,
             unless --mesh-size or --load is given. trained: as local with fewer windows, but every weight is
-            trained, one to four minutes; no cylinder.
+            trained, one to four minutes by the linear law; no cylinder.
         solver_set: Change a setting of a solver, such as pinn-std.neurons=7; may be repeated.
         device: cpu (default) or cuda, for the solvers that can use either.
         seed: Seed of the random numbers.
