@@ -37,6 +37,8 @@ def with_trained_neurons(
         progress: Told of every step.
     """
     trained = _Training(network, start, windows)
+    if not trained.lowest:  # at rest, where no neuron counts
+        return network, start
     first = trained.places(network.energy.basis.neurons)
     highest = trained.lowest
 
@@ -69,7 +71,10 @@ class _Training:
         self.lowest, _ = self.network.least(self.reached.state)
 
     def settled(self) -> LoadStep:
-        """The equilibrium of the best network, of which the training asked less at finite strain."""
+        """The equilibrium of the best network, of which the training asked less at finite strain.
+
+        Where the whole accuracy is not reached it stays that of the training, `SETTLED`.
+        """
         if self.network.energy.material.law == "linear" or not self.count:
             return self.reached
         state, iterations = find_equilibrium(self.network, self.reached.state.output, 1.0)

@@ -109,6 +109,12 @@ def test_base_and_contact_move_as_prescribed(trained):
     np.testing.assert_allclose(moved[load.prescribed], load.values, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_finger_that_is_not_moved_stays_at_rest(problem):
+    found = TrainedPinnSolver(**STEPS).solve(replace(problem, load=Load(displacement=(0.0, 0.0))))
+    assert found.energy == pytest.approx(0.0, abs=1e-12)
+
+
 def test_the_reaction_is_the_slope_of_the_energy(trained):
     """By Clapeyron's theorem, up to what regularises the factorisation."""
     work = 0.5 * trained.reaction[1] * trained.problem.load.displacement[1]
