@@ -67,7 +67,7 @@ class DiscreteEquilibrium:
         constraints: DisplacementConstraints | None = None,
         linear_solver: LinearSolver = "auto",
     ) -> None:
-        """Compile the forms, and factorise at rest; without constraints they are the load's."""
+        """Compile the forms; what needs factors first makes them. Constraints are the load's by default."""
         self.problem, self.linear = problem, problem.material.law == "linear"
         self.iterative = linear_solver == "iterative"
         if linear_solver == "auto" and self.linear:
@@ -87,7 +87,7 @@ class DiscreteEquilibrium:
         self._inside_out = ufl.conditional(ufl.gt(deformation_jacobian(gradient), 0), 0.0, 1.0) * measure
         self._force, self.tangent = self.distributed.derivatives(self._integrand)
         self.factors = self.factorised(self.clamped)
-        self.elimination = self._elimination()
+        self._eliminated: ConstrainedElimination | None = None
 
     @cached_property
     def _energy(self) -> Any:
@@ -121,7 +121,7 @@ class DiscreteEquilibrium:
             self.clamped, self.factors = clamped, self.factorised(clamped)
         elif np.array_equal(functionals, self.constraints.functionals):
             return
-        self.elimination = self._elimination()
+        self._eliminated = None
 
     def vary(self, problem: Problem) -> None:
         """Take a problem that is a little different, on the same plane elements; keeps the factors.
@@ -176,11 +176,15 @@ class DiscreteEquilibrium:
         if shift:
             self.matrix.shift(shift)
         self.factors.update(state.nodal)
-        self.elimination = self._elimination()
+        self._eliminated = None
 
-    def _elimination(self) -> ConstrainedElimination:
-        rows, slacks = self.constraints.functionals, self.constraints.slacks
-        return ConstrainedElimination(rows, self.factors.solve_all(rows), slacks)
+    @property
+    def elimination(self) -> ConstrainedElimination:
+        """The constraints' forces and the nodes' displacements by the factors at hand."""
+        if self._eliminated is None:
+            rows, slacks = self.constraints.functionals, self.constraints.slacks
+            self._eliminated = ConstrainedElimination(rows, self.factors.solve_all(rows), slacks)
+        return self._eliminated
 
     def response(self, force: FloatArray) -> FloatArray:
         """Displacements, mm, under nodal forces, N/mm, by the factorised tangent: both (N, d)."""

@@ -94,11 +94,17 @@ class Factorisation(StiffnessSolver):
             factors.destroy()
         preconditioner.destroy()  # the name only: petsc4py would keep it, and the factors, for ever
         self._ksp.setErrorIfNotConverged(True)
-        self.update()
+        self._factorised = False  # At first use: an equilibrium that is carried here has no need of the rest
+
+    def _ready(self) -> None:
+        """Factorise the matrix that was given, unless it is done."""
+        if not self._factorised:
+            self.update()
 
     def update(self, nodal: FloatArray | None = None) -> None:
         """Factorise again after the matrix has got new values in its old places; needs no displacements."""
         self._ksp.setOperators(self.matrix)
+        self._factorised = True
         try:
             self._ksp.setUp()
         except PETSc.Error as error:
@@ -110,6 +116,7 @@ class Factorisation(StiffnessSolver):
     @property
     def negative(self) -> int:
         """Number of negative eigenvalues: of the negative pivots, by Sylvester's law of inertia."""
+        self._ready()
         preconditioner = self._ksp.getPC()
         factors = preconditioner.getFactorMatrix()
         found = int(factors.getMumpsInfog(12))
@@ -119,6 +126,7 @@ class Factorisation(StiffnessSolver):
 
     def solve(self, nodal: FloatArray) -> FloatArray:
         """See `StiffnessSolver`; a `UserError` says that rounding has spoilt the solution."""
+        self._ready()
         values = super().solve(nodal)
         self._check(nodal, values)
         return values
@@ -145,6 +153,7 @@ class Factorisation(StiffnessSolver):
         """Solve for several right-hand sides at once; see `solve`."""
         if self._space.comm.size > 1 or not len(nodal):
             return super().solve_all(nodal)
+        self._ready()
         right = PETSc.Mat().createDense((nodal[0].size, len(nodal)), comm=self._space.comm)
         right.setUp()
         held = self.matrix.createVecRight()

@@ -12,8 +12,8 @@ from solvers.cylinder_contact import ContactRegion
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.problem import Problem
 
-COARSE, FINE = 1.0, 4000
-"""Size of the coarse elements, mm, and number of triangles from which on they are worth while."""
+COARSE, ACROSS, FINE = 1.0, 2, 4000
+"""Size of the coarse elements, mm, least number through a wall, and triangles from which on they are worth it."""
 
 
 def coarser(problem: Problem) -> Problem | None:
@@ -30,8 +30,8 @@ def coarser(problem: Problem) -> Problem | None:
         return None
     settings = MeshSettings(size=COARSE)
     try:
-        mesh = finger_mesh(problem.finger, settings=settings)
-    except UserError:  # a wall is too thin for three elements of such a mesh
+        mesh = finger_mesh(problem.finger, settings=settings, across=ACROSS)
+    except UserError:  # a wall is too thin for that
         mesh = finger_mesh(problem.finger, settings=settings, across=1)
     same_body = np.isclose(mesh.areas.sum(), problem.mesh.areas.sum(), rtol=1e-2)
     fewer = 2 * len(mesh.triangles) < len(problem.mesh.triangles)

@@ -36,7 +36,7 @@ class PinnStdSolver(FiniteBasisSolver):
     """
 
     wall_spacing: float = 0.9
-    corner_spacing: float = 0.022
+    corner_spacing: float = 0.018
     growth: float = 0.6
     gate_width: float = 0.8
     steepness: float = 0.5

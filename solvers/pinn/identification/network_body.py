@@ -33,7 +33,7 @@ from solvers.pinn.finite_basis.sparse_cholesky import Factors
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
 
-TOLERANCE = 1e-4
+TOLERANCE = 1e-2
 """Relative error of a solve in the energy norm, and so of a Newton step."""
 MOST_ITERATIONS = 8
 """Iterations of conjugate gradients that cost less than factors of the tangent at hand."""

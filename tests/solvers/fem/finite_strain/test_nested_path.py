@@ -9,7 +9,7 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain import solver
-from solvers.fem.finite_strain.nested_path import coarser
+from solvers.fem.finite_strain.nested_path import ACROSS, coarser
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
 
@@ -82,5 +82,5 @@ def test_a_mesh_that_is_coarse_or_of_another_body_has_no_coarser_one():
     assert coarser(FINE) is not None
     assert coarser(replace(FINE, finger=None)) is None
     assert coarser(replace(FINE, finger=FINGER.replaced(front_thickness=3.0))) is None
-    coarse = finger_mesh(FINGER, settings=MeshSettings(size=0.8))
+    coarse = finger_mesh(FINGER, settings=MeshSettings(size=0.8), across=ACROSS)
     assert coarser(replace(FINE, mesh=coarse)) is None
