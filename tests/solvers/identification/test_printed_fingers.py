@@ -6,6 +6,8 @@ import pytest
 from benchmarks.validation.fingers import Experiment, distance
 from benchmarks.validation.printed_finger import FINGERS, FRICTION
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 
 @pytest.mark.slow
 @pytest.mark.parametrize("finger", FINGERS, ids=["A", "B"])

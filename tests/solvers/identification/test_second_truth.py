@@ -7,6 +7,8 @@ import pytest
 import pinnray as pr
 from solvers.problem import Load
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 DATA = Path(__file__).parents[2] / "data" / "second-renderer"
 FORCE = 0.2535
 
