@@ -137,7 +137,9 @@ def run_folder(tmp_path_factory) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted((DOCS / "examples").glob("*.py")), ids=id_of)
-def test_examples_run_and_find_their_number(path, capsys):
+def test_examples_run_and_find_their_number(path, capsys, request):
+    if path.stem == "rib_sweep":  # three fingers under a cylinder
+        request.getfixturevalue("few_elements")
     runpy.run_path(str(path), run_name="__main__")
     assert capsys.readouterr().out
 
@@ -149,7 +151,9 @@ def test_examples_pin_a_number(path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("block", TO_RUN, ids=id_of)
-def test_python_in_the_docs_runs(block, tmp_path, monkeypatch, without_pictures):
+def test_python_in_the_docs_runs(block, tmp_path, monkeypatch, without_pictures, request):
+    if block.page.name == "gallery.md":  # of which no number is kept
+        request.getfixturevalue("few_elements")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(JOBS, "", JobDefaults(solvers="fem,gp"))  # all have a test of the benchmark `default`
     padded = "\n" * block.line + block.text  # so that a traceback names the page's own line
@@ -525,7 +529,7 @@ def test_the_docs_have_every_file_of_a_grid_search(tmp_path, in_line):
 
 
 @pytest.mark.slow
-def test_the_docs_have_every_file_of_a_cross_validation(tmp_path, in_line):
+def test_the_docs_have_every_file_of_a_cross_validation(tmp_path, in_line, few_elements):
     from pinnray.cli import main
 
     study = "--solvers fem,fem-asm --schemes one-out --seeds 1 --mesh-size 1"
