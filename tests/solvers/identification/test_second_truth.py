@@ -7,8 +7,6 @@ import pytest
 import pinnray as pr
 from solvers.problem import Load
 
-pytestmark = pytest.mark.usefixtures("few_elements")
-
 DATA = Path(__file__).parents[2] / "data" / "second-renderer"
 FORCE = 0.2535
 
@@ -21,6 +19,7 @@ def identified(measurements):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_elements")
 def test_one_wrong_marker_makes_no_wrong_law_certain():
     """Laws were compared by fits that had not converged: the wrong one had all of the probability, +20 %."""
     found = identified("one-marker-off.csv")
