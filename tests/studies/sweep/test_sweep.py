@@ -167,7 +167,7 @@ def test_the_page_has_pictures_and_every_quantity(swept: Path) -> None:
     assert "compliance_across" in page
 
 
-def test_a_second_start_goes_on_and_does_nothing_twice(swept: Path, tmp_path: Path) -> None:
+def test_a_second_start_goes_on_and_does_nothing_twice(swept, tmp_path, in_line):
     out = tmp_path / "out"
     shutil.copytree(swept / "out", out)
     before = load_sweep(out).measurements
