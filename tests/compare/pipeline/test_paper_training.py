@@ -21,7 +21,6 @@ from compare.pipeline.pipeline import run
 from compare.runtime.exits import NOT_CONVERGED
 from compare.runtime.stages import Stages
 from geometry.errors import UserError
-from geometry.mesh.settings import MeshSettings
 from solvers.problem import Load
 from solvers.registry import make_solver
 from solvers.solver import Progress
@@ -31,7 +30,6 @@ from tests.pinnray.commands.programs import WITHOUT_PICTURES
 pytestmark = pytest.mark.usefixtures("few_elements")
 
 ROOT = Path(__file__).parents[3]
-COARSE = MeshSettings(size=1.0)
 TINY = {"preset": "paper", "width": 4, "layers": 1, "base_points": 5, "checkpoint_every": 5, "threads": 1}
 
 

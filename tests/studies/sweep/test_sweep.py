@@ -203,12 +203,12 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
 def test_a_hanging_worker_is_ended_after_the_time_limit(tmp_path, monkeypatch, request):
     monkeypatch.setattr("studies.sweep.workers._measured", hang_at_one)
     monkeypatch.setattr("studies.sweep.workers.GRACE_S", 1.0)
-    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": 4.0})
+    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": 3.0})
     sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", "not converged", "done"]
     monkeypatch.setattr("studies.sweep.workers._measured", answered)
     request.getfixturevalue("in_line")
-    longer = study.model_copy(update={"time_limit": 5.0})
+    longer = study.model_copy(update={"time_limit": 4.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
 
