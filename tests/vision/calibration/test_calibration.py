@@ -297,6 +297,11 @@ def test_another_board_is_named_only_if_most_photographs_show_it(parts, hint):
         calibrate_camera(images.items(), Unseen(9, 6, 25.0))
 
 
+def test_photographs_without_a_board_are_refused():
+    with pytest.raises(UserError, match="0 of 2 photographs show the board of 9x6 inner corners; count them"):
+        calibrate_camera(dict.fromkeys("ab", np.zeros((100, 150), np.uint8)).items(), BOARD)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Six small photographs by a pinhole with a focal length of 300 pixels, and one without a board."""
