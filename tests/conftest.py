@@ -66,8 +66,20 @@ def plugin_folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def coarse_mesh() -> TriangleMesh:
-    """The default finger with elements of 1 mm."""
+    """The default finger with elements of 1 mm, two across its walls: a third of the usual unknowns."""
+    return finger_mesh(Design(), settings=MeshSettings(size=1.0), across=1)
+
+
+@pytest.fixture(scope="session")
+def usual_mesh() -> TriangleMesh:
+    """The same with the three elements across walls that a user has."""
     return finger_mesh(Design(), settings=MeshSettings(size=1.0))
+
+
+@pytest.fixture
+def few_elements(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Walls get the elements that their size asks for, not three at least: half to a fifth of the nodes."""
+    monkeypatch.setitem(finger_mesh.__kwdefaults__, "across", 1)
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+from pinnray.options.preset_jobs import JOBS, JobDefaults
 from tests.test_docs import DOCS, blocks, names, table
 
 PAGE = DOCS / "designers.md"
@@ -44,23 +45,27 @@ def test_the_example_questions_can_be_read(name: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_elements", "in_line", "without_pictures")
 def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(tmp_path, monkeypatch):
     from pinnray.cli import compare_main, main
 
+    monkeypatch.setattr("studies.optimum.search.ROUNDS", 2)
     monkeypatch.setattr("studies.optimum.proposals.POPULATION", 16)  # a quick search for the front
     monkeypatch.setattr("studies.optimum.proposals.GENERATIONS", 4)
+    monkeypatch.setitem(JOBS, "", JobDefaults(solvers="fem"))
     shutil.copytree(DOCS / "examples", tmp_path / "docs" / "examples")
-    for name, many, few in (("ribs", "samples = 64", "samples = 24"), ("wrap", "runs = 40", "runs = 20")):
+    quick = {"samples = 64": "samples = 20", "runs = 40": "runs = 20", "mesh_size = 1.0": "mesh_size = 2.0"}
+    for name, many in (("ribs", "samples = 64"), ("wrap", "runs = 40")):
         study = tmp_path / "docs" / "examples" / f"{name}.toml"
         text = study.read_text(encoding="utf-8")
         assert many in text
-        study.write_text(text.replace(many, few), encoding="utf-8")
+        for slow, fast in quick.items():
+            text = text.replace(slow, fast)
+        study.write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     for line in blocks(PAGE)[0].text.splitlines():
         program, *arguments = shlex.split(line)
         run = {"pinnray": main, "compare": compare_main}[program]
-        if arguments[0] in ("sweep", "optimise"):
-            arguments += ["--processes", "1"]  # each imports for seconds
         assert run(arguments) == 0, line
     written = {path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*")}
     assert {f"ribs/{name}" for name in files("file of a sweep")} <= written

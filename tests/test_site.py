@@ -9,6 +9,8 @@ import pytest
 
 from tests.test_docs import ALL_BLOCKS, DOCS, blocks, id_of
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 CELL = "{code-cell} python"
 NOTEBOOKS = sorted({block.page for block in ALL_BLOCKS if block.language == CELL})
 

@@ -10,7 +10,17 @@ import pytest
 from benchmarks.results.default_time import StageTime
 
 ROOT = Path(__file__).parents[2]
-RUN = ["compare", "--quiet", "--solvers", "fem,pinn-std", "--mesh-size", "2", "--out"]
+RUN = [
+    "compare",
+    "--quiet",
+    "--solvers",
+    "fem,pinn-std",
+    "--mesh-size",
+    "2",
+    "--solver-set",
+    "pinn-std.preset=fast",
+    "--out",
+]
 
 
 @pytest.mark.slow

@@ -132,6 +132,8 @@ def test_a_command_that_is_killed_goes_on_to_the_same_numbers(tmp_path: Path) ->
     code = (
         "from pathlib import Path\n"
         "import sys\n"
+        "from compare.pipeline import pipeline\n"
+        "pipeline.draw_all = lambda *_: []\n"  # most of the time of a small run
         "from benchmarks.reliability.faults import copied, filled, trial, undisturbed\n"
         "from benchmarks.reliability.jobs import JOBS\n"
         "from benchmarks.reliability.supervision import Fault\n"

@@ -274,8 +274,8 @@ def test_the_repr_of_a_design_makes_it_again():
 # --- studies ---
 
 
-def test_a_dictionary_is_swept(tmp_path: Path):
-    found = pr.sweep({"front_thickness": [1.2, 1.8]}, young=5, processes=1, **COARSE)
+def test_a_dictionary_is_swept(in_line: None):
+    found = pr.sweep({"front_thickness": [1.2, 1.8]}, young=5, **COARSE)
     assert found["front_thickness_mm"].tolist() == [1.2, 1.8]
     assert found["force_N"].is_monotonic_increasing
     assert set(found["state"]) == {"done"}  # though the usual markers do not fit into 1.2 mm
@@ -283,9 +283,9 @@ def test_a_dictionary_is_swept(tmp_path: Path):
     assert found["force_N"][1] == pytest.approx(once.force, rel=1e-9)
 
 
-def test_ranges_are_sampled_and_a_design_may_be_an_object():
+def test_ranges_are_sampled_and_a_design_may_be_an_object(in_line: None):
     ends = {"E": {"from": 3.0, "to": 5.0}}
-    found = pr.sweep(ends, design=pr.Design(rib_count=3), samples=2, processes=1, **COARSE)
+    found = pr.sweep(ends, design=pr.Design(rib_count=3), samples=2, **COARSE)
     assert found["young_MPa"].between(3, 5).all()
     assert (found["force_N"] / found["young_MPa"]).std() < 1e-9
 

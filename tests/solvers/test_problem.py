@@ -22,9 +22,10 @@ def test_the_mean_is_weighted_by_a_raised_cosine(coarse_mesh):
     assert weights @ offset**2 == pytest.approx(width**2 * (1 / 12 - 1 / (2 * np.pi**2)), rel=1e-4)
 
 
-def test_the_point_load_is_the_contacts_middle_node(coarse_mesh):
-    points, weights = contact_functional(Problem(coarse_mesh, load=Load(kind="point")))
-    np.testing.assert_allclose(points, [[35.0, 0.0]], atol=1e-12)
+@pytest.mark.parametrize(("position", "found"), [(None, 35.0), (41.23, 41.23)])  # a node, and between two
+def test_the_point_load_is_at_the_contacts_middle_or_its_position(coarse_mesh, position, found):
+    points, weights = contact_functional(Problem(coarse_mesh, load=Load(kind="point", position=position)))
+    np.testing.assert_allclose(points, [[found, 0.0]], atol=1e-12)
     assert weights.tolist() == [1.0]
 
 
@@ -66,12 +67,6 @@ def test_where_the_mesh_has_its_contact_the_position_changes_nothing(coarse_mesh
         given = contact_functional(Problem(coarse_mesh, load=Load(kind=kind, position=35.0)))
         for ours, theirs in zip(own, given, strict=True):
             np.testing.assert_allclose(ours, theirs, atol=1e-12)
-
-
-def test_a_point_load_between_two_nodes_is_at_its_position(coarse_mesh):
-    points, weights = contact_functional(Problem(coarse_mesh, load=Load(kind="point", position=41.23)))
-    np.testing.assert_allclose(points, [[41.23, 0.0]], atol=1e-12)
-    assert weights.tolist() == [1.0]
 
 
 def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):

@@ -13,7 +13,7 @@ from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.problem import Problem
 
 COARSE, ACROSS, FINE = 1.0, 2, 4000
-"""Size of the coarse elements, mm, least number through a wall, and triangles from which on they are worth it."""
+"""Size of coarse elements, mm; their least number through a wall; triangles from which on they are used."""
 
 
 def coarser(problem: Problem) -> Problem | None:

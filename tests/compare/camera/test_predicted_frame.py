@@ -19,6 +19,8 @@ from solvers.problem import Problem
 from tests.solvers.conftest import observed_at
 from vision.frames.sources import open_frames
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 FILM = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 0 --tilt 8 --turn 15 --seed 1"
 
 

@@ -13,6 +13,11 @@ NOISE = 0.005
 """Standard deviation of the markers' displacements, mm."""
 
 
+@pytest.fixture(autouse=True)
+def quick(few_elements: None) -> None:
+    """Meshes of few elements: what is tested is not how accurate they are."""
+
+
 @pytest.fixture(scope="package")
 def truth(coarse_mesh: TriangleMesh) -> Solution:
     """Stands for a richer model: the same finger, pressed by something that sticks."""

@@ -30,7 +30,7 @@ from vision.measurements import write_measurements
 
 
 def run(line: str, out: Path) -> int:
-    return main([*shlex.split(f"crossval {line} --mesh-size 1"), "--out", str(out)])
+    return main([*shlex.split(f"crossval {line} --mesh-size 2"), "--out", str(out)])
 
 
 def layouts_of(out: Path, truth: str = "sliding") -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """The simulated truths: walls, laws and loads, and fields at points that move with the walls."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from geometry.finger.design import Design
 from geometry.finger.section import rib_axes
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Load, Material, Problem
 from tests.fingers import beam
 
@@ -24,7 +22,7 @@ FULL = LoadCase("full", Load(), 1.0, 35.0)
 
 
 @pytest.fixture
-def study(tmp_path: Path, coarse_mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> CrossvalStudy:
+def study(tmp_path, coarse_mesh, monkeypatch) -> CrossvalStudy:
     monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
     study = CrossvalStudy(design=Design(), variants=[], out=tmp_path, mesh=MeshSettings(size=1.0))
     coarse_mesh.save(study.mesh_file)
@@ -128,6 +126,7 @@ def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_me
     assert fixed["von_mises"] > 2 * moved["von_mises"]  # 0.14 and 0.036, which is the coarse mesh's error
 
 
+@pytest.mark.usefixtures("few_elements")
 def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkeypatch):
     truth = TRUTHS["cylinder"]
     found = true_field(study, truth)
@@ -145,6 +144,7 @@ def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkey
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_elements")
 @pytest.mark.parametrize("name", [name for name in TRUTHS if name != "3d"])  # see test_virtual_experiment
 def test_every_truth_comes_to_its_full_load(study, name):
     found = true_field(replace(study, mesh=MeshSettings(size=2.0)), TRUTHS[name])

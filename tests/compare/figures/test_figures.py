@@ -89,6 +89,7 @@ def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawing
     said: list[float] = []
     pictures = draw_all(tmp_path, comparison, lambda done, _: said.append(done))
     assert [picture.path.stem for picture in pictures] == list(ALL) == list(drawings)
+    assert sorted(tmp_path.iterdir()) == sorted(picture.path for picture in pictures)
     assert [picture.caption for picture in pictures] == [each.caption for each in drawings.values()]
     assert said == sorted(said)
     assert (said[0], said[-1], len(said)) == (0.0, 1.0, len(GALLERY) + 1)
@@ -344,16 +345,9 @@ def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, c
 def test_all_pictures_are_pages_of_one_file_with_their_captions(comparison, tmp_path, monkeypatch):
     chosen = {name: GALLERY[name] for name in ("marker_errors", "mesh")}
     monkeypatch.setattr("compare.figures.gallery.GALLERY", chosen)
-    draw_all(tmp_path / "first", comparison, formats=["pdf"])
-    draw_all(tmp_path / "second", comparison, formats=["pdf"])
-    content = (tmp_path / "first" / "all.pdf").read_bytes()
-    assert content == (tmp_path / "second" / "all.pdf").read_bytes()
-    sizes = [
-        [float(number) / 72 for number in found.split()]
-        for found in re.findall(rb"/MediaBox \[([^\]]*)\]", content)
-    ]
+    draw_all(tmp_path, comparison, formats=["pdf"])
+    boxes = re.findall(rb"/MediaBox \[([^\]]*)\]", (tmp_path / "all.pdf").read_bytes())
+    sizes = [[float(number) / 72 for number in box.split()] for box in boxes]
     assert [size[2] for size in sizes] == pytest.approx([WIDTH] * 2)
     for name, size in zip(chosen, sizes, strict=True):
         assert size[3] > draw(comparison, name).figure.get_figheight() + 0.3  # its caption
-    draw_all(tmp_path / "third", comparison)
-    assert not (tmp_path / "third" / "all.pdf").exists()

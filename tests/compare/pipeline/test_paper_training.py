@@ -21,15 +21,15 @@ from compare.pipeline.pipeline import run
 from compare.runtime.exits import NOT_CONVERGED
 from compare.runtime.stages import Stages
 from geometry.errors import UserError
-from geometry.mesh.settings import MeshSettings
 from solvers.problem import Load
 from solvers.registry import make_solver
 from solvers.solver import Progress
 from tests.compare.pipeline.runs import compare
 from tests.pinnray.commands.programs import WITHOUT_PICTURES
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 ROOT = Path(__file__).parents[3]
-COARSE = MeshSettings(size=1.0)
 TINY = {"preset": "paper", "width": 4, "layers": 1, "base_points": 5, "checkpoint_every": 5, "threads": 1}
 
 
@@ -103,7 +103,7 @@ def test_a_killed_run_ends_as_if_it_had_not_been(measured, tmp_path):
     change the last bits.
     """
     line = f"compare --solvers pinn-std --mesh-size 1.0 --quiet --measurements {measured}"
-    line += "".join(f" --solver-set pinn-std.{key}={value}" for key, value in {**TINY, "epochs": 200}.items())
+    line += "".join(f" --solver-set pinn-std.{key}={value}" for key, value in {**TINY, "epochs": 60}.items())
 
     def started(*options: str) -> subprocess.Popen[bytes]:
         return subprocess.Popen(

@@ -47,14 +47,28 @@ def written(fem, pinn, followed, truth, compared, tmp_path_factory) -> Path:
     return path
 
 
-@pytest.fixture
-def viewer(browser: Browser, written: Path) -> Iterator[Page]:
-    """The page with its viewer ready and in sight."""
+@pytest.fixture(scope="module")
+def ready(browser: Browser, written: Path) -> Page:
+    """The page with its viewer ready, which takes seconds."""
     page = opened(browser, written).page
     page.locator("#viewer").scroll_into_view_if_needed()
     page.locator("#viewer[data-ready]").wait_for()
-    yield page
-    page.close()
+    return page
+
+
+@pytest.fixture
+def viewer(ready: Page) -> Page:
+    """The page with its viewer in sight, and each of its controls as at the start."""
+    ready.set_viewport_size({"width": 1400, "height": 900})
+    ready.evaluate(
+        "for (const each of document.querySelectorAll('#viewer select')) each.selectedIndex = 0;"
+        "document.getElementById('viewer-marks').checked = true;"
+        "document.getElementById('viewer-load').value = 100;"
+        "document.getElementById('viewer-beside').dispatchEvent(new Event('input'));"
+        "document.getElementById('viewer-all').click();"
+    )
+    ready.locator("#viewer").scroll_into_view_if_needed()
+    return ready
 
 
 def shot(page: Page) -> FloatArray:

@@ -70,6 +70,7 @@ def test_json_prints_the_metrics_and_nothing_else(folder, capsys, without_pictur
     assert output.err == ""
 
 
+@pytest.mark.usefixtures("few_elements")
 def test_markers_that_no_finger_explains_are_said_first(folder, capsys, without_pictures):
     """They were in reverse order: the run had ended with 0, "converged" and no warning."""
     markers = Path(__file__).parents[2] / "data" / "second-renderer" / "reversed.csv"
@@ -355,7 +356,7 @@ def cad_in_cache(tmp_path_factory) -> None:
     ],
 )
 def test_a_full_disk_is_told_in_one_line_and_leaves_no_part_of_a_file(
-    command, said, folder, coarse_mesh, cad_in_cache, full_disk, capsys
+    command, said, folder, usual_mesh, cad_in_cache, full_disk, capsys
 ):
     assert main([*command, "--mesh-size", "1.0"]) == BAD_INPUT
     errors = [line for line in capsys.readouterr().err.splitlines() if not line.startswith(("mesh:", "fem:"))]
@@ -381,7 +382,7 @@ def test_the_design_alone(folder, capsys):
 # Surroundings
 
 
-def test_a_home_that_cannot_be_written_is_not_needed(folder, coarse_mesh, tmp_path_factory):
+def test_a_home_that_cannot_be_written_is_not_needed(folder, tmp_path_factory):
     """Neither for the mesh nor for what DOLFINx compiles and matplotlib remembers."""
     cache = tmp_path_factory.mktemp("cache")
     place = {"HOME": "/proc/absent", "PINNRAY_CACHE": str(cache)}

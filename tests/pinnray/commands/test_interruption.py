@@ -89,7 +89,8 @@ def meshing(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], int, Path]]
     command = started(WHILE_MESHING, str(tmp_path / "cache"), TMPDIR=str(tmp_path))
     until(lambda: workers(command.pid))
     (worker,) = workers(command.pid)
-    time.sleep(2)  # the worker has read its task and calls Gmsh
+    until(lambda: "libgmsh" in Path(f"/proc/{worker}/maps").read_text())
+    time.sleep(0.5)  # the worker has read its task and calls Gmsh
     assert list(tmp_path.iterdir()) != []
     yield command, worker, tmp_path
     for number in filter(runs, (command.pid, worker)):
@@ -111,7 +112,7 @@ def test_a_signal_that_the_shell_has_ignored_stays_ignored(number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", ENDING, ids=lambda number: number.name)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 def test_a_signal_ends_the_worker_too(meshing, number):
     command, worker, folder = meshing
     command.send_signal(number)

@@ -41,11 +41,3 @@ def test_one_and_two_ranks_give_the_same_tables(start_ranks, tmp_path, without_p
         for path in sorted(tmp_path.glob("*/metrics.json"))
     ]
     np.testing.assert_allclose(*energies, rtol=1e-9)
-
-
-def test_bad_input_on_two_ranks_is_one_line(start_ranks):
-    process = start_ranks(2, "-m", "pinnray.cli", "compare", "--young", "-1")
-    output, errors = process.communicate()
-    assert (process.returncode, output) == (2, "")
-    # The launcher has something to say about the exit code, too.
-    assert len([line for line in errors.splitlines() if line.startswith("error: ")]) == 1, errors

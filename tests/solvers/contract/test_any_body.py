@@ -29,6 +29,7 @@ SETTINGS = QUICK | {
     "pinn-std trained": TINY,
     "pinn-asm trained": TINY,
     "gp": {"clamp": True},
+    "fem-id": {"law": "given"},
     "pinn-id": QUICK["pinn-id"] | {"law": "given"},
 }
 

@@ -15,12 +15,17 @@ def problem(coarse_mesh):
 
 
 @pytest.fixture(scope="session")
-def model(problem):
-    return model_of(problem)
+def fine_problem(problem, usual_mesh):
+    return replace(problem, mesh=usual_mesh)
 
 
 @pytest.fixture(scope="session")
-def markers(problem, model):
+def model(fine_problem):
+    return model_of(fine_problem)
+
+
+@pytest.fixture(scope="session")
+def markers(model):
     return marked(model)
 
 

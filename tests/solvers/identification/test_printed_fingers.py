@@ -6,18 +6,18 @@ import pytest
 from benchmarks.validation.fingers import Experiment, distance
 from benchmarks.validation.printed_finger import FINGERS, FRICTION
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 
 @pytest.mark.slow
-@pytest.mark.parametrize("finger", FINGERS, ids=["A", "B"])
-def test_mechanics_predict_a_real_finger_better_than_none(finger):
+def test_mechanics_predict_a_real_finger_better_than_none():
     """Held-out errors of u and v (rms), mm. Nothing is set by hand: every solver finds the picture's turn."""
-    experiment, off = Experiment(finger), {}
+    experiment, off = Experiment(FINGERS[1]), {}  # the harder one: its wall wraps around the cylinder
     for solver in ("gp", "statfem", "fem-id"):  # `pinn-id` takes a minute: benchmarks/validation has it
         found = experiment.left_out(solver)
         assert found.left_out is not None
         off[solver] = np.sqrt(((found.left_out - experiment.seen.displacements) ** 2).mean())
-    if finger.name == "B":  # its wall wraps around the cylinder
-        assert any("COVERS" in said for said in found.status.warnings)
+    assert any("COVERS" in said for said in found.status.warnings)
     assert off["fem-id"] < 0.45
     assert off["fem-id"] < 0.8 * min(off["gp"], off["statfem"])
 

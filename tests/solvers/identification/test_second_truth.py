@@ -19,6 +19,7 @@ def identified(measurements):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_elements")
 def test_one_wrong_marker_makes_no_wrong_law_certain():
     """Laws were compared by fits that had not converged: the wrong one had all of the probability, +20 %."""
     found = identified("one-marker-off.csv")

@@ -215,9 +215,9 @@ def test_no_weights_are_chosen_at_finite_strain(bent):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", [PinnAsmSolver, PinnLocalAsmSolver])
-def test_simulated_markers_are_met_as_by_finite_elements(coarse_mesh, solver):
+def test_simulated_markers_are_met_as_by_finite_elements(usual_mesh, solver):
     """The default settings, where the model cannot follow: 0.06 % or 0.07 % and 0.007 mm are usual."""
-    plain = Problem(coarse_mesh)
+    plain = Problem(usual_mesh)
     problem = replace(plain, observations=virtual_experiment(plain, 0.8)[0])
     found, exact = solver().solve(problem), FemAsmSolver().solve(problem)
     assert found.status.converged, found.status.message

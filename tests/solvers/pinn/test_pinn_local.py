@@ -344,8 +344,8 @@ def test_where_newton_fails_the_energy_is_followed_down_to_the_same(monkeypatch)
     assert "stopped at 0.0% of the load" in solution.status.message
 
 
-def test_too_few_windows_are_reported_as_not_converged(coarse_mesh):
-    solution = PinnLocalSolver(wall_spacing=1.2, corner_spacing=0.5, neurons=2).solve(Problem(coarse_mesh))
+def test_too_few_windows_are_reported_as_not_converged(usual_mesh):
+    solution = PinnLocalSolver(wall_spacing=1.2, corner_spacing=0.5, neurons=2).solve(Problem(usual_mesh))
     assert not solution.status.converged
     assert "take a smaller spacing" in solution.status.message
 

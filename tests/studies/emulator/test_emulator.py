@@ -51,7 +51,7 @@ def unseen(emulator: Emulator) -> tuple[list[dict[str, Value]], dict[str, np.nda
     return fingers, {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 
-def small_study(count: int = 100, **changes: Any) -> Study:
+def small_study(count: int = 50, **changes: Any) -> Study:
     return Study(
         name="small",
         samples=count,

@@ -147,8 +147,8 @@ def test_a_run_without_a_solution_says_why(wanted, monkeypatch, error, state):
 
 
 @pytest.mark.slow
-def test_a_whole_search(tmp_path, capsys, monkeypatch):
-    """In a process of its own; again, nothing is left to do, and a wider grid trains what is new."""
+def test_a_whole_search(tmp_path, capsys, monkeypatch, request):
+    """In its own process, then here: nothing is left to do again, and a wider grid trains what is new."""
     monkeypatch.chdir(tmp_path)
     tiny = " ".join(f"--solver-set pinn-std.{key}={value}" for key, value in TINY.items() if key != "epochs")
     line = f"gridsearch --learning-rates 1e-3,1e-2 --epochs 2 --mesh-size 1 --processes 1 {tiny}"
@@ -163,6 +163,7 @@ def test_a_whole_search(tmp_path, capsys, monkeypatch):
     for run in told["runs"]:
         assert run["status"] == TRAINED
         assert run["measured"]["rel_l2_displacement"] > 0.1  # after two epochs
+    request.getfixturevalue("in_line")
     assert main([*line.split(), "--bc-weights", "10"]) == 0
     assert capsys.readouterr().out == output.out
     histories = {path: path.read_text() for path in out.rglob("history.csv")}

@@ -13,6 +13,8 @@ from studies.optimum.search import search_front
 from studies.sweep.job import StudyJob
 from studies.sweep.measurement import measured
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 VARIED = {
     "rib_thickness": {"from": 1.0, "to": 2.5},
     "front_thickness": {"from": 1.0, "to": 2.5},
@@ -41,7 +43,7 @@ def job(asked: Question) -> StudyJob[Question]:
 
 
 def test_a_step_is_better_in_every_objective_by_what_the_derivatives_say():
-    asked = job(question(objectives={"von_mises": "least", "force": "largest"}))
+    asked = job(question(mesh_size=1.0, objectives={"von_mises": "least", "force": "largest"}))
     before = measured(asked.task(0, FINGER))
     moved = stepped(asked, FINGER, before)
     assert moved is not None
@@ -76,7 +78,7 @@ def test_no_step_leads_on_from_a_corner_of_the_ranges():
 
 
 @pytest.mark.slow
-def test_a_search_ends_with_the_steps_and_says_what_they_gained(tmp_path, monkeypatch):
+def test_a_search_ends_with_the_steps_and_says_what_they_gained(tmp_path, monkeypatch, in_line):
     asked = question(runs=20, steps=2)
     monkeypatch.setattr("studies.optimum.proposals.POPULATION", 16)
     monkeypatch.setattr("studies.optimum.proposals.GENERATIONS", 4)

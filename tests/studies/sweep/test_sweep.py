@@ -167,7 +167,7 @@ def test_the_page_has_pictures_and_every_quantity(swept: Path) -> None:
     assert "compliance_across" in page
 
 
-def test_a_second_start_goes_on_and_does_nothing_twice(swept: Path, tmp_path: Path) -> None:
+def test_a_second_start_goes_on_and_does_nothing_twice(swept, tmp_path, in_line):
     out = tmp_path / "out"
     shutil.copytree(swept / "out", out)
     before = load_sweep(out).measurements
@@ -200,14 +200,15 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
     assert failure_grid(sweep).rows == [("not converged", "1", "stopped at the time limit", "0")]
 
 
-def test_a_hanging_worker_is_ended_after_the_time_limit(tmp_path, monkeypatch):
+def test_a_hanging_worker_is_ended_after_the_time_limit(tmp_path, monkeypatch, request):
     monkeypatch.setattr("studies.sweep.workers._measured", hang_at_one)
     monkeypatch.setattr("studies.sweep.workers.GRACE_S", 1.0)
-    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": 4.0})
+    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": 3.0})
     sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", "not converged", "done"]
     monkeypatch.setattr("studies.sweep.workers._measured", answered)
-    longer = study.model_copy(update={"time_limit": 5.0})
+    request.getfixturevalue("in_line")
+    longer = study.model_copy(update={"time_limit": 4.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
 
@@ -235,7 +236,7 @@ def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
     assert "holds a sweep with other settings (study.mesh_size)" in capsys.readouterr().err
 
 
-def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(tmp_path, monkeypatch):
+def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(tmp_path, monkeypatch, request):
     monkeypatch.setattr("studies.sweep.workers._measured", die_at_one)
     monkeypatch.setattr("studies.sweep.workers.DEATHS", 2)
     study = load_study(study_file(tmp_path, 4))
@@ -245,6 +246,7 @@ def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(tmp_path, mon
     assert failure_grid(sweep).rows == [("failed", "1", "its worker process died", "1")]
     assert list(sample_table(sweep)["state"]) == ["done", "failed", "done", "done"]
     monkeypatch.setattr("studies.sweep.workers._measured", answered)
+    request.getfixturevalue("in_line")
     again = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
 

@@ -14,7 +14,7 @@ from vision.calibration.dot_grid import DotGrid
 from vision.frames.frame import GreyImage
 from vision.rig.boards import board_scene
 
-SIZE, FOCAL, SAMPLES = (640, 480), 700.0, 3
+SIZE, FOCAL, SAMPLES = (640, 480), 700.0, 2
 CIRCLES, SHIFTED = DotGrid(7, 6, 10.0), DotGrid(4, 11, 7.5, asymmetric=True)
 TILTS = [(30, 10, 20), (-20, 35, 100), (10, -40, 185)]
 pytestmark = pytest.mark.filterwarnings("ignore:the boards cover")

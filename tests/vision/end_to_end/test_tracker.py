@@ -51,6 +51,7 @@ def test_a_tilted_camera_measures_a_jump_of_10_mm_to_hundredths_of_a_millimetre(
     assert not observations.simulated
     assert observations.marker_radius == DESIGN.marker_radius
     assert (tracking.rest.initial, tracking.rest.final) == (range(3), range(3, 6))
+    assert not any("not at rest" in line for line in tracking.warnings)
 
 
 @pytest.mark.parametrize(
@@ -129,12 +130,10 @@ def shifted(image, x, y):
     return np.roll(image, (y, x), axis=(0, 1))
 
 
-@pytest.mark.parametrize("camera", [CAMERA, None])
-def test_a_camera_that_moves_between_start_and_end_is_undone_by_the_fiducials(
-    camera, tracking, without_camera
-):
-    still = (tracking if camera else without_camera).observations("rig")
-    moved = tracked([*images()[:3], *(shifted(image, 3, 2) for image in images()[3:])], camera=camera)
+def test_a_camera_that_moves_between_start_and_end_is_undone_by_the_fiducials(without_camera):
+    """With a calibrated camera, see `test_shake`."""
+    still = without_camera.observations("rig")
+    moved = tracked([*images()[:3], *(shifted(image, 3, 2) for image in images()[3:])], camera=None)
     observations = moved.observations("rig")
     np.testing.assert_allclose(observations.displacements, still.displacements, rtol=0, atol=0.01)  # of 0.38
     assert any("moved by 3.6" in warning and "they undo" in warning for warning in moved.warnings)
@@ -157,9 +156,8 @@ def test_a_patch_a_little_lighter_than_the_wall_is_no_marker():
     assert error_of(observations) < 0.015
 
 
-@pytest.mark.parametrize("turns", [1, 2])
-def test_a_camera_may_be_turned_if_the_fiducials_are_seen(turns):
-    tracking = tracked([np.rot90(image, turns) for image in images()], camera=None)
+def test_a_camera_may_be_turned_if_the_fiducials_are_seen():
+    tracking = tracked([np.rot90(image) for image in images()], camera=None)
     assert error_of(tracking.observations("rig")) < 0.2  # the lens is not undone
     assert any("no camera" in warning for warning in tracking.warnings)
 
@@ -237,7 +235,7 @@ def without_fiducials(turns=0, design=DESIGN):
     return [np.rot90(painted_over(image, fiducials()), turns) for image in images(design=design)]
 
 
-@pytest.mark.parametrize(("layout", "turns"), [("joints", 0), ("joints", 3), ("front", 1), ("front", 2)])
+@pytest.mark.parametrize(("layout", "turns"), [("joints", 3), ("front", 1), ("front", 2)])
 def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_up(layout, turns):
     """Markers at the joints show the way up themselves; a row looks the same from both ends."""
     design = Design(marker_layout=layout)

@@ -69,7 +69,8 @@ def test_the_truth_goes_from_rest_to_the_whole_displacement(bench):
     np.testing.assert_allclose(truths[0].discs, bench.mesh.markers, atol=1e-12)
 
 
-def test_the_middle_of_a_disc_that_bends_is_the_mean_over_the_disc(bench):
+def test_the_middle_of_a_disc_that_bends_is_the_mean_over_the_disc(usual_mesh):
+    bench = Bench(usual_mesh, Design(), WORKSPACE)
     x, slope = bench.mesh.points[:, 0], 0.002
     recording = film(bench, displacement=np.column_stack([0 * x, slope * x**2]))
     _, truth = recording.frame(5)

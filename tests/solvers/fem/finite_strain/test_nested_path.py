@@ -6,22 +6,24 @@ import numpy as np
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain import solver
 from solvers.fem.finite_strain.nested_path import ACROSS, coarser
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
+from tests.solvers.conftest import SHORT
 
-FINGER = Design()
 FINE = Problem(
-    finger_mesh(FINGER, settings=MeshSettings(size=0.35)), Material(law="neo-hookean"), finger=FINGER
+    finger_mesh(SHORT, settings=MeshSettings(size=0.35)),
+    Material(law="neo-hookean"),
+    Load(displacement=(0.0, -5.0)),
+    finger=SHORT,
 )
 SOLVER = FemNonlinearSolver(first_step=0.2)
 LOADS = {
-    "mean": Load(),
-    "patch": Load(kind="patch", displacement=(None, -6.0)),
-    "cylinder": Load(kind="cylinder", radius=5.0, displacement=(0.0, -4.0)),
+    "mean": FINE.load,
+    "patch": Load(kind="patch", displacement=(None, -3.0)),
+    "cylinder": Load(kind="cylinder", radius=5.0, displacement=(0.0, -2.0)),
 }
 
 
@@ -81,6 +83,6 @@ def test_friction_is_followed_on_the_given_elements():
 def test_a_mesh_that_is_coarse_or_of_another_body_has_no_coarser_one():
     assert coarser(FINE) is not None
     assert coarser(replace(FINE, finger=None)) is None
-    assert coarser(replace(FINE, finger=FINGER.replaced(front_thickness=3.0))) is None
-    coarse = finger_mesh(FINGER, settings=MeshSettings(size=0.8), across=ACROSS)
+    assert coarser(replace(FINE, finger=SHORT.replaced(front_thickness=3.0))) is None
+    coarse = finger_mesh(SHORT, settings=MeshSettings(size=0.8), across=ACROSS)
     assert coarser(replace(FINE, mesh=coarse)) is None
