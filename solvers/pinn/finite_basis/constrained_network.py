@@ -14,6 +14,7 @@ from solvers.constrained_elimination import ConstrainedElimination
 from solvers.pinn.finite_basis.energy import REGULARISATION, NetworkEnergy
 from solvers.pinn.finite_basis.load_conditions import load_conditions
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
+from solvers.pinn.finite_basis.sparse_cholesky import Factors
 from solvers.problem import Problem
 
 INVERSE_ITERATIONS = 3
@@ -172,6 +173,18 @@ class ConstrainedNetwork:
         response = self.linear_response(output, shift)
         return None if response is None else self.constrained_step(output, response, fraction)
 
+    def step_from(self, gradient: torch.Tensor) -> NewtonIterate:
+        """One Newton step to equilibrium from a displacement that need not be one of the network's.
+
+        It minimises the energy's second-order expansion there; for a linear law that is the energy.
+
+        Args:
+            gradient: Of the displacement at the quadrature points, shape (q, 2, 2).
+        """
+        force, hessian = self.energy.expanded(gradient)
+        factors = hessian.factorised(REGULARISATION, definite=self.energy.material.law == "linear")
+        return self.constrained_step(self.zero_output, self._responses(force, factors))
+
     def linear_response(self, output: torch.Tensor, shift: float = REGULARISATION) -> LinearResponse | None:
         """One factorisation, and one solve for every spring; None as in `step`."""
         if self.energy.quadratic and shift == REGULARISATION and not output.any():
@@ -181,6 +194,9 @@ class ConstrainedNetwork:
             if not torch.isfinite(gradient).all():
                 return None
             factors = hessian.factorised(shift, definite=self.energy.material.law == "linear")
+        return self._responses(gradient, factors)
+
+    def _responses(self, gradient: torch.Tensor, factors: Factors) -> LinearResponse:
         residual = gradient.numpy().ravel()
         free, *responses = factors.solve(np.concatenate([-residual[None], self.functionals]))
         unit = np.reshape(responses, self.functionals.shape)

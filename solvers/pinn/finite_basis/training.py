@@ -1,8 +1,11 @@
 """Training of every weight of a finite-basis network, on its energy alone.
 
 The output layer minimises the energy exactly for whatever neurons, so that the least energy is a function of
-the neurons; quasi-Newton steps lower it. Sources: G. Golub, V. Pereyra, Inverse Problems 19 (2003) R1-R26
-(variable projection); J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed. 2006, section 7.2 (L-BFGS).
+the neurons; quasi-Newton steps lower it. At finite strain it minimises the energy's expansion to second order
+about the best displacement so far, which other neurons change little: one factorisation, as for the linear law.
+
+Sources: G. Golub, V. Pereyra, Inverse Problems 19 (2003) R1-R26 (variable projection); J. Nocedal, S. J. Wright,
+Numerical Optimization, 2nd ed. 2006, section 7.2 (L-BFGS).
 """
 
 from dataclasses import dataclass
@@ -13,7 +16,7 @@ from scipy.optimize import minimize
 
 from geometry.arrays import FloatArray
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from solvers.pinn.finite_basis.newton import SETTLED, LoadStep, find_equilibrium
+from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium
 from solvers.pinn.finite_basis.windows import ShepardWindows
 from solvers.solver import Progress
 
@@ -21,7 +24,7 @@ MEMORY = 20
 """Steps that L-BFGS remembers."""
 
 RISE = 1.5
-"""Energy over the lowest one at which neurons without an equilibrium are entered in a line search."""
+"""Energy over the lowest one at which neurons that turn a point inside out are entered in a line search."""
 
 
 def with_trained_neurons(
@@ -69,11 +72,16 @@ class _Training:
 
     def __post_init__(self) -> None:
         self.lowest, _ = self.network.least(self.reached.state)
+        self._gradient = self._reached_gradient()
+
+    def _reached_gradient(self) -> torch.Tensor:
+        """Displacement gradient of the best network at the quadrature points, (q, 2, 2)."""
+        return self.network.energy.gradients(self.reached.state.output[None])[0]
 
     def settled(self) -> LoadStep:
-        """The equilibrium of the best network, of which the training asked less at finite strain.
+        """The equilibrium of the best network, which the training knows to second order at finite strain.
 
-        Where the whole accuracy is not reached it stays that of the training, `SETTLED`.
+        Where Newton's method fails it stays that of the training.
         """
         if self.network.energy.material.law == "linear" or not self.count:
             return self.reached
@@ -97,19 +105,16 @@ class _Training:
         now = self.network.energy.basis.neurons
         places = torch.from_numpy(flat.reshape(now.shape))
         network = self.network.with_neurons(self.neurons(places), self.reached.state.factor)
-        if network.energy.material.law == "linear":
-            state, iterations = network.step(network.zero_output), 1
-        else:
-            state, iterations = find_equilibrium(network, self.reached.state.output, 1.0, SETTLED)
-        iterations += self.reached.iterations
-        if state is None or state.unstable:
-            self.reached = self.reached._replace(iterations=iterations)
-            return RISE * self.lowest / scale, np.zeros(flat.size)
+        state = network.step_from(self._gradient)
+        iterations = self.reached.iterations + 1
         value, slopes = network.least(state)
         if network.energy.kept:
             network.energy.kept.clear()
+        if not np.isfinite(value):  # a point is turned inside out
+            return RISE * self.lowest / scale, np.zeros(flat.size)
         if value <= self.lowest:
             self.network, self.lowest = network, value
             self.reached = LoadStep(1.0, state, iterations)
+            self._gradient = self._reached_gradient()
         slopes[:2] = (slopes[:2] - slopes[2] * self.windows.centres.T[:, None]) / self.windows.radii
         return value / scale, slopes.numpy().ravel() / scale

@@ -9,6 +9,7 @@ import torch
 from geometry.errors import UserError
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.newton import find_equilibrium
 from solvers.pinn.finite_basis.presets import PinnLocalSolver, TrainedPinnAsmSolver, TrainedPinnSolver
 from solvers.problem import Load, Material, Problem, contact_functional
@@ -142,15 +143,27 @@ def test_finite_strain_is_trained_too(bent):
     assert apart(found, FemNonlinearSolver().solve(bent)) < 0.002
 
 
-def test_neurons_without_an_equilibrium_are_left_out(bent, monkeypatch):
-    """The training ends with the best that it has."""
-    from solvers.pinn.finite_basis import training
+@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+def test_a_step_from_a_displacement_of_the_network_is_newtons(bent, law):
+    level = TrainedPinnSolver(**SMALL).level(replace(bent, material=Material(law=law)), 1.0)
+    output = level.step(level.zero_output, 0.1).output
+    expected = level.step(output, 1.0)
+    found = level.step_from(level.energy.gradients(output[None])[0])
+    torch.testing.assert_close(found.output, expected.output, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-6)
 
-    monkeypatch.setattr(training, "find_equilibrium", lambda *_: (None, 3))
-    solver = TrainedPinnSolver(**STEPS)
-    assert solver.solve(bent).energy == pytest.approx(
-        PinnLocalSolver(**SMALL, growth=0.8).solve(bent).energy, rel=1e-9
-    )
+
+def test_neurons_that_turn_a_point_inside_out_are_left_out(bent, monkeypatch):
+    """The training ends with the best that it has."""
+    step = ConstrainedNetwork.step_from
+
+    def leap(*given):
+        found = step(*given)
+        return found._replace(output=50 * found.output)
+
+    monkeypatch.setattr(ConstrainedNetwork, "step_from", leap)
+    drawn = PinnLocalSolver(**SMALL, growth=0.8).solve(bent)
+    assert TrainedPinnSolver(**STEPS).solve(bent).energy == pytest.approx(drawn.energy, rel=1e-9)
 
 
 @pytest.mark.parametrize(
