@@ -1,11 +1,11 @@
 """Training of every weight of a finite-basis network, on its energy alone.
 
 The output layer minimises the energy exactly for whatever neurons, so that the least energy is a function of
-the neurons; quasi-Newton steps lower it. At finite strain it minimises the energy's expansion to second order
-about the best displacement so far, which other neurons change little: one factorisation, as for the linear law.
+the neurons; quasi-Newton steps lower it. At finite strain it minimises the energy's expansion to second
+order about the best displacement so far, which other neurons change little: one factorisation a step.
 
-Sources: G. Golub, V. Pereyra, Inverse Problems 19 (2003) R1-R26 (variable projection); J. Nocedal, S. J. Wright,
-Numerical Optimization, 2nd ed. 2006, section 7.2 (L-BFGS).
+Sources: G. Golub, V. Pereyra, Inverse Problems 19 (2003) R1-R26 (variable projection); J. Nocedal,
+S. J. Wright, Numerical Optimization, 2nd ed. 2006, section 7.2 (L-BFGS).
 """
 
 from dataclasses import dataclass
