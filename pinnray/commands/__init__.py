@@ -1,1 +1,1 @@
-"""The commands, one a module: a function that has the command's name. `pinnray.commands.app` lists them."""
+"""The commands: a module has the name of one, whose function is `command`; `app` here lists them."""

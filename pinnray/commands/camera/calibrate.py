@@ -13,7 +13,7 @@ from pinnray.options.shared import Flag, OutputPath, Repeated
 VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
 
 
-def calibrate(
+def command(
     *images: Path,
     board: str,
     square: float,

@@ -6,7 +6,7 @@ from compare.runtime.exits import say
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
-def fiducials(
+def command(
     finger: FingerOptions = FingerOptions(),
     *,
     marker_plane: float = 0.0,

@@ -18,7 +18,7 @@ FEWEST = 3
 """Number of discs that a marker's colour shows at least; a track needs as many."""
 
 
-def pick(
+def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     *,
     at: str | None = None,

@@ -8,7 +8,7 @@ from pinnray.commands.camera.pick import read_numbers
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
-def points(
+def command(
     rest: Path,
     pressed: Path,
     finger: FingerOptions = FingerOptions(),

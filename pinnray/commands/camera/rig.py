@@ -12,7 +12,7 @@ from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 
 
-def rig(
+def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),

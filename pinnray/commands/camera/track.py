@@ -14,7 +14,7 @@ from pinnray.options.camera import FilmOptions, ForceOptions
 from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
 
 
-def track(
+def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     finger: FingerOptions = FingerOptions(),
     options: FilmOptions = FilmOptions(),

@@ -29,7 +29,7 @@ from pinnray.options.shared import (
 from solvers.solver import Solver
 
 
-def compare(
+def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),

@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # SciPy's statistics come with it, and `--help` has to be qui
     from compare.crossval.study import SolverVariant
 
 
-def crossval(
+def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),

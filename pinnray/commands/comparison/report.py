@@ -7,7 +7,7 @@ from geometry.errors import UserError
 from pinnray.options.shared import OptionalOutputPath
 
 
-def report(*runs: Path, out: OptionalOutputPath = None) -> int:
+def command(*runs: Path, out: OptionalOutputPath = None) -> int:
     """Read one finished run, or several side by side.
 
     One gives its answers; several (designs, seeds, settings) make one page and one table. Examples:

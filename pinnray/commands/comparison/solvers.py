@@ -10,7 +10,7 @@ PRESET_MEANINGS = {
 }
 
 
-def solvers() -> int:
+def command() -> int:
     """List the solvers with their material laws, loads, presets and settings.
 
     The networks pinn-std and pinn-asm have random hidden weights and an output layer that is solved exactly,

@@ -11,7 +11,7 @@ CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dx
 PICTURE = "design.png"
 
 
-def design(
+def command(
     finger: FingerOptions = FingerOptions(),
     *,
     out: OutputPath = Path("out/cad"),

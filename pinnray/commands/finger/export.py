@@ -10,7 +10,7 @@ from compare.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import FingerOptions, Flag, OutputPath, PhysicsOptions
 
 
-def export(
+def command(
     kind: Literal["mujoco", "sofa", "mesh"],
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),

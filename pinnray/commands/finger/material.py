@@ -6,7 +6,7 @@ from geometry.errors import UserError
 from pinnray.options.shared import OutputPath
 
 
-def material(
+def command(
     test: Path | None = None,
     *,
     poisson: float = 0.45,

@@ -7,7 +7,7 @@ from geometry.errors import UserError
 from pinnray.options.shared import Adapt, FingerOptions, OutputPath, PhysicsOptions
 
 
-def mesh(
+def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     *,

@@ -9,7 +9,7 @@ from geometry.errors import UserError
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
 
 
-def sensitivity(
+def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     *,

@@ -16,7 +16,7 @@ from pinnray.options.shared import (
 )
 
 
-def solve(
+def command(
     solver: str | None = None,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),

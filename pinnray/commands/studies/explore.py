@@ -1,4 +1,4 @@
-"""Write the explorer of a sweep's fields, or serve it with a solver behind it."""
+"""Write the explorer of a sweep's fields."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from geometry.errors import UserError
 from pinnray.options.shared import OptionalOutputPath
 
 
-def explore(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False) -> int:
+def command(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False) -> int:
     """Write a page that shows the deformed finger at any load of a sweep, while sliders move.
 
     The page is one file that needs no network. The study must have kept fields: strokes = 10 in its file.
@@ -30,26 +30,4 @@ def explore(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False)
             size = write_explorer(emulator, path).stat().st_size
             progress(1.0, f"{size / 1e6:.1f} MB")
     print(path)
-    return 0
-
-
-def app(sweep: Path, *, port: int = 8765, refit: bool = False) -> int:
-    """Serve the explorer of a sweep, with `fem-nonlinear` behind it for what the sweep does not know.
-
-    Only this machine is served, and only pages that it has served itself. Ctrl-C ends it.
-
-    Args:
-        sweep: Folder of `pinnray sweep`.
-        port: Of this machine; 0 takes any that is free.
-        refit: Fit the emulator again.
-    """
-    from compare.runtime.stages import Stages
-    from studies.fields.live import serve_explorer
-    from studies.fields.store import fields_of
-
-    if not 0 <= port < 65536:
-        raise UserError(f"--port {port}: give a number from 0 to 65535")
-    with Stages() as stages:
-        emulator = fields_of(sweep, refit=refit, stages=stages)
-    serve_explorer(emulator, port, lambda address: print(f"{address}  (Ctrl-C ends)", flush=True))
     return 0

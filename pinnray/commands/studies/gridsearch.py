@@ -26,7 +26,7 @@ SHORT = 2_000
 SEARCHED = {"learning_rate": "--learning-rates", "bc_weight": "--bc-weights"}
 
 
-def gridsearch(
+def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),

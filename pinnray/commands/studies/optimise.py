@@ -7,7 +7,7 @@ from rich.console import Console
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 
 
-def optimise(
+def command(
     question: Path,
     options: StudyOptions = StudyOptions(),
 ) -> int:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from studies.sweep.study import Value
 
 
-def predict(
+def command(
     sweep: Path,
     *,
     set: Repeated = (),

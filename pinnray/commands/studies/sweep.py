@@ -8,7 +8,7 @@ from compare.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 
 
-def sweep(
+def command(
     study: Path,
     options: StudyOptions = StudyOptions(),
 ) -> int:
