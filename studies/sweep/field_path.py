@@ -1,7 +1,7 @@
 """A finger's deformation along its load path, on a mesh that moves with the finger's walls."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Self
@@ -19,6 +19,7 @@ from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeField
+from solvers.problem import Problem
 from solvers.solution import Solution
 from solvers.solver import Solver
 
@@ -103,11 +104,19 @@ class MovedMesh:
         return moved
 
 
+class Stepping(FemNonlinearSolver):
+    """`fem-nonlinear` with every step on the given elements, because the fields on the way are kept."""
+
+    def coarser(self, problem: Problem) -> None:
+        """None; see `FemNonlinearSolver`."""
+
+
 def stepping(solver: Solver, strokes: int) -> Solver:
     """The solver of finite strain with its load steps at equal strokes, where it needs no shorter ones."""
     assert isinstance(solver, FemNonlinearSolver)
     step = 1 / strokes
-    return replace(solver, first_step=step, max_step=step, min_step=min(step, solver.min_step))
+    own = asdict(solver) | {"first_step": step, "max_step": step, "min_step": min(step, solver.min_step)}
+    return Stepping(**own)
 
 
 @lru_cache(maxsize=1)

@@ -53,9 +53,11 @@ class FemNonlinearSolver(ElementSettings):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`."""
         check_problem(self, problem)
-        # Friction depends on the way: it is followed on the given elements.
-        coarse = None if problem.load.friction else coarser(problem)
-        return on_all_ranks(partial(self._solve, coarse), problem, progress)
+        return on_all_ranks(partial(self._solve, self.coarser(problem)), problem, progress)
+
+    def coarser(self, problem: Problem) -> Problem | None:
+        """The problem on the coarse elements on which the load is followed; None for the given ones."""
+        return None if problem.load.friction else coarser(problem)  # friction depends on the way
 
     def path(
         self, problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints | None = None
