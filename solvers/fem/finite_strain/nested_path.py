@@ -12,7 +12,7 @@ from solvers.cylinder_contact import ContactRegion
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.problem import Problem
 
-COARSE, ACROSS, FINE = 1.0, 2, 4000
+COARSE, ACROSS, FINE = 1.0, 2, 3000
 """Size of coarse elements, mm; their least number through a wall; triangles from which on they are used."""
 
 
