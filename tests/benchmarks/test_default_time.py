@@ -19,6 +19,10 @@ RUN = [
     "2",
     "--solver-set",
     "pinn-std.preset=fast",
+    "--solver-set",
+    "pinn-std.wall_spacing=1.8",
+    "--solver-set",
+    "pinn-std.corner_spacing=0.1",
     "--out",
 ]
 

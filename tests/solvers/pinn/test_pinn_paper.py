@@ -14,21 +14,19 @@ TINY = {"width": 8, "layers": 2, "base_points": 20, "precision": "double"}
 
 
 @pytest.mark.slow
-def test_first_500_epochs_are_those_of_the_plain_implementation():
-    """To rounding, which Adam lets grow once its steps are too long for the boundary's stiff penalty.
+def test_first_200_epochs_are_those_of_the_plain_implementation():
+    """To rounding; a wrong law, gate or weight shows in the first epoch.
 
-    Two plain runs whose initial weights differ by rounding were seen to part by 1e-13 in 300 epochs and 2e-7
-    in 500; ours and the plain one by no more. A wrong law, gate or weight shows in the first epoch.
+    Adam lets rounding grow later: two plain runs part by 1e-13 in 300 epochs and by 2e-7 in 500.
     """
     problem = Problem(bar_mesh(24.0, 4.0, 12, 4, contact=(14.0, 18.0)))
-    solver = PaperPinnSolver(epochs=500, precision="double", base_points=50, threads=1)
+    solver = PaperPinnSolver(epochs=200, precision="double", base_points=50, threads=1)
     history = solver.solve(problem).history
     plain = PlainPinn(problem, solver)
     with torch_threads(1):  # so small a problem is slower on two
-        expected = np.array([plain.step() for _ in range(500)])
+        expected = np.array([plain.step() for _ in range(200)])
     ours = np.column_stack([history[name] for name in ("PDE", "BC", "total")])
-    np.testing.assert_allclose(ours[:300], expected[:300], rtol=1e-11)
-    np.testing.assert_allclose(ours, expected, rtol=1e-5)
+    np.testing.assert_allclose(ours, expected, rtol=1e-11)
 
 
 @pytest.mark.parametrize(
