@@ -104,7 +104,6 @@ class Factorisation(StiffnessSolver):
     def update(self, nodal: FloatArray | None = None) -> None:
         """Factorise again after the matrix has got new values in its old places; needs no displacements."""
         self._ksp.setOperators(self.matrix)
-        self._factorised = True
         try:
             self._ksp.setUp()
         except PETSc.Error as error:
@@ -112,6 +111,7 @@ class Factorisation(StiffnessSolver):
                 "MUMPS cannot factorise the stiffness matrix: "
                 "is there enough memory, and is no element nearly flat?"
             ) from error
+        self._factorised = True
 
     @property
     def negative(self) -> int:

@@ -37,7 +37,7 @@ class LoadStep(NamedTuple):
 
 
 def find_equilibrium(
-    network: ConstrainedNetwork, guess: torch.Tensor, fraction: float, tolerance: float = TOLERANCE
+    network: ConstrainedNetwork, guess: torch.Tensor, fraction: float
 ) -> tuple[NewtonIterate | None, int]:
     """Equilibrium under a fraction of the load, None if the iteration fails, and the iterations taken.
 
@@ -51,7 +51,7 @@ def find_equilibrium(
         if state is None:
             break
         slow = SLOW * before < state.change < SETTLED
-        if state.change < tolerance or slow:
+        if state.change < TOLERANCE or slow:
             return (_stable(network, state, fraction) if state.unstable else state), iteration
         guess, before = state.output, state.change  # from now on the guess has the prescribed displacement
         energy = network.energy_with_springs(guess, fraction)

@@ -108,13 +108,13 @@ class _Training:
         state = network.step_from(self._gradient)
         iterations = self.reached.iterations + 1
         value, slopes = network.least(state)
-        if network.energy.kept:
-            network.energy.kept.clear()
         if not np.isfinite(value):  # a point is turned inside out
             return RISE * self.lowest / scale, np.zeros(flat.size)
         if value <= self.lowest:
             self.network, self.lowest = network, value
             self.reached = LoadStep(1.0, state, iterations)
             self._gradient = self._reached_gradient()
+        if network.energy.kept:
+            network.energy.kept.clear()
         slopes[:2] = (slopes[:2] - slopes[2] * self.windows.centres.T[:, None]) / self.windows.radii
         return value / scale, slopes.numpy().ravel() / scale

@@ -149,11 +149,8 @@ class GateTree:
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Shares (n, w), the gates' logits and their derivatives by the linear ones, (n, k) each."""
         logits, slopes = _logits(torch.addmm(gates[:, 2], points, gates[:, :2].T))
-        return (
-            (logits @ opened).addmm_(softplus(logits, threshold=40), above, alpha=-1).exp_(),
-            logits,
-            slopes,
-        )
+        closed = softplus(logits, threshold=40)
+        return (logits @ opened).addmm_(closed, above, alpha=-1).exp_(), logits, slopes
 
     def _above(self, near: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Gates above encoders (w,), (k, 3), and the matrices |P| and P of the module's formula, (k, w)."""
