@@ -18,7 +18,7 @@ from geometry.arrays import FloatArray
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium
 from solvers.pinn.finite_basis.windows import ShepardWindows
-from solvers.solver import Progress
+from solvers.solver import NoSolutionError, Progress
 
 MEMORY = 20
 """Steps that L-BFGS remembers."""
@@ -81,13 +81,15 @@ class _Training:
     def settled(self) -> LoadStep:
         """The equilibrium of the best network, which the training knows to second order at finite strain.
 
-        Where Newton's method fails it stays that of the training.
+        Raises:
+            NoSolutionError: If Newton's method finds none there.
         """
         if self.network.energy.material.law == "linear" or not self.count:
             return self.reached
         state, iterations = find_equilibrium(self.network, self.reached.state.output, 1.0)
-        iterations += self.reached.iterations
-        return self.reached._replace(state=state or self.reached.state, iterations=iterations)
+        if state is None:
+            raise NoSolutionError("the trained network has no equilibrium near; take fewer steps")
+        return self.reached._replace(state=state, iterations=self.reached.iterations + iterations)
 
     def places(self, neurons: torch.Tensor) -> torch.Tensor:
         """Weights of the position in radii from a window's centre, and the bias there, shape (3, m, c)."""

@@ -13,6 +13,7 @@ from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.newton import find_equilibrium
 from solvers.pinn.finite_basis.presets import PinnLocalSolver, TrainedPinnAsmSolver, TrainedPinnSolver
 from solvers.problem import Load, Material, Problem, contact_functional
+from solvers.solver import NoSolutionError
 from tests.solvers.conftest import bar_mesh, observed_at
 
 SMALL = {"wall_spacing": 1.6, "corner_spacing": 0.4, "neurons": 3, "tolerance": 0.2}
@@ -151,6 +152,12 @@ def test_a_step_from_a_displacement_of_the_network_is_newtons(bent, law):
     found = level.step_from(level.energy.gradients(output[None])[0])
     torch.testing.assert_close(found.output, expected.output, rtol=0, atol=1e-6)
     np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-6)
+
+
+def test_a_training_that_ends_beside_no_equilibrium_says_so(bent, monkeypatch):
+    monkeypatch.setattr("solvers.pinn.finite_basis.training.find_equilibrium", lambda *_: (None, 3))
+    with pytest.raises(NoSolutionError, match="no equilibrium near"):
+        TrainedPinnSolver(**STEPS).solve(bent)
 
 
 def test_neurons_that_turn_a_point_inside_out_are_left_out(bent, monkeypatch):
