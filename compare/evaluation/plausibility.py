@@ -1,4 +1,4 @@
-"""Checks measured marker displacements against the finger, the indenter's travel and `fem`.
+"""Checks a finger's walls, and measured marker displacements against finger, indenter's travel and `fem`.
 
 What is impossible is refused; what is unlikely is warned of, with what it looks like.
 """
@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import shapely
 
-from compare.evaluation.thin_walls import wall_remarks
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import OutsideBodyError, UserError
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from geometry.section.thickness import wall_thickness
 from solvers.identification.contradiction import MUCH_NEARER, likely_order, order_words
 from solvers.problem import Problem
 from solvers.registry import MissingLibraryError, make_solver
@@ -215,3 +215,38 @@ def _inside(mesh: TriangleMesh, points: FloatArray) -> bool:
     except OutsideBodyError:
         return False
     return True
+
+
+LEAST_ACROSS = 1.5
+"""Elements across a wall below which its bending is told to be unresolved: less than two."""
+NECK = 0.2
+"""Thickness of a wall over the median wall's below which it is told: such a neck is a hinge. The walls of
+finger rays, printed or drawn, have 0.24 or more."""
+
+
+def wall_remarks(problem: Problem) -> list[str]:
+    """A remark on the thinnest wall of a problem's finger, if it is a neck or has too few elements across."""
+    if problem.finger is None:
+        return []
+    section, mesh = problem.finger.section, problem.mesh
+    extent = float(np.ptp(section.bounds, axis=0).max())
+    points, thickness = wall_thickness(section, extent / 400)
+    if not len(points):
+        return []
+    least, usual = float(thickness.min()), float(np.median(thickness))
+    where = points[thickness.argmin()]
+    corners = mesh.points[mesh.triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    away = np.linalg.norm(corners.mean(axis=1) - where, axis=1)
+    height = float(np.median((2 * mesh.areas / longest)[away <= max(least, away.min())]))
+    across = least / height
+    if across >= LEAST_ACROSS and least >= NECK * usual:
+        return []
+    count = max(round(across), 1)
+    said = f"wall of {least:.2g} mm at ({where[0]:.4g}, {where[1]:.4g}) mm"
+    if least < NECK * usual:
+        said += f", {least / usual:.1g} of the median wall's {usual:.3g} mm"
+    said += f": {count} element{'s' if count > 1 else ''} of {height:.2g} mm across it"
+    if across < LEAST_ACROSS:
+        return [f"{said}, too few for the stress of its bending; take a mesh with at least two there"]
+    return [f"{said}; a neck bends as a hinge, its stiffness with its thickness cubed: see that it is meant"]

@@ -21,10 +21,9 @@ from compare.figures.fields import (
     drawn_solvers,
 )
 from compare.figures.force_charts import draw_force_displacement
-from compare.figures.marker_charts import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
-from compare.figures.record_charts import draw_convergence, draw_energy, draw_losses
+from compare.figures.solver_charts import draw_convergence, draw_energy, draw_losses, draw_marker_errors
 from geometry.errors import UserError
 from geometry.figure import Figure
 

@@ -32,8 +32,7 @@ from compare.report import text
 from compare.report.output_files import metrics
 from compare.report.summary import answers
 from compare.report.tables import millimetres, printed_rows, seconds, table_one
-from compare.runtime.html import picture_urls, template_environment
-from compare.runtime.packed import Packed, base64_text
+from compare.runtime.html import Packed, base64_text, picture_urls, template_environment
 from compare.runtime.tables import distance, number, percent
 from geometry.arrays import FloatArray
 from geometry.atomic import write_text

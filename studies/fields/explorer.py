@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import to_hex
 
 from compare.runtime import html
-from compare.runtime.packed import Packed
+from compare.runtime.html import Packed
 from compare.runtime.provenance import package_versions
 from geometry.arrays import FloatArray
 from geometry.finger.parameters import SYMBOLS, Parameters

@@ -1,22 +1,29 @@
-"""Charts of records: energy, convergence and losses on the way to a solution."""
+"""Charts of solvers: the record of each on the way to its solution, and its errors at the markers."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullLocator
 
 from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
 from compare.figures.style import (
     axes_at,
     legend_above,
+    legend_below_heading,
     legend_height,
     solver_colour,
     write_heading,
     write_letter,
 )
-from geometry.arrays import FloatArray
-from geometry.figure import INK, WIDTH, Figure, figure
+from geometry.arrays import BoolArray, FloatArray
+from geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
+from geometry.observations import Observations
 
 HEAD = 0.3
 """Height of the heading, inches."""
@@ -184,3 +191,107 @@ def draw_losses(comparison: Results) -> Figure | None:
                 axes.tick_params(labelbottom=False)
         axes.set_xlabel("epoch")
     return drawn
+
+
+CIRCLE: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3.2, "mfc": "white", "mew": 0.8}
+"""Look of a training error, which is seen even where the error vanishes."""
+
+
+def draw_marker_errors(comparison: Results) -> Figure:
+    """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one logarithmic scale.
+
+    Bars: at markers that the solver was not given. Circles: at markers that it was given.
+    """
+    evaluations, observations = comparison.evaluations, comparison.observations
+    head, title, height, gap, foot = 0.62, 0.19, 0.5, 0.1, 0.4  # inches: with legend; a solver's name; ...
+    left, step = 0.72, title + height + gap
+    width = WIDTH / 2 - left - 1.02  # where the means stand
+    span = _span(evaluations, observations)
+    with figure(head + len(evaluations) * step + foot) as drawn:
+        write_heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
+        fitted = any(evaluation.in_sample for evaluation in evaluations)
+        handles = [
+            Patch(facecolor=MUTED, edgecolor=MUTED, label="held out: the solver was not given this marker"),
+            Line2D([], [], **CIRCLE, color=MUTED, label="training: it was given this marker (†)"),
+        ]
+        legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
+        for row, evaluation in enumerate(evaluations):
+            held_out = held_out_errors(evaluation, observations)
+            given = marker_errors(evaluation, observations) if evaluation.in_sample else None
+            for column, symbol in enumerate("uv"):
+                axes = axes_at(drawn, (left + column * WIDTH / 2, head + title + row * step, width, height))
+                _draw_errors(axes, symbol, held_out, given, solver_colour(row), span[0])
+                _set_scales(axes, observations.visible, span)
+                axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=SMALL)
+                if row == 0:
+                    axes.text(1.03, 1.06, "mean, mm", size=SMALL, color=INK, transform=axes.transAxes)
+                if column == 0:
+                    axes.set_title(evaluation.label_at_markers, size=8.5, pad=2, weight="bold")
+                if row == len(evaluations) - 1:
+                    axes.set_xlabel("marker, by its number in the drawing")
+                else:
+                    axes.tick_params(labelbottom=False)
+    return drawn
+
+
+DECADES = 4
+"""Powers of ten below the largest error at which the scale of errors ends at the latest."""
+
+SMALLEST = 1e-6
+"""Errors below this, mm, are those of rounding."""
+
+
+def _span(evaluations: Sequence[Evaluation], observations: Observations) -> tuple[float, float]:
+    """Powers of ten around the errors of the solvers that converged (or of any), mm."""
+    chosen = [evaluation for evaluation in evaluations if evaluation.converged] or evaluations
+    errors = [
+        error(evaluation, observations) for evaluation in chosen for error in (marker_errors, held_out_errors)
+    ]
+    found = np.concatenate([np.append(each.ae_u, each.ae_v) for each in errors if each is not None])
+    found = found[np.isfinite(found) & (found > SMALLEST)]
+    if not len(found):
+        return SMALLEST, 1e3 * SMALLEST
+    high = float(np.ceil(np.log10(found.max()) - 1e-9))
+    low = max(float(np.floor(np.log10(found.min()))), high - DECADES)
+    return 10 ** min(low, high - 1), 10**high
+
+
+def _draw_errors(
+    axes: Axes,
+    symbol: str,
+    held_out: MarkerErrors | None,
+    given: MarkerErrors | None,
+    colour: str,
+    floor: float,
+) -> None:
+    """The bars and circles of one solver and component, and their means beside; none is below the floor."""
+    words = []
+    for errors, kind in ((held_out, "held out"), (given, "training")):
+        if errors is None:
+            continue
+        values = np.maximum(getattr(errors, f"ae_{symbol}"), floor)  # a scale of powers has no zero
+        marker = np.arange(1, len(values) + 1)
+        seen = np.isfinite(values)
+        if errors is given:
+            axes.plot(marker[seen], values[seen], **CIRCLE, color=INK, clip_on=False, zorder=3)
+        else:
+            axes.bar(marker[seen], values[seen], 0.72, color=colour, edgecolor=colour, linewidth=0.6)
+        words.append(f"{getattr(errors, f'mae_{symbol}'):.3f} {kind}")
+    axes.text(1.03, 0.5, "\n".join(words), size=SMALL, va="center", color=MUTED, transform=axes.transAxes)
+
+
+def _set_scales(axes: Axes, visible: BoolArray, span: tuple[float, float]) -> None:
+    count = len(visible)
+    for marker in np.flatnonzero(~visible) + 1:
+        place = axes.get_xaxis_transform()
+        axes.text(marker, 0.04, "×", size=SMALL, color=MUTED, ha="center", transform=place)
+    axes.set_xticks(range(1, count + 1) if count <= 12 else range(1, count + 1, 5))
+    axes.set_xlim(0.4, count + 0.6)
+    axes.set_ylim(*span)  # first: a scale of powers cannot find limits for bars that are all at one height
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(numticks=4))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.tick_params(labelsize=SMALL)
+    axes.grid(axis="y")
+    axes.set_axisbelow(True)
