@@ -5,6 +5,7 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import chdir, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from time import time
 from typing import Any, Generic, TypeVar
@@ -105,17 +106,24 @@ def _compiled(build: Callable[[], Built]) -> Built:
     before, began = logging.root.manager.disable, time()
     logging.disable(logging.INFO)
     try:
+        _forget_abandoned()
         while True:
-            _forget_half_compiled(lambda changed: changed < time() - ABANDONED_S)
             try:
                 return build()
             except TimeoutError:  # of FFCx, which has waited; several ranks have another error
-                continue
+                _forget_abandoned.cache_clear()
+                _forget_abandoned()
     except KeyboardInterrupt:  # of other exceptions FFCx takes care
         _forget_half_compiled(lambda changed: changed >= began)
         raise
     finally:
         logging.disable(before)
+
+
+@cache
+def _forget_abandoned() -> None:
+    """Delete what killed processes have left, once: looking for it takes as long as a form that is there."""
+    _forget_half_compiled(lambda changed: changed < time() - ABANDONED_S)
 
 
 def _forget_half_compiled(chosen: Callable[[float], bool]) -> None:

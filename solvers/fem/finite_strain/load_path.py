@@ -25,8 +25,10 @@ BESIDE = 0.05
 further away is of another branch."""
 CARRIED = 40
 """Newton iterations from an equilibrium on coarser elements; the first ones undo stretching of thin walls."""
-PENETRATION = 1e-5
-"""Largest gap of a node in contact and penetration of any node, mm."""
+PENETRATION, ROUGH = 1e-5, 1e-3
+"""Largest gap of a node in contact and penetration of any node, mm; on the way of a rough path."""
+ROUGH_TOLERANCE = 1e-4
+"""Largest residual force over the largest internal force on the way of a rough path."""
 SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
 """A finger whose contact is so many times stiffer than itself takes a step first with a contact that is only
 SOFTEST times as stiff, which is hardened by factors of at most HARDER. For a node leaves the contact within
@@ -52,8 +54,9 @@ class LoadPath:
         constraints: Their targets grow with the load; the load's own if None.
         guide: States of a simpler model at fractions of the load: each step starts from the last state plus
             the guide's change.
-        iterative: Whether multigrid solves with the tangent, not factors. The rest are settings of
-            `FemNonlinearSolver`.
+        iterative: Whether multigrid solves with the tangent, not factors.
+        rough: Whether equilibria need be near only, as on the way to one that is found from the last of them.
+            The rest are settings of `FemNonlinearSolver`.
     """
 
     def __init__(
@@ -64,6 +67,7 @@ class LoadPath:
         *,
         guide: Callable[[float], LoadState] | None = None,
         iterative: bool = False,
+        rough: bool = False,
         first_step: float,
         max_step: float,
         min_step: float,
@@ -73,11 +77,14 @@ class LoadPath:
         self._first_step, self._min_step, self.space, self._guide = first_step, min_step, space, guide
         method: LinearSolver = "iterative" if iterative else "direct"
         self.equilibrium = DiscreteEquilibrium(problem, space, constraints, method)
+        if rough:
+            tolerance = max(tolerance, ROUGH_TOLERANCE)
+        self._penetration = ROUGH if rough else PENETRATION
         self._begin = partial(ConstrainedNewton, self.equilibrium, tolerance, max_iterations=max_iterations)
         self._newton = self._begin()
         contact = self.equilibrium.contact
         self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
-        self._softer = [] if contact is None else self._ever_harder(contact)
+        self._softer: list[float] | None = [] if contact is None else None  # Until it is needed
         self.points = [self.equilibrium.rest]
         self.left = 0  # Number of unstable equilibria that were left for a stable one
         self._halved = self._iterations = 0  # Failed steps; Newton iterations of all steps
@@ -126,6 +133,7 @@ class LoadPath:
             forces=last.forces,
             contact=self._carried_contact(way, last),
         )
+        self._softer = way._softer  # A finger is as slender on any elements
         newton, self._newton = self._newton, self._begin(max_iterations=CARRIED)
         found, _ = self._found(guess)
         self._newton.close()
@@ -210,7 +218,9 @@ class LoadPath:
     def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
         """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""
         hardest, final = 0, self.equilibrium.contact
-        softer = [] if final is None else [replace(final, stiffness=each) for each in self._softer]
+        if self._softer is None and final is not None:
+            self._softer = self._ever_harder(final)
+        softer = [replace(final, stiffness=each) for each in self._softer or ()] if final is not None else []
         for contact in (*softer, final):
             self.equilibrium.contact = contact
             for _ in range(30 if contact is final else 1):
@@ -223,7 +233,7 @@ class LoadPath:
                 if contact is None:
                     return result.state, hardest
                 guess, off = contact.settled(result.state)
-                if contact is final and off <= PENETRATION:
+                if contact is final and off <= self._penetration:
                     return guess, hardest
         self._reason = "the contact does not settle"
         return None, hardest

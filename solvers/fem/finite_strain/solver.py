@@ -60,13 +60,19 @@ class FemNonlinearSolver(ElementSettings):
         return None if problem.load.friction else coarser(problem)  # friction depends on the way
 
     def path(
-        self, problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints | None = None
+        self,
+        problem: Problem,
+        space: LagrangeSpace,
+        constraints: DisplacementConstraints | None = None,
+        *,
+        rough: bool = False,
     ) -> LoadPath:
         """The load path, not yet followed; for the arguments see `LoadPath`."""
         return LoadPath(
             problem,
             space,
             constraints,
+            rough=rough,
             first_step=self.first_step,
             max_step=self.max_step,
             min_step=self.min_step,
@@ -77,7 +83,7 @@ class FemNonlinearSolver(ElementSettings):
     def followed(self, coarse: Problem | None, path: LoadPath, progress: Progress) -> LoadPath | NestedPath:
         """The path to the full load: on coarse elements as far as that leads, else on the given ones."""
         if coarse is not None:
-            way = self.path(coarse, LagrangeSpace(coarse.mesh, self.degree))
+            way = self.path(coarse, LagrangeSpace(coarse.mesh, self.degree), rough=True)
             way.follow(progress)
             if path.take_over(way):
                 return NestedPath(path, way)
