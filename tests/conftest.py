@@ -1,7 +1,9 @@
 """Fixtures that the tests of several folders share."""
 
 import gc
+import hashlib
 import os
+import pickle
 import resource
 import shutil
 import signal
@@ -120,3 +122,21 @@ def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
             yield name, work(each, silent)
 
     monkeypatch.setattr("geometry.processes.Pool.answers", inline)
+
+
+@pytest.fixture(scope="session")
+def discs_fitted_once() -> Iterator[None]:
+    """Discs that were fitted in a picture are not fitted again: tests share films, and the fit takes longest."""
+    from vision.discs import disc_detector
+
+    fit, known = disc_detector.fit_discs, {}
+
+    def fitted(*what: object, **options: object) -> object:
+        key = hashlib.sha256(pickle.dumps((what, options))).digest()
+        if key not in known:
+            known[key] = fit(*what, **options)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(disc_detector, "fit_discs", fitted)
+        yield

@@ -39,7 +39,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=id_of)
-def test_notebooks_run(page, tmp_path, monkeypatch, without_pictures):
+def test_notebooks_run(page, tmp_path, monkeypatch, without_pictures, in_line):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "__docs__"}
     for block in blocks(page):

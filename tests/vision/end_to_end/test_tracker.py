@@ -17,6 +17,8 @@ from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 from vision.tracking.workspace import Workspace
 
+pytestmark = pytest.mark.usefixtures("discs_fitted_once")
+
 MARKERS = DESIGN.markers
 TRUE = bent(MARKERS)
 
