@@ -84,6 +84,14 @@ def few_elements(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(finger_mesh.__kwdefaults__, "across", 1)
 
 
+@pytest.fixture(scope="module")
+def few_elements_throughout() -> Iterator[None]:
+    """The same for all of a module, with its own fixtures."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(finger_mesh.__kwdefaults__, "across", 1)
+        yield
+
+
 @pytest.fixture(scope="session")
 def start_ranks() -> Callable[..., subprocess.Popen[str]]:
     """`start_ranks(count, *arguments)`: Python with arguments on so many MPI ranks, as one process."""
@@ -126,7 +134,7 @@ def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def discs_fitted_once() -> Iterator[None]:
-    """Discs that were fitted in a picture are not fitted again: tests share films, and the fit takes longest."""
+    """Discs are not fitted again in a picture where they were: tests share films, and it takes longest."""
     from vision.discs import disc_detector
 
     fit, known = disc_detector.fit_discs, {}

@@ -9,7 +9,7 @@ import pytest
 
 from tests.test_docs import ALL_BLOCKS, DOCS, blocks, id_of
 
-pytestmark = pytest.mark.usefixtures("few_elements")
+pytestmark = pytest.mark.usefixtures("few_elements", "discs_fitted_once")
 
 CELL = "{code-cell} python"
 NOTEBOOKS = sorted({block.page for block in ALL_BLOCKS if block.language == CELL})

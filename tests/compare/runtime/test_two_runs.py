@@ -12,16 +12,16 @@ import pytest
 
 from geometry.content_hash import file_digest
 from pinnray.cli import main
-from tests.pinnray.commands.programs import WITHOUT_PICTURES
+from tests.pinnray.commands.programs import FEW_ELEMENTS, WITHOUT_PICTURES
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("few_elements")]
 
 OPTIONS = ["compare", "--mesh-size", "2", "--solvers", "fem", "--quiet"]
 
 
 def start(cache: Path, out: Path, *options: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-c", WITHOUT_PICTURES, *OPTIONS, *options, "--out", str(out)],
+        [sys.executable, "-c", FEW_ELEMENTS + WITHOUT_PICTURES, *OPTIONS, *options, "--out", str(out)],
         env=os.environ | {"PINNRAY_CACHE": str(cache)},
         stderr=subprocess.PIPE,
         text=True,
