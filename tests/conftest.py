@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Generator, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -139,7 +140,7 @@ def discs_fitted_once() -> Iterator[None]:
 
     fit, known = disc_detector.fit_discs, {}
 
-    def fitted(*what: object, **options: object) -> object:
+    def fitted(*what: Any, **options: Any) -> object:
         key = hashlib.sha256(pickle.dumps((what, options))).digest()
         if key not in known:
             known[key] = fit(*what, **options)
