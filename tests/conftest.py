@@ -1,7 +1,9 @@
 """Fixtures that the tests of several folders share."""
 
 import gc
+import hashlib
 import os
+import pickle
 import resource
 import shutil
 import signal
@@ -9,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Generator, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -82,6 +85,14 @@ def few_elements(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(finger_mesh.__kwdefaults__, "across", 1)
 
 
+@pytest.fixture(scope="module")
+def few_elements_throughout() -> Iterator[None]:
+    """The same for all of a module, with its own fixtures."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(finger_mesh.__kwdefaults__, "across", 1)
+        yield
+
+
 @pytest.fixture(scope="session")
 def start_ranks() -> Callable[..., subprocess.Popen[str]]:
     """`start_ranks(count, *arguments)`: Python with arguments on so many MPI ranks, as one process."""
@@ -120,3 +131,21 @@ def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
             yield name, work(each, silent)
 
     monkeypatch.setattr("geometry.processes.Pool.answers", inline)
+
+
+@pytest.fixture(scope="session")
+def discs_fitted_once() -> Iterator[None]:
+    """Discs are not fitted again in a picture where they were: tests share films, and it takes longest."""
+    from vision.discs import disc_detector
+
+    fit, known = disc_detector.fit_discs, {}
+
+    def fitted(*what: Any, **options: Any) -> object:
+        key = hashlib.sha256(pickle.dumps((what, options))).digest()
+        if key not in known:
+            known[key] = fit(*what, **options)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(disc_detector, "fit_discs", fitted)
+        yield

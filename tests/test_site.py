@@ -9,7 +9,7 @@ import pytest
 
 from tests.test_docs import ALL_BLOCKS, DOCS, blocks, id_of
 
-pytestmark = pytest.mark.usefixtures("few_elements")
+pytestmark = pytest.mark.usefixtures("few_elements", "discs_fitted_once")
 
 CELL = "{code-cell} python"
 NOTEBOOKS = sorted({block.page for block in ALL_BLOCKS if block.language == CELL})
@@ -39,7 +39,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=id_of)
-def test_notebooks_run(page, tmp_path, monkeypatch, without_pictures):
+def test_notebooks_run(page, tmp_path, monkeypatch, without_pictures, in_line):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "__docs__"}
     for block in blocks(page):

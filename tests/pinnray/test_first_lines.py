@@ -24,6 +24,8 @@ from pinnray.solution import FieldName
 from solvers.finger_figures import figures_of
 from solvers.physics import Physics
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")
+
 ROOT = Path(__file__).parents[2]
 COARSE = {"size": 2.0}
 SHORT = [[20.0, -1.0], [50.0, -1.0]], [[-1.0, -3.0], [-1.5, -8.5]]

@@ -13,6 +13,8 @@ import pinnray as pr
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 HEAVY = ("torch", "dolfinx", "cadquery", "gmsh", "cv2", "pyvista", "pandas", "matplotlib", "scipy")
 COARSE = {"size": 1.0}
 

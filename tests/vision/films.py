@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from geometry.arrays import FloatArray
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
+from geometry.observations import Observations
 from vision.frames.frame import CapturedImage, Frames, Image
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
@@ -16,6 +18,9 @@ from vision.rig.motion import Motion
 from vision.rig.occluders import cable
 from vision.rig.recording import Recording
 from vision.rig.virtual_camera import default_camera, viewing_pose
+from vision.tracking.scene import FilmedScene
+from vision.tracking.tracker import track
+from vision.tracking.trajectories import Tracking
 from vision.tracking.workspace import default_workspace
 
 DESIGN = Design()
@@ -60,3 +65,20 @@ def frames_of(pictures: Sequence[Image], *, live: bool = False) -> Frames:
             yield CapturedImage(np.ascontiguousarray(picture), number / 30, f"picture {number}")
 
     return Frames("the film", shots(), rate=30.0, count=None if live else len(pictures))
+
+
+def tracked(pictures: Sequence[Image], **changes: Any) -> Tracking:
+    """Images, tracked in the scene of this module, which may be changed."""
+    scene: dict[str, Any] = {"design": DESIGN, "workspace": WORKSPACE, "camera": CAMERA}
+    return track(frames_of(pictures), FilmedScene(**scene | changes))
+
+
+def error_of(observations: Observations, true: FloatArray | None = None) -> float:
+    """Mean over the markers of the sum of the absolute errors, mm; by default `DESIGN` is true."""
+    true = bent(DESIGN.markers) if true is None else true
+    return float(np.abs(observations.displacements - true)[observations.visible].sum(axis=1).mean())
+
+
+def shifted(image: Image, x: int, y: int) -> Image:
+    """What a camera sees that was turned a little."""
+    return np.roll(image, (y, x), axis=(0, 1))

@@ -18,6 +18,8 @@ from vision.rig.recording import Recording
 from vision.rig.virtual_camera import default_camera, viewing_pose
 from vision.tracking.workspace import default_workspace
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 
 def filmed(finger, solution):
     mesh, workspace, camera = solution.problem.mesh, default_workspace(finger), default_camera(320, 180)

@@ -20,6 +20,8 @@ from vision.frames.frame import Frame
 from vision.frames.sources import open_frames
 from vision.tracking.frame_tracker import FrameDetections
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")
+
 DEPTH = 20.0
 SCALE = 8.0  # pixels per mm
 REST = np.array([[10.0, -1.0], [50.0, -1.0], [80.0, -3.0]])

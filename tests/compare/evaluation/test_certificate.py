@@ -27,6 +27,8 @@ from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
 from tests.fingers import ring
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 LOADS = {
     "mean": Load(),
     "point": Load(kind="point"),

@@ -24,6 +24,8 @@ from solvers.solution import Solution, Status
 from tests.compare.pipeline.runs import compare
 from tests.meshes import permuted
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

@@ -21,7 +21,7 @@ def measured(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def job(tmp_path: Path, measured: Path, without_pictures: None) -> Callable[..., Job]:
+def job(tmp_path: Path, measured: Path, without_pictures: None, few_elements: None) -> Callable[..., Job]:
     """`job(solver, ...)`: a small job with those solvers, changed by keyword."""
 
     def make(*solvers: Any, **changes: Any) -> Job:

@@ -184,7 +184,9 @@ MEASURED = Path()
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.* is damaged .* and is made again")
-def test_any_history_ends_with_the_numbers_of_a_fresh_folder(without_pictures, monkeypatch, tmp_path):
+def test_any_history_ends_with_the_numbers_of_a_fresh_folder(
+    without_pictures, few_elements, monkeypatch, tmp_path
+):
     measured = tmp_path / "measured.csv"
     measured.write_text("x_mm,y_mm,u_mm,v_mm\n12,-1,-0.5,-5\n40,-1,-2,-0.5\n", encoding="utf-8")
     monkeypatch.setitem(globals(), "MEASURED", measured)

@@ -31,6 +31,8 @@ from solvers.solver import NoSolutionError, Progress, silent
 from tests.compare.pipeline.runs import compare
 from vision.measurements import read_measurements
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 COARSE = MeshSettings(size=1.0)
 
 

@@ -13,6 +13,10 @@ WITHOUT_PICTURES = f"import compare.pipeline.pipeline as p; p.draw_all = lambda 
 """Pictures take most of the time of a small comparison, and have tests of their own."""
 
 
+FEW_ELEMENTS = "from geometry.cache import finger_mesh as f; f.__kwdefaults__['across'] = 1; "
+"""Goes before one of these, as the fixture `few_elements`."""
+
+
 def run_python(
     *arguments: str, before: str = "", after: str = "", **environment: str
 ) -> subprocess.CompletedProcess[str]:

@@ -6,7 +6,7 @@ import pytest
 
 from pinnray.cli import compare_main
 
-pytestmark = pytest.mark.usefixtures("without_pictures")
+pytestmark = pytest.mark.usefixtures("few_elements_throughout", "without_pictures")
 
 SMALL = ["--solvers", "fem,gp", "--mesh-size", "1.5", "--set", "rib_count=3", "--quiet"]
 

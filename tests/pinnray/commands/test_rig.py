@@ -10,6 +10,8 @@ from vision.calibration.chessboard import Board
 from vision.frames.sources import open_frames, photographs
 from vision.measurements import read_measurements
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 QUICK = "--mesh-size 1 --size 480x270 --rest 2 --moving 0 --held 2"
 
 

@@ -16,6 +16,8 @@ from vision.frames.pictures import write_picture
 from vision.frames.sources import open_frames
 from vision.measurements import read_measurements
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")
+
 QUICK = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 2 --tilt 4 --seed 1"
 
 

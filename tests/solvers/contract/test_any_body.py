@@ -18,7 +18,7 @@ from tests.solvers.bodies import BODIES, body_mesh, mesh_of, ring
 from tests.solvers.conftest import observed_at
 from tests.solvers.contract.test_contract import QUICK
 
-COARSE, FINE = 1.0, 0.4
+COARSE, FINE = 1.0, 0.6
 """Element sizes, mm."""
 
 TINY = {"preset": "trained", "wall_spacing": 2.0, "corner_spacing": 0.3, "neurons": 3, "steps": 1}

@@ -33,11 +33,11 @@ QUICK = {
 WITHOUT_MECHANICS = {"gp"}
 """Solvers that have nothing to say without markers, and nothing that this suite could test."""
 
-MEANT_OVER_DEPTH = {"fem-3d": 5e-3}
+MEANT_OVER_DEPTH = {"fem-3d": 8e-3}
 """Solvers whose load and energy are means over the depth, and by how much those of their field may differ.
 
 Held side faces make a plane state of it but for the tetrahedra, which cut every prism differently at its two
-ends: 0.0002 mm of 2 mm, and 0.3 % of the energy, on this mesh.
+ends: 0.0002 mm of 2 mm, and 0.6 % of the energy, on this mesh.
 """
 
 NAMES = [

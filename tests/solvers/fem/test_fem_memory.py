@@ -18,7 +18,7 @@ from solvers.registry import make_solver
 
 name, law, kind = sys.argv[1:]
 design = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
-mesh = finger_mesh(design, settings=MeshSettings(size=1.5))
+mesh = finger_mesh(design, settings=MeshSettings(size=1.5), across=1)
 markers = mesh.markers
 deviations, seen = np.full_like(markers, 0.01), np.ones(len(markers), bool)
 observations = Observations(markers, -0.01 * markers, deviations, seen, "test", True, 0.8)

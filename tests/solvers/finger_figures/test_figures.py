@@ -24,8 +24,10 @@ from solvers.problem import Load, Material, Physics, Problem, Substance
 from solvers.registry import make_solver
 from solvers.solution import Solution, Status
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 FINGER = Design()
-PROBLEM = Problem(finger_mesh(FINGER, settings=MeshSettings(size=1.0)), finger=FINGER)
+PROBLEM = Problem(finger_mesh(FINGER, settings=MeshSettings(size=1.0), across=1), finger=FINGER)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from solvers.registry import make_solver
 from solvers.solver import NoSolutionError
 from tests.solvers.conftest import SHORT
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 CHECKED = ("force", "tip_u", "tip_v", "wrap", "von_mises", "principal_strain", "compliance_across", "mass")
 
 

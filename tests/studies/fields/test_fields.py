@@ -97,7 +97,7 @@ def test_the_reader_reads_what_the_figures_of_a_solution_say():
     assert largest == pytest.approx(figures.von_mises, rel=1e-9)
 
 
-def test_a_sweep_keeps_the_path_of_each_sample_on_the_moved_mesh(tmp_path, in_line):
+def test_a_sweep_keeps_the_path_of_each_sample_on_the_moved_mesh(tmp_path, in_line, few_elements):
     given = Study(
         name="kept",
         solver="fem-nonlinear",

@@ -27,6 +27,8 @@ from studies.sweep.measurement import Measurement, measured
 from studies.sweep.store import Journal
 from studies.sweep.study import Range, physics_of
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 VARIED = {
     "rib_count": {"from": 2, "to": 6},
     "rib_thickness": {"from": 1.0, "to": 2.5},

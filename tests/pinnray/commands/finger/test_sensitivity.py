@@ -6,6 +6,8 @@ import pytest
 
 from pinnray.cli import main
 
+pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+
 COARSE = ["sensitivity", "--mesh-size", "2", "--stroke", "4"]
 
 
@@ -15,7 +17,7 @@ def test_the_command_writes_table_and_picture(tmp_path, capsys):
     said = capsys.readouterr().out
     (force,) = (line for line in said.splitlines() if line.startswith("force "))
     assert "±" in force
-    assert "young +1" in force
+    assert "stroke +1" in force
     with out.open() as file:
         rows = {row["parameter"]: row for row in csv.DictReader(file)}
     assert rows["young"]["unit"] == "MPa"
