@@ -179,18 +179,19 @@ class NetworkEnergy:
     def forces(self, stresses: torch.Tensor) -> torch.Tensor:
         """Forces (s, c, 2, m + 1), N/mm, of Piola-Kirchhoff stresses P at the points, (s, q, 2, 2), MPa."""
         count = len(stresses)
-        found = stresses.new_zeros(self.basis.windows.count, self.basis.per_window, count, 2)
+        found = stresses.new_zeros(self.basis.windows.count, 2 * count, self.basis.per_window)
         if stresses.any():
             weighted = (self.weights[:, None, None] * stresses).permute(3, 1, 0, 2).contiguous()
 
             def task(number: int) -> tuple[torch.Tensor, torch.Tensor]:
                 patch, along = self.patches[number], self._along(number)
-                here = along.flatten(2).flatten(0, 1).T @ weighted[:, patch.rows].flatten(0, 1).flatten(1)
-                return patch.near, here.view(len(patch.near), -1, count, 2)
+                # In this order the product takes half of the time.
+                here = weighted[:, patch.rows].flatten(0, 1).flatten(1).T @ along.flatten(2).flatten(0, 1)
+                return patch.near, here.view(2 * count, len(patch.near), -1).transpose(0, 1)
 
             for near, here in imap_in_threads(task, range(len(self.patches))):
                 found.index_add_(0, near, here)
-        return found.permute(2, 0, 3, 1).contiguous()
+        return found.view(len(found), count, 2, -1).transpose(0, 1).contiguous()
 
     def with_neuron_slopes(self, output: torch.Tensor) -> tuple[float, torch.Tensor]:
         """The energy of an output layer (c, 2, m + 1), and its derivatives by the neurons, (3, m, c)."""

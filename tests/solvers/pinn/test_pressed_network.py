@@ -12,6 +12,7 @@ from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import pressed_network
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.finite_basis.pressed_network import PENETRATION, PressedNetwork
+from solvers.pinn.finite_basis.solver import estimated_error
 from solvers.problem import Load, Material, Problem
 
 LOCAL = PinnLocalSolver(wall_spacing=0.7, corner_spacing=0.1, tolerance=0.1)
@@ -50,6 +51,17 @@ def test_displacement_and_force_are_those_of_finite_elements(local, fem):
     assert apart(local, fem) < 0.01
     np.testing.assert_allclose(local.reaction, fem.reaction, atol=0.02 * np.linalg.norm(fem.reaction))
     assert local.energy == pytest.approx(fem.energy, rel=0.02)
+
+
+@pytest.mark.parametrize(("order", "seen"), [(1.0, 2.0), (2.0, 2.0), (3.5, 3.5), (9.0, 6.0)])
+def test_three_levels_show_the_order_of_convergence(order, seen):
+    """Of errors C h^p the last one, with p between 2 and 6; two levels are taken to be of second order."""
+    scales = np.array([1.7**2, 1.7, 1.0])
+    changes = -np.diff(0.3 * scales**order)
+    last = changes[-1] / (1.7**seen - 1)
+    assert estimated_error(list(changes), list(scales)) == pytest.approx(last, rel=1e-6)
+    assert estimated_error(list(changes[:1]), list(scales[:2])) == pytest.approx(changes[0] / (1.7**2 - 1))
+    assert estimated_error([], [1.0]) == np.inf
 
 
 def test_the_cylinder_only_presses_and_is_not_entered(local, problem):
