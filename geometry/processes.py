@@ -7,6 +7,7 @@ Not `pebble.ProcessPool`: when the program is killed its workers go on until the
 interrupted they are killed before they can save their state, and they cannot report progress.
 """
 
+import gc
 import logging
 import os
 import pickle
@@ -17,8 +18,9 @@ import sys
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, MutableMapping
-from contextlib import suppress
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Mapping, MutableMapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from ctypes import CDLL
 from dataclasses import dataclass
 from math import inf
@@ -71,6 +73,7 @@ class Pool:
     def __init__(self, count: int, *, threads: int = 1, captured: bool = False) -> None:
         self._count, self._threads, self._captured = count, threads, captured
         self._idle: list[_Child] = []
+        self._abandoned, self._abandon = Pipe(duplex=False)  # A message ends all tasks
         with suppress(ValueError):  # outside of the main thread, where it cannot be set
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python does; PETSc ends the program at one
 
@@ -114,7 +117,9 @@ class Pool:
                     running[child.connection] = name, child, monotonic() + timeout_s
                     child.send((pickle.dumps((work, waiting.pop(name))), timeout_s))
                 left = min(end for *_, end in running.values()) - monotonic()
-                ready = wait(list(running), None if left == inf else max(left, 0.0))
+                ready = wait([*running, self._abandoned], None if left == inf else max(left, 0.0))
+                if self._abandoned in ready:
+                    return
                 for connection in [each for each in running if each in ready]:
                     name, child, _ = running[connection]
                     kind, content = child.message()
@@ -139,6 +144,34 @@ class Pool:
                         yield name, ProcessFailed(None)
         finally:
             _end(child for _, child, _ in running.values())
+
+    @contextmanager
+    def beside(
+        self,
+        work: Callable[[Input, Callable[..., None]], Output],
+        task: Input,
+        *,
+        report: Callable[..., None] = lambda *_: None,
+    ) -> Iterator[Future[Output | ProcessFailed]]:
+        """Run one task while the block runs, and yield its answer to come; a block that raises ends it.
+
+        Args:
+            work: See `answers`.
+            task: See `answers`.
+            report: Called in another thread with what the task reports.
+        """
+
+        def answer() -> Output | ProcessFailed:
+            for _, found in self.answers(work, {"": task}, report=lambda _, *said: report(*said)):
+                return found
+            return ProcessFailed(None)  # Abandoned: nobody asks any more
+
+        with ThreadPoolExecutor(1) as thread:
+            try:
+                yield thread.submit(answer)
+            except BaseException:
+                self._abandon.send(None)
+                raise
 
     def stop(self) -> None:
         """End the processes that wait for work."""
@@ -288,6 +321,7 @@ def serve() -> None:
     finally:
         ending.set()
         shutil.rmtree(os.environ["TMPDIR"], ignore_errors=True)
+        gc.freeze()  # the parent waits for the end, which would take a second to look for garbage
 
 
 def _listen(

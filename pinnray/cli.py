@@ -3,6 +3,8 @@
 The commands, which take most of a second to import, are imported when Ctrl-C no longer gives a traceback.
 """
 
+import atexit
+import gc
 import os
 import sys
 
@@ -17,6 +19,7 @@ And so the sums have one order, whatever the number of cores. Read when NumPy an
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry of `pinnray`."""
+    atexit.register(gc.freeze)  # the end would look for garbage among all that the libraries hold: a second
     with ending_at_once():
         from pinnray.commands.app import pinnray
         from pinnray.commands.launch import launched

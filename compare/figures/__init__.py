@@ -6,7 +6,7 @@ run without pictures starts fast.
 
 import gc
 from collections.abc import Callable, Collection, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,31 +48,31 @@ class Beside:
     """Pictures that another process draws."""
 
     names: Collection[str]
-    drawn: Future[list[tuple[str, "dict[str, Picture] | ProcessFailed"]]]
+    drawn: Future["dict[str, Picture] | ProcessFailed"]
 
     def pictures(self) -> dict[str, Picture]:
         """The pictures by their names; none of a process that failed, which this one then draws."""
-        ((_, answer),) = self.drawn.result()
+        answer = self.drawn.result()
         return {} if isinstance(answer, ProcessFailed) else answer
 
 
 @contextmanager
 def fields_beside(
-    folder: Path, comparison: Results, formats: Collection[str], processes: int
+    folder: Path, comparison: Results, formats: Collection[str], pool: Pool | None
 ) -> Iterator[Beside | None]:
-    """Begin the pictures of fields in a second process, if there may be one and they take longer than it.
+    """Begin the pictures of fields in a second process, if there is a pool and they take longer than it.
 
     One PDF of all pictures needs them here.
     """
-    if processes < 2 or "pdf" in formats or len(comparison.mesh.points) < LARGE:
+    if not pool or "pdf" in formats or len(comparison.mesh.points) < LARGE:
         yield None
         return
     from compare.figures.fields import QUANTITIES
 
     names = [quantity.name for quantity in QUANTITIES]
-    with Pool(1) as pool, ThreadPoolExecutor(1) as thread:
-        task = {"pictures": (folder, comparison, names, formats)}
-        yield Beside(names, thread.submit(lambda: list(pool.answers(_drawn_for_parent, task))))
+    task = (folder, comparison, names, formats)
+    with pool.beside(_drawn_for_parent, task) as drawn:
+        yield Beside(names, drawn)
 
 
 def _drawn_for_parent(

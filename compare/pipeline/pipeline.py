@@ -23,7 +23,7 @@ from compare.evaluation.truths import (
 from compare.figures import Picture, draw_all, fields_beside
 from compare.pipeline.job import Job, checked
 from compare.pipeline.shared_mesh import shared_mesh, write_rounds
-from compare.pipeline.solving import ERRORS, solve_all
+from compare.pipeline.solving import ERRORS, second_process, solve_all
 from compare.report.html_report import write_report
 from compare.report.output_files import metrics, write_vtu
 from compare.report.tables import write_markers, write_summary, write_table_one
@@ -34,6 +34,7 @@ from geometry.atomic import write_json
 from geometry.content_hash import file_digest
 from geometry.errors import UserError
 from geometry.observations import Observations
+from geometry.processes import Pool
 from solvers.problem import Problem
 from solvers.shared_work import SharedWork
 from solvers.solver import Solver, Traits
@@ -49,10 +50,11 @@ def run(job: Job, stages: Stages) -> Results:
     """
     job = checked(job)
     check_output(job.out)
-    with replaced_folder(job.out, keep=job.names if job.resume else ()) as folder:
+    kept = job.names if job.resume else ()
+    with replaced_folder(job.out, keep=kept) as folder, second_process(job) as pool:
         if not isinstance(job.measurements, Film):
-            comparison = compute(job, stages, folder)
-            _write(folder, job, comparison, stages)
+            comparison = compute(job, stages, folder, pool)
+            _write(folder, job, comparison, stages, pool)
             return comparison
         # They need OpenCV.
         from compare.camera.predicted_frame import predicted_frame
@@ -71,14 +73,14 @@ def run(job: Job, stages: Stages) -> Results:
                 watch=lambda frame, _: last.append(frame),
             )
         photographs = track_figures(track, tracking)
-        comparison = compute(replace(job, measurements=measurements), stages, folder)
+        comparison = compute(replace(job, measurements=measurements), stages, folder, pool)
         comparison = replace(comparison, warnings=[*tracking.warnings, *comparison.warnings])
         photographs.append(predicted_frame(track, comparison, tracking, last[0].image))
-        _write(folder, job, comparison, stages, photographs)
+        _write(folder, job, comparison, stages, pool, photographs)
     return comparison
 
 
-def compute(job: Job, stages: Stages, folder: Path) -> Results:
+def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) -> Results:
     """Mesh, solve and evaluate a checked job without film; solutions and checkpoints go into the folder.
 
     Raises:
@@ -107,7 +109,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Results:
                 solvers, without = _without_markers(solvers, job.spare, error)
                 unsupported |= without
                 observations, remarks = no_displacements(problem, radius, str(error)), [f"no truth: {error}"]
-    outcome = solve_all(job, solvers, problem, observations, folder, stages)
+    outcome = solve_all(job, solvers, problem, observations, folder, stages, pool)
     with stages.stage("checks"):
         evaluations, impossible = with_body_checks(list(outcome.evaluations.values()), mesh, truth)
         evaluations, branches = with_branches(evaluations, problem)
@@ -163,14 +165,19 @@ def _without_markers(
 
 
 def _write(
-    folder: Path, job: Job, comparison: Results, stages: Stages, photographs: Sequence[Picture] = ()
+    folder: Path,
+    job: Job,
+    comparison: Results,
+    stages: Stages,
+    pool: Pool | None,
+    photographs: Sequence[Picture] = (),
 ) -> None:
     """Write every file of a comparison but its solutions; photographs of the tracking are for the report."""
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
     figures = folder / "figures"
-    with fields_beside(figures, comparison, job.picture_formats, job.processes) as beside:
+    with fields_beside(figures, comparison, job.picture_formats, pool) as beside:
         with stages.stage("fields"), SharedWork().used():
             for evaluation in comparison.shown_fields:
                 write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)

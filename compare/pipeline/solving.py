@@ -4,11 +4,14 @@ The two kinds share no work. On a large mesh they run in two processes, where th
 """
 
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+
+from threadpoolctl import threadpool_limits
 
 from compare.evaluation.certification import with_certificates
 from compare.evaluation.evaluation import Evaluation
@@ -41,7 +44,10 @@ ERRORS = "errors"
 """Folder of the tracebacks of solvers that raised an exception."""
 
 LARGE = 5000
-"""Nodes of a mesh from which a second process gains more than its start, 3 s, takes."""
+"""Nodes of a mesh from which a second process gains more than its start takes."""
+
+SHARE = max(1, cores() // 2)
+"""Threads of the linear algebra in each of two processes."""
 
 Stage = Callable[[str], AbstractContextManager[Progress]]
 """Begins a stage of a run, as `Stages.stage`."""
@@ -56,6 +62,11 @@ class Outcome:
     failed: dict[str, str] = field(default_factory=dict)  #: Reasons of those that have no result.
 
 
+def second_process(job: Job) -> AbstractContextManager[Pool | None]:
+    """The pool of a second process for a job, with half of the cores; None where it may have only one."""
+    return Pool(1, threads=SHARE) if job.processes > 1 else nullcontext()
+
+
 def solve_all(
     job: Job,
     solvers: Sequence[Solver],
@@ -63,11 +74,12 @@ def solve_all(
     observations: Observations,
     folder: Path,
     stages: Stages,
+    pool: Pool | None = None,
 ) -> Outcome:
     """Solve the problem with every solver, or take over the results of an earlier run.
 
     Solutions and checkpoints go into the folder as they are finished. Only some solvers are given the
-    observations.
+    observations. A pool is of a second process.
 
     Raises:
         UserError: If a solver refuses, the reference fails, or all fail.
@@ -76,15 +88,12 @@ def solve_all(
     others = [each for each in solvers if each not in linear]
     # A class of the calling script is unknown to other processes.
     elsewhere = all(type(each).__module__ != "__main__" for each in solvers)
-    if job.processes > 1 and elsewhere and linear and others and len(problem.mesh.points) >= LARGE:
-        outcome = _in_two_processes(
-            {
-                # Without the solvers of the other part, which would be imported there.
-                name: _Part(replace(job, solvers=own), own, problem, observations, folder)
-                for name, own in (("linear solvers", linear), ("solvers of finite strain", others))
-            },
-            stages,
+    if pool and elsewhere and linear and others and len(problem.mesh.points) >= LARGE:
+        # Without the solvers of the other part, which would be imported there.
+        here, there = (
+            _Part(replace(job, solvers=own), own, problem, observations, folder) for own in (linear, others)
         )
+        outcome = _beside_each_other(here, there, stages, pool)
     else:
         outcome = _Part(job, solvers, problem, observations, folder).outcome(stages.stage)
     if outcome.failed and not outcome.evaluations:
@@ -93,30 +102,42 @@ def solve_all(
     return Outcome(*({name: each[name] for name in names if name in each} for each in vars(outcome).values()))
 
 
-def _in_two_processes(parts: "Mapping[str, _Part]", stages: Stages) -> Outcome:
-    """Solve every part in a process of its own, whose stages follow each other."""
-    outcome = Outcome()
-    shown: dict[tuple[str, str], Progress] = {}
-    ends = {name: ExitStack() for name in parts}
+def _beside_each_other(own: "_Part", other: "_Part", stages: Stages, pool: Pool) -> Outcome:
+    """Solve a part in this process, which has imported its libraries, and another one in a second process."""
+    shown, last = dict[str, Progress](), ExitStack()
 
-    def report(part: str, stage: str, fraction: float, note: str) -> None:
-        if (part, stage) not in shown:
-            ends[part].close()
-            shown[part, stage] = ends[part].enter_context(stages.stage(stage))
-        shown[part, stage](fraction, note)
+    def told(stage: str, fraction: float, note: str) -> None:
+        if stage not in shown:
+            last.close()
+            shown[stage] = last.enter_context(stages.stage(stage))
+        shown[stage](fraction, note)
 
-    with (
-        Pool(len(parts), threads=max(1, cores() // len(parts))) as pool,
-        closing(pool.answers(_answered, parts, report=report)) as answers,
-    ):
-        for name, answer in answers:
-            if isinstance(answer, ProcessFailed):
-                raise UserError(f"{name}: {answer.message}; a resumed run goes on from what was finished")
-            if isinstance(answer, UserError):
-                raise answer
-            ends[name].close()
-            for ours, theirs in zip(vars(outcome).values(), vars(answer).values(), strict=True):
-                ours.update(theirs)
+    def theirs() -> Outcome:
+        found = answer.result()
+        if isinstance(found, ProcessFailed):
+            raise UserError(
+                f"solvers of finite strain: {found.message}; a resumed run goes on from what was finished"
+            )
+        if isinstance(found, UserError):
+            raise found
+        return found
+
+    @contextmanager
+    def stage(name: str) -> Iterator[Progress]:
+        with stages.stage(name) as progress:
+
+            def checked(fraction: float, note: str) -> None:
+                progress(fraction, note)
+                if answer.done():
+                    theirs()
+
+            yield checked
+
+    with threadpool_limits(SHARE), pool.beside(_answered, other, report=told) as answer:
+        answer.add_done_callback(lambda _: last.close())
+        outcome = own.outcome(stage)
+        for ours, more in zip(vars(outcome).values(), vars(theirs()).values(), strict=True):
+            ours.update(more)
     return outcome
 
 
@@ -129,9 +150,11 @@ def _answered(part: "_Part", report: Callable[..., None]) -> Outcome | UserError
         return nullcontext(partial(report, name))
 
     try:
-        return part.outcome(stage)
+        outcome = part.outcome(stage)
     except UserError as error:
         return UserError(str(error))
+    import_module("compare.figures.gallery")  # while the other part goes on: this process draws next
+    return outcome
 
 
 @dataclass(frozen=True)

@@ -110,6 +110,10 @@ class Stepping(FemNonlinearSolver):
     def coarser(self, problem: Problem) -> None:
         """None; see `FemNonlinearSolver`."""
 
+    def exact_from(self, problem: Problem) -> float:
+        """Zero; see `FemNonlinearSolver`."""
+        return 0.0
+
 
 def stepping(solver: Solver, strokes: int) -> Solver:
     """The solver of finite strain with its load steps at equal strokes, where it needs no shorter ones."""

@@ -26,9 +26,9 @@ further away is of another branch."""
 CARRIED = 40
 """Newton iterations from an equilibrium on coarser elements; the first ones undo stretching of thin walls."""
 PENETRATION, ROUGH = 1e-5, 1e-3
-"""Largest gap of a node in contact and penetration of any node, mm; on the way of a rough path."""
+"""Largest gap of a node in contact and penetration of any node, mm, and the same where near will do."""
 ROUGH_TOLERANCE = 1e-4
-"""Largest residual force over the largest internal force on the way of a rough path."""
+"""Largest residual force over the largest internal force where near will do."""
 SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
 """A finger whose contact is so many times stiffer than itself takes a step first with a contact that is only
 SOFTEST times as stiff, which is hardened by factors of at most HARDER. For a node leaves the contact within
@@ -55,8 +55,8 @@ class LoadPath:
         guide: States of a simpler model at fractions of the load: each step starts from the last state plus
             the guide's change.
         iterative: Whether multigrid solves with the tangent, not factors.
-        rough: Whether equilibria need be near only, as on the way to one that is found from the last of them.
-            The rest are settings of `FemNonlinearSolver`.
+        exact_from: Fraction of the load before which the equilibria need be near only. The rest are settings
+            of `FemNonlinearSolver`.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class LoadPath:
         *,
         guide: Callable[[float], LoadState] | None = None,
         iterative: bool = False,
-        rough: bool = False,
+        exact_from: float = 0.0,
         first_step: float,
         max_step: float,
         min_step: float,
@@ -77,11 +77,12 @@ class LoadPath:
         self._first_step, self._min_step, self.space, self._guide = first_step, min_step, space, guide
         method: LinearSolver = "iterative" if iterative else "direct"
         self.equilibrium = DiscreteEquilibrium(problem, space, constraints, method)
-        if rough:
-            tolerance = max(tolerance, ROUGH_TOLERANCE)
-        self._penetration = ROUGH if rough else PENETRATION
-        self._begin = partial(ConstrainedNewton, self.equilibrium, tolerance, max_iterations=max_iterations)
-        self._newton = self._begin()
+        self._begin = partial(
+            ConstrainedNewton, self.equilibrium, tolerance=tolerance, max_iterations=max_iterations
+        )
+        self._newton, self._exact_from = self._begin(), exact_from
+        rough = self._begin(tolerance=max(tolerance, ROUGH_TOLERANCE)) if exact_from > 0 else None
+        self._rough = rough  # For equilibria that need be near only
         contact = self.equilibrium.contact
         self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
         self._softer: list[float] | None = [] if contact is None else None  # Until it is needed
@@ -94,6 +95,8 @@ class LoadPath:
     def close(self) -> None:
         """Free what PETSc holds, on all ranks at once."""
         self._newton.close()
+        if self._rough is not None:
+            self._rough.close()
         self.equilibrium.factors.destroy()
 
     def follow(self, progress: Progress) -> None:
@@ -217,14 +220,16 @@ class LoadPath:
 
     def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
         """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""
-        hardest, final = 0, self.equilibrium.contact
+        hardest, final, newton, apart = 0, self.equilibrium.contact, self._newton, PENETRATION
+        if self._rough is not None and guess.fraction < self._exact_from:
+            newton, apart = self._rough, ROUGH
         if self._softer is None and final is not None:
             self._softer = self._ever_harder(final)
         softer = [replace(final, stiffness=each) for each in self._softer or ()] if final is not None else []
         for contact in (*softer, final):
             self.equilibrium.contact = contact
             for _ in range(30 if contact is final else 1):
-                result = self._newton.solve(guess)
+                result = newton.solve(guess)
                 self._iterations += result.iterations
                 hardest = max(hardest, result.iterations)
                 if not result.converged:
@@ -233,7 +238,7 @@ class LoadPath:
                 if contact is None:
                     return result.state, hardest
                 guess, off = contact.settled(result.state)
-                if contact is final and off <= self._penetration:
+                if contact is final and off <= apart:
                     return guess, hardest
         self._reason = "the contact does not settle"
         return None, hardest

@@ -34,7 +34,7 @@ def coarser(problem: Problem) -> Problem | None:
     except UserError:  # a wall is too thin for that
         mesh = finger_mesh(problem.finger, settings=settings, across=1)
     same_body = np.isclose(mesh.areas.sum(), problem.mesh.areas.sum(), rtol=1e-2)
-    fewer = 2 * len(mesh.triangles) < len(problem.mesh.triangles)
+    fewer = 3 * len(mesh.triangles) < 2 * len(problem.mesh.triangles)
     return replace(problem, mesh=mesh) if same_body and fewer else None
 
 

@@ -59,6 +59,10 @@ class FemNonlinearSolver(ElementSettings):
         """The problem on the coarse elements on which the load is followed; None for the given ones."""
         return None if problem.load.friction else coarser(problem)  # friction depends on the way
 
+    def exact_from(self, problem: Problem) -> float:
+        """Fraction of the load before which the equilibria on the way need be near only; see `LoadPath`."""
+        return 1.0 if problem.load.kind == "cylinder" and not problem.load.friction else 0.0
+
     def path(
         self,
         problem: Problem,
@@ -72,7 +76,7 @@ class FemNonlinearSolver(ElementSettings):
             problem,
             space,
             constraints,
-            rough=rough,
+            exact_from=np.inf if rough else self.exact_from(problem),
             first_step=self.first_step,
             max_step=self.max_step,
             min_step=self.min_step,

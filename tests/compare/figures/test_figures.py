@@ -21,7 +21,7 @@ from compare.figures.overlay import overlay_extent
 from geometry.errors import UserError
 from geometry.figure import DPI, NOTEBOOK_DPI, WIDTH
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.processes import ProcessFailed
+from geometry.processes import Pool, ProcessFailed
 from solvers.problem import Problem
 from tests.compare.figures.drawn_pages import Page, page_of
 
@@ -110,10 +110,10 @@ def test_a_second_process_draws_fields_as_this_one_and_its_end_does_not_lose_the
     alone, died = tmp_path / "alone", ProcessFailed(-9)
     expected = [replace(each, path=each.path.name) for each in draw_all(alone, comparison)]
     for place, lost in ((tmp_path / "beside", False), (tmp_path / "lost", True)):
-        with fields_beside(place, comparison, (), 2) as beside:
+        with Pool(1) as pool, fields_beside(place, comparison, (), pool) as beside:
             assert beside is not None
             if lost:
-                monkeypatch.setattr(beside.drawn, "result", lambda: [("pictures", died)])
+                monkeypatch.setattr(beside.drawn, "result", lambda: died)
             pictures = draw_all(place, comparison, beside=beside)
         assert [replace(each, path=each.path.name) for each in pictures] == expected
         for each in expected:
@@ -121,8 +121,8 @@ def test_a_second_process_draws_fields_as_this_one_and_its_end_does_not_lose_the
 
 
 def test_fields_are_drawn_here_where_a_second_process_would_not_help(comparison, tmp_path):
-    for formats, processes in (((), 1), (("pdf",), 2), ((), 2)):  # the last: the mesh is small
-        with fields_beside(tmp_path, comparison, formats, processes) as beside:
+    for formats, pool in (((), None), (("pdf",), Pool(1)), ((), Pool(1))):  # the last: the mesh is small
+        with fields_beside(tmp_path, comparison, formats, pool) as beside:
             assert beside is None
 
 

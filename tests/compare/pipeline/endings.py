@@ -72,7 +72,8 @@ class Said:
 def main() -> None:
     """The program; its classes must not be of `__main__`, which other processes do not know."""
     solving.LARGE = 0
-    solvers = Ending("waiting", laws=("linear",)), Ending(sys.argv[2])
+    solvers = Ending("reporting", laws=("linear",)), Ending(sys.argv[2])
     with interruptible():
         made = Job(DESIGN, solvers, processes=2)
-        solving.solve_all(made, solvers, PROBLEM, MARKERS, Path(sys.argv[1]), Said())  # type: ignore[arg-type]
+        with solving.second_process(made) as pool:
+            solving.solve_all(made, solvers, PROBLEM, MARKERS, Path(sys.argv[1]), Said(), pool)  # type: ignore[arg-type]

@@ -39,7 +39,8 @@ def solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tupl
         folder.mkdir(exist_ok=True)
         job = replace(Job(DESIGN, solvers, out=folder / "out", processes=processes), **changes)
         stages = Stages(quiet=True)
-        return solve_all(job, solvers, PROBLEM, MARKERS, folder, stages), stages.seconds
+        with solving.second_process(job) as pool:
+            return solve_all(job, solvers, PROBLEM, MARKERS, folder, stages, pool), stages.seconds
 
     return run
 
@@ -113,7 +114,7 @@ def test_a_refusal_in_the_second_process_is_one_line_of_the_first(solve, name, c
 )
 def test_the_end_of_a_second_process_is_one_line_of_the_first(solve, name, message):
     with pytest.raises(UserError, match=message):
-        solve(2, Ending("waiting", laws=("linear",)), Ending(name))
+        solve(2, Ending("reporting", laws=("linear",)), Ending(name))
 
 
 @pytest.mark.parametrize(
