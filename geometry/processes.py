@@ -166,6 +166,8 @@ class Pool:
                 return found
             return ProcessFailed(None)  # Abandoned: nobody asks any more
 
+        if not self._idle:  # here: the system takes the end of a thread for that of its processes' parent
+            self._idle.append(_Child(self._threads, self._captured))
         with ThreadPoolExecutor(1) as thread:
             try:
                 yield thread.submit(answer)

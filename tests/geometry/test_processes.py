@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from geometry.processes import Pool, ProcessFailed, child_environment
+from geometry.processes import Pool, ProcessFailed, child_environment, end_with_parent
 from pinnray.commands.launch import guarded
 from solvers.solver import Progress
 
@@ -50,6 +50,11 @@ def die_once(folder: Path, progress: Progress) -> str:
 
 
 def process_number(_: object, progress: Progress) -> int:
+    return os.getpid()
+
+
+def bound_process(_: object, progress: Progress) -> int:
+    end_with_parent()
     return os.getpid()
 
 
@@ -204,3 +209,27 @@ def test_a_warning_of_several_processes_is_one_line_once(capfd):
         warnings.simplefilter("default")  # Python's own, which pytest replaces
         assert guarded(lambda: len(answers_of(warning, {"a": 1, "b": 2, "c": 3}))) == 3
     assert capfd.readouterr().err == "warning: the disk is full\n"
+
+
+def test_a_process_beside_this_one_stays_for_the_next_task():
+    """The system ends processes with the thread that made them: it is not the one that waits."""
+    with Pool(1) as pool:
+        found = []
+        for _ in range(2):
+            with pool.beside(bound_process, None) as answer:
+                found.append(answer.result())
+            time.sleep(0.1)
+    assert found[0] == found[1]
+
+
+def test_a_task_beside_a_block_that_raises_saves_its_state(tmp_path):
+    said: list[str] = []
+
+    def block() -> None:
+        with Pool(1) as pool, pool.beside(endless, tmp_path, report=lambda _, note: said.append(note)):
+            until(lambda: bool(said))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        block()
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["saved"]
