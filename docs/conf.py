@@ -58,7 +58,7 @@ nitpick_ignore_regex = [
     ),
     ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|(.*\.)?T|.*Options)"),
     ("py:.*", r"compare\.(runtime|figures|camera|crossval|evaluation\.truths)\..*"),
-    ("py:.*", r"geometry\.(finger\.(rules|parameters)|drawing\.placement)\..*"),
+    ("py:.*", r"geometry\.(finger\.(rules|parameters)|drawing\.placement|processes)\..*"),
     ("py:.*", r"(pinnray\.observations|studies|vision)\..*"),
     ("py:.*", r"solvers\.fem\.adaptive_refinement\..*"),
 ]

@@ -76,7 +76,7 @@ def coarse_mesh() -> TriangleMesh:
 @pytest.fixture(scope="session")
 def usual_mesh() -> TriangleMesh:
     """The same with the three elements across walls that a user has."""
-    return finger_mesh(Design(), settings=MeshSettings(size=1.0))
+    return finger_mesh(Design(), settings=MeshSettings(size=1.0), across=3)
 
 
 @pytest.fixture

@@ -35,7 +35,7 @@ def marked_mesh() -> TriangleMesh:
 @pytest.fixture(scope="session")
 def medium_mesh() -> TriangleMesh:
     """The default finger with elements of 0.5 mm."""
-    return finger_mesh(Design(), settings=MeshSettings(size=0.5))
+    return finger_mesh(Design(), settings=MeshSettings(size=0.5), across=3)
 
 
 @pytest.fixture(scope="session")

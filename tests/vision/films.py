@@ -37,7 +37,7 @@ def bent(points: FloatArray) -> FloatArray:
 @cache
 def recording(*, design: Design = DESIGN, hidden: int | None = None, tilt: float = 5.0) -> Recording:
     """Three frames at rest and three bent, with a jump between; a cable before one marker, if asked for."""
-    mesh = finger_mesh(design, settings=MeshSettings(size=1.0))
+    mesh = finger_mesh(design, settings=MeshSettings(size=1.0), across=3)
     where = None if hidden is None else (mesh.markers + bent(mesh.markers))[hidden]
     cover = [] if where is None else [cable(where, DESIGN.marker_radius, 1.2)]
     return Recording(

@@ -221,7 +221,8 @@ class LoadPath:
     def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
         """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""
         hardest, final, newton, apart = 0, self.equilibrium.contact, self._newton, PENETRATION
-        if self._rough is not None and guess.fraction < self._exact_from:
+        rubs = final is not None and final.coefficient > 0  # friction depends on the way
+        if self._rough is not None and guess.fraction < self._exact_from and not rubs:
             newton, apart = self._rough, ROUGH
         if self._softer is None and final is not None:
             self._softer = self._ever_harder(final)

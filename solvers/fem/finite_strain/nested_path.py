@@ -16,10 +16,10 @@ COARSE, ACROSS, FINE = 1.0, 2, 3000
 """Size of coarse elements, mm; their least number through a wall; triangles from which on they are used."""
 
 
-def coarser(problem: Problem) -> Problem | None:
+def coarser(problem: Problem, most: float = 0.5) -> Problem | None:
     """The problem on elements of the size `COARSE`; through walls that are thin for it, on one element.
 
-    None where its own mesh has not many more, or is of another body.
+    None where these are more than a share `most` of its own, or its mesh is of another body.
     """
     if problem.mesh.moduli is not None:  # which the coarse mesh would lack
         return None
@@ -34,7 +34,7 @@ def coarser(problem: Problem) -> Problem | None:
     except UserError:  # a wall is too thin for that
         mesh = finger_mesh(problem.finger, settings=settings, across=1)
     same_body = np.isclose(mesh.areas.sum(), problem.mesh.areas.sum(), rtol=1e-2)
-    fewer = 3 * len(mesh.triangles) < 2 * len(problem.mesh.triangles)
+    fewer = len(mesh.triangles) < most * len(problem.mesh.triangles)
     return replace(problem, mesh=mesh) if same_body and fewer else None
 
 

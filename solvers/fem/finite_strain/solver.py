@@ -20,6 +20,8 @@ from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
 from solvers.solver import ElementSettings, Progress, check_problem, silent
 
+MOST = 2 / 3
+"""Coarse elements over the given ones up to which the load is followed on them."""
 ITERATIONS = 40
 """Newton iterations from given displacements."""
 
@@ -57,11 +59,11 @@ class FemNonlinearSolver(ElementSettings):
 
     def coarser(self, problem: Problem) -> Problem | None:
         """The problem on the coarse elements on which the load is followed; None for the given ones."""
-        return None if problem.load.friction else coarser(problem)  # friction depends on the way
+        return None if problem.load.friction else coarser(problem, MOST)  # friction depends on the way
 
     def exact_from(self, problem: Problem) -> float:
         """Fraction of the load before which the equilibria on the way need be near only; see `LoadPath`."""
-        return 1.0 if problem.load.kind == "cylinder" and not problem.load.friction else 0.0
+        return 1.0 if problem.load.kind == "cylinder" else 0.0
 
     def path(
         self,

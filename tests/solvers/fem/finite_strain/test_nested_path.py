@@ -30,7 +30,7 @@ LOADS = {
 def plainly(problem):
     """The solution by the path on the given elements alone."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(solver, "coarser", lambda _: None)
+        patched.setattr(solver, "coarser", lambda *_: None)
         return SOLVER.solve(problem)
 
 
