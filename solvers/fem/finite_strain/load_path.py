@@ -89,6 +89,7 @@ class LoadPath:
         self.points = [self.equilibrium.rest]
         self.left = 0  # Number of unstable equilibria that were left for a stable one
         self._halved = self._iterations = 0  # Failed steps; Newton iterations of all steps
+        self._tangent = False  # Whether the tangent of the last equilibrium stands factorised
         self._weights: csr_matrix | None = None  # Of coarser nodes at this path's
         self._reason = ""  # Why the last failed step failed, for Newton's method in PETSc's word
 
@@ -144,7 +145,8 @@ class LoadPath:
         size = np.abs(guess.nodal).max()
         if found is None or np.abs(found.nodal - guess.nodal).max() > BESIDE * size:
             return False
-        self.equilibrium.factorise(found)
+        if not self._tangent:
+            self.equilibrium.factorise(found)
         if self.equilibrium.unstable:
             return False
         self.points.append(found)
@@ -232,7 +234,7 @@ class LoadPath:
             for _ in range(30 if contact is final else 1):
                 result = newton.solve(guess)
                 self._iterations += result.iterations
-                hardest = max(hardest, result.iterations)
+                hardest, self._tangent = max(hardest, result.iterations), result.tangent
                 if not result.converged:
                     self._reason, self.equilibrium.contact = f"SNES: {result.reason}", final
                     return None, hardest

@@ -17,6 +17,11 @@ class NewtonResult(NamedTuple):
     converged: bool  # Whether the state is in equilibrium
     reason: str  # PETSc's word for the end, in lower case
     iterations: int  # Newton steps taken
+    tangent: bool  # Whether the tangent factorised last is as good as that of the state
+
+
+TANGENT = 1e-3
+"""Largest residual, over the largest internal force, of a state whose tangent stands for that of equilibrium."""
 
 
 class ConstrainedNewton:
@@ -34,8 +39,8 @@ class ConstrainedNewton:
     def __init__(self, equilibrium: DiscreteEquilibrium, tolerance: float, max_iterations: int) -> None:
         self._equilibrium, self._tolerance = equilibrium, tolerance
         self._scale, self._state = equilibrium.problem.stiffest, equilibrium.rest
-        self._size = 0.0
-        self._torn = self._near = self._kept = False
+        self._size = self._off = 0.0
+        self._torn = self._near = self._kept = self._tangent = False
         self._part = equilibrium.matrix.createVecRight()
         comm = equilibrium.distributed.comm
         self._last = comm.size - 1
@@ -68,16 +73,16 @@ class ConstrainedNewton:
     def solve(self, guess: LoadState) -> NewtonResult:
         """Find equilibrium at the guess's fraction of the load and multipliers of the contact."""
         self._state, self._torn = guess, not self._equilibrium.admissible(guess.nodal)
-        self._kept = False
+        self._kept = self._tangent = False
         if self._torn:
-            return NewtonResult(guess, False, "diverged_function_domain", 0)
+            return NewtonResult(guess, False, "diverged_function_domain", 0, False)
         self._join(guess.nodal, guess.forces, self._unknown)
         self._snes.solve(None, self._unknown)
         reason = self._snes.getConvergedReason()
         words = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if name[0] != "_"}
         word = "diverged_function_domain" if self._torn else words[reason].lower()
         iterations = self._snes.getIterationNumber()
-        return NewtonResult(self._at(self._unknown), reason > 0, word, iterations)
+        return NewtonResult(self._at(self._unknown), reason > 0, word, iterations, self._tangent)
 
     def apply(self, preconditioner: PETSc.PC, right: PETSc.Vec, step: PETSc.Vec) -> None:
         """J^-1, as PETSc calls it."""
@@ -107,6 +112,7 @@ class ConstrainedNewton:
         self._kept = self._near and not self._kept
         if not self._kept:
             self._equilibrium.factorise(self._at(unknown))
+            self._tangent = self._off <= TANGENT
 
     def _shorten(self, unknown: PETSc.Vec, step: PETSc.Vec) -> bool:
         """Halve the step, which will be subtracted, until no element is turned inside out."""
@@ -127,8 +133,9 @@ class ConstrainedNewton:
         if not np.isfinite(residual):
             return int(reasons.DIVERGED_FNORM_NAN)
         size = max(self._size, 1e-4 * self._scale)  # rounding of positions makes forces, too
-        self._near = iteration > 0 and residual <= 1e-5 * size
-        if residual <= self._tolerance * size:
+        self._off = residual / size
+        self._near = iteration > 0 and self._off <= 1e-5
+        if self._off <= self._tolerance:
             return int(reasons.CONVERGED_FNORM_RELATIVE)
         return int(reasons.CONVERGED_ITERATING)
 
