@@ -50,6 +50,7 @@ class ContactState:
     # Multipliers λ: in equilibrium the forces on the nodes of the front, shape (l m,), N/mm
     contact: FloatArray
     friction: Friction | None = field(default=None, kw_only=True)  # None without friction
+    held: bool = field(default=False, kw_only=True)  # Whether nodes with a multiplier stay, even by tension
 
 
 StateT = TypeVar("StateT", bound=ContactState)
@@ -107,8 +108,17 @@ class CylinderContact:
         return distance - self.radius, away / distance[:, None]
 
     def forces(self, state: ContactState) -> FloatArray:
-        """Forces q along the outer normals, shape (l m,), N/mm, never tension; λ is `state.contact`."""
-        return np.maximum(0.0, state.contact - self._stiffness * self.gaps(state)[0])
+        """Forces q along the outer normals, shape (l m,), N/mm, tension where held; λ is `state.contact`."""
+        forces = state.contact - self._stiffness * self.gaps(state)[0]
+        return np.where(_holds(state), forces, np.maximum(0.0, forces))
+
+    def holding(self, guess: StateT) -> StateT:
+        """A guess from which Newton's method starts: held if the extrapolation took nodes off the cylinder.
+
+        Else its first step would be that of a finger set free.
+        """
+        free = (guess.contact > 0) & (self.forces(guess) == 0)
+        return replace(guess, held=True) if free.any() else guess
 
     def started(self, equilibrium: ContactState) -> Friction | None:
         """Friction as a step begins at an equilibrium: the same; None without friction."""
@@ -172,14 +182,14 @@ class CylinderContact:
     def tangent(self, state: ContactState) -> FloatArray:
         """Derivative of the gradient by its components, (l m, 2, 2) or (l m, 3, 3).
 
-        Blocks k n n^T - q (I - n n^T) / r of the pressure with r = g + radius. Friction f along t adds
+        Blocks k n n^T - q (I - n n^T) / r of the pressure with r = g + radius; tension is not let turn. Friction f along t adds
         f radius (t n^T + n t^T) / r^2 and, where a node sticks, k J^T J with the derivative J of its place.
         """
         (gap, normal), force = self.gaps(state), self.forces(state)
         distance = gap + self.radius
         across = np.einsum("mi,mj->mij", normal, normal)
-        turning = (force / distance)[:, None, None] * (np.eye(2) - across)
-        stiffness = (force > 0) * self._stiffness
+        turning = (np.maximum(0.0, force) / distance)[:, None, None] * (np.eye(2) - across)
+        stiffness = ((force > 0) | _holds(state)) * self._stiffness
         pressing = np.asarray(stiffness[:, None, None] * across - turning)
         if state.friction is None:
             return pressing
@@ -214,6 +224,11 @@ class CylinderContact:
         shares = {2: (1 / 2, 1 / 2), 3: (1 / 6, 4 / 6, 1 / 6)}[self.edges.shape[1]]
         weights = np.outer(lengths, shares)
         return np.bincount(self.edges.ravel(), weights.ravel(), len(self.positions)).astype(np.float64)
+
+
+def _holds(state: ContactState) -> BoolArray:
+    """The nodes that stay on the cylinder even by tension, shape (l m,)."""
+    return np.asarray(state.held & (state.contact > 0))
 
 
 def _turned(normal: FloatArray) -> FloatArray:

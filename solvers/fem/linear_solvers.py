@@ -115,10 +115,14 @@ class Factorisation(StiffnessSolver):
     @property
     def negative(self) -> int:
         """Number of negative eigenvalues: of the negative pivots, by Sylvester's law of inertia."""
+        return self.output(12)
+
+    def output(self, number: int) -> int:
+        """MUMPS' global output of a number, INFOG in its guide."""
         self._ready()
         preconditioner = self._ksp.getPC()
         factors = preconditioner.getFactorMatrix()
-        found = int(factors.getMumpsInfog(12))
+        found = int(factors.getMumpsInfog(number))
         for item in (factors, preconditioner):
             item.destroy()  # petsc4py would keep the factors for ever
         return found

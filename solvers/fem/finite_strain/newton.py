@@ -72,7 +72,9 @@ class ConstrainedNewton:
 
     def solve(self, guess: LoadState) -> NewtonResult:
         """Find equilibrium at the guess's fraction of the load and multipliers of the contact."""
-        self._state, self._torn = guess, not self._equilibrium.admissible(guess.nodal)
+        contact = self._equilibrium.contact
+        self._state = guess if contact is None else contact.holding(guess)
+        self._torn = not self._equilibrium.admissible(guess.nodal)
         self._kept = self._tangent = False
         if self._torn:
             return NewtonResult(guess, False, "diverged_function_domain", 0, False)
@@ -115,7 +117,8 @@ class ConstrainedNewton:
             self._tangent = self._off <= TANGENT
 
     def _shorten(self, unknown: PETSc.Vec, step: PETSc.Vec) -> bool:
-        """Halve the step, which will be subtracted, until no element is turned inside out."""
+        """Halve the step, which will be subtracted, until no element is turned inside out; let nodes go."""
+        self._state = replace(self._state, held=False)
         start, _ = self._split(unknown)
         down, _ = self._split(step)
         length, shortest = 1.0, 2.0**-10
@@ -135,7 +138,7 @@ class ConstrainedNewton:
         size = max(self._size, 1e-4 * self._scale)  # rounding of positions makes forces, too
         self._off = residual / size
         self._near = iteration > 0 and self._off <= 1e-5
-        if self._off <= self._tolerance:
+        if self._off <= self._tolerance and not self._state.held:
             return int(reasons.CONVERGED_FNORM_RELATIVE)
         return int(reasons.CONVERGED_ITERATING)
 
