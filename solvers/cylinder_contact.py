@@ -182,8 +182,9 @@ class CylinderContact:
     def tangent(self, state: ContactState) -> FloatArray:
         """Derivative of the gradient by its components, (l m, 2, 2) or (l m, 3, 3).
 
-        Blocks k n n^T - q (I - n n^T) / r of the pressure with r = g + radius; tension is not let turn. Friction f along t adds
-        f radius (t n^T + n t^T) / r^2 and, where a node sticks, k J^T J with the derivative J of its place.
+        Blocks k n n^T - q (I - n n^T) / r of the pressure, without the last term for tension; r = g + radius.
+        Friction f along t adds f radius (t n^T + n t^T) / r^2 and, where a node sticks, k J^T J with the
+        derivative J of its place.
         """
         (gap, normal), force = self.gaps(state), self.forces(state)
         distance = gap + self.radius

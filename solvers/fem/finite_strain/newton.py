@@ -21,7 +21,7 @@ class NewtonResult(NamedTuple):
 
 
 TANGENT = 1e-3
-"""Largest residual, over the largest internal force, of a state whose tangent stands for that of equilibrium."""
+"""Largest residual, over the largest internal force, where a tangent stands for that of equilibrium."""
 
 
 class ConstrainedNewton:

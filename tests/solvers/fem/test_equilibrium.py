@@ -135,8 +135,10 @@ def test_a_guess_off_the_cylinder_is_first_held_there():
     assert not contact.forces(off).any()
     assert contact.forces(contact.holding(off)).min() < 0
     found = solver.solve(off)
-    assert found.converged and found.iterations <= 4
-    assert not found.state.held and contact.forces(found.state).min() == 0
+    assert found.converged
+    assert found.iterations <= 4
+    assert not found.state.held
+    assert contact.forces(found.state).min() == 0
     again = solver.solve(replace(pressed, nodal=1.001 * pressed.nodal))
     np.testing.assert_allclose(found.state.nodal, again.state.nodal, atol=1e-7)
 
