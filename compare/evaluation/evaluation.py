@@ -138,7 +138,8 @@ class Evaluation:
         inside, nodes = quadrature.location, LagrangeSpace(mesh, 2).at_nodes()
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             inside, nodes = (mesh.locate_on(solution.problem.mesh, place.points) for place in (inside, nodes))
-        state, displacement = solution.state(inside), solution.displacement(nodes)
+        displacement, state = solution.displacement_and_state(inside)
+        at_nodes = solution.displacement(nodes)
         markers = np.asarray(mesh.markers if markers is None else markers, dtype=np.float64)
         at_markers = solution.displacement_in_space(markers)
         known, other = solution.uncertainty, solution.problem.mesh
@@ -157,10 +158,10 @@ class Evaluation:
             },
             history={name: np.asarray(column) for name, column in solution.history.items()},
             marker_displacement=at_markers,
-            node_displacement=displacement[: len(mesh.points)],
-            edge_displacement=displacement[len(mesh.points) :],
+            node_displacement=at_nodes[: len(mesh.points)],
+            edge_displacement=at_nodes[len(mesh.points) :],
             weights=quadrature.weights,
-            displacement=solution.displacement(inside),
+            displacement=displacement,
             strain=np.ascontiguousarray(state.strain),  # as from the archive, to the last digit of a mean
             stress=state.stress,
             stress_zz=state.stress_zz,

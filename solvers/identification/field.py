@@ -10,6 +10,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.wall_motion import WallMotion
 from geometry.registration import Pictures
+from solvers.elasticity import deformation_jacobian
 from solvers.identification.body import Body
 from solvers.identification.boundary import RigidMotion
 from solvers.identification.model import Response, ResponseModel
@@ -59,8 +60,10 @@ class Snapshot:
 
     def _gradient(self, drawn: FloatArray, location: LocatedPoints) -> FloatArray:
         """`gradient` from the gradient by the drawn position without the clamp, both of shape (n, 2, 2)."""
-        walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())[location.cells]
-        gradient = drawn @ np.linalg.inv(np.eye(2) + walls)
+        walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())
+        cofactors = (1 + np.trace(walls, axis1=1, axis2=2))[:, None, None] * np.eye(2) - walls
+        inverse = cofactors / deformation_jacobian(walls)[:, None, None]
+        gradient = drawn @ inverse[location.cells]
         return np.asarray(self.clamp.rotation @ (np.eye(2) + gradient) - np.eye(2))
 
 

@@ -82,18 +82,24 @@ class FiniteBasis:
 
     def gradients(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Derivatives of `values` with respect to x and y, 1/mm, by windows: (2, n, w, m + 1)."""
-        window, window_gradient = self.windows.values_and_gradients(points, near)
-        factor, *slopes = self.constraint.at(points)
-        window_gradient = window_gradient.mul_(factor)
-        for along, slope in zip(window_gradient, slopes, strict=True):
-            along.addcmul_(slope, window)
-        window = window.mul_(factor)
+        window, window_gradient = self.constrained_windows(points, near)
         function = self._unwindowed(points, near)
         rate = (1 - function[:, 1:].square()).mul_(window[:, None])
         found = function * window_gradient[:, :, None]
         for axis in range(2):
             found[axis, :, 1:].addcmul_(rate, self.neurons[axis, :, near])
         return found.transpose(2, 3).contiguous()
+
+    def constrained_windows(
+        self, points: torch.Tensor, near: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Windows times the constraint's factor, (n, w), and their derivatives, (2, n, w), 1/mm."""
+        window, along = self.windows.values_and_gradients(points, near)
+        factor, *slopes = self.constraint.at(points)
+        along = along.mul_(factor)
+        for part, slope in zip(along, slopes, strict=True):
+            part.addcmul_(slope, window)
+        return window.mul_(factor), along
 
     def functionals(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Sums of weights (k, n) times the basis functions at points (n, 2), mm: (k, c, m + 1)."""
@@ -146,16 +152,12 @@ class FiniteBasis:
         Returns:
             Shape (3, m, w).
         """
-        window, along = self.windows.values_and_gradients(points, near)
-        factor, *slopes = self.constraint.at(points)
-        along = along.mul_(factor)
-        for part, slope in zip(along, slopes, strict=True):
-            part.addcmul_(slope, window)
+        window, along = self.constrained_windows(points, near)
         neuron = self._unwindowed(points, near)[:, 1:]
         rate = 1 - neuron.square()
         pulled = torch.einsum("nij,wim->jnmw", weights, output[:, :, 1:])
         steep = (pulled * self.neurons[:2, None, :, near]).sum(dim=0)
-        rate_in_window = rate * window.mul_(factor)[:, None]
+        rate_in_window = rate * window[:, None]
         by_argument = rate * (pulled * along[:, :, None]).sum(dim=0) - 2 * neuron * rate_in_window * steep
         found = torch.einsum("nmw,nx->xmw", by_argument, with_one(points))
         found[:2] += (pulled * rate_in_window).sum(dim=1)
@@ -208,7 +210,7 @@ class FiniteBasisField:
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        return self.basis.evaluated(location.points, self.gradient_of_patch)
+        return self.displacement_and_gradient(location)[1]
 
     def displacement_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Displacement at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2), mm."""
@@ -222,6 +224,31 @@ class FiniteBasisField:
         found.addmm_(logistic.mul_(window[:, None]).flatten(1), flat, alpha=2)
         return found
 
+    def displacement_and_gradient(self, location: LocatedPoints) -> tuple[FloatArray, FloatArray]:
+        """Both, with the windows and neurons at a point computed once."""
+        both = self.basis.evaluated(location.points, self._both_of_patch)
+        return np.ascontiguousarray(both[:, :, 2]), np.ascontiguousarray(both[:, :, :2])
+
     def gradient_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Its gradient at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2, 2)."""
-        return torch.einsum("xnwu,wiu->nix", self.basis.gradients(points, near), self.output[near])
+        return self._both_of_patch(points, near)[:, :, :2]
+
+    def _both_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+        """The gradient and, as a third column, the displacement: (n, 2, 3).
+
+        With a window g and the function N = c + sum_m c_m tanh t_m of its neurons it is the sum over windows
+        of (N ∂g + g ∂N, g N).
+        """
+        window, along = self.basis.constrained_windows(points, near)
+        neurons, output = self.basis.neurons[:, :, near], self.output[near]
+        weights, bias = neurons.flatten(1).split([2, 1])
+        # tanh(t) = 2 σ(2 t) - 1, whose derivative is 4 σ (1 - σ)
+        logistic = torch.addmm(2 * bias, points, 2 * weights).sigmoid_().view(len(points), -1, len(near))
+        constant, linear = output[:, :, :1], output[:, :, 1:]
+        start = (constant - linear.sum(dim=2, keepdim=True)).transpose(1, 2)
+        function = torch.baddbmm(start, logistic.permute(2, 0, 1), linear.transpose(1, 2), alpha=2)
+        found = torch.einsum("xnw,wni->nix", torch.cat([along, window[None]]), function)
+        rate = (1 - logistic).mul_(logistic).mul_(window[:, None])
+        steep = torch.einsum("wim,xmw->mwix", 4 * linear, neurons[:2]).flatten(2).flatten(0, 1)
+        found[:, :, :2] += (rate.flatten(1) @ steep).view(-1, 2, 2)
+        return found
