@@ -18,11 +18,22 @@ import sys
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import (
+    Callable,
+    Generator,
+    Hashable,
+    Iterable,
+    Iterator,
+    Mapping,
+    MutableMapping,
+    Sequence,
+)
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from ctypes import CDLL
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
 from math import inf
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
@@ -68,10 +79,14 @@ class Pool:
             one another on cores of others take more than they give.
         captured: Whether an interrupted process is killed at once, as it has no state to save, and what it
             writes is kept for `ProcessFailed.reason`.
+        modules: What each process imports as it starts, where it is installed.
     """
 
-    def __init__(self, count: int, *, threads: int = 1, captured: bool = False) -> None:
-        self._count, self._threads, self._captured = count, threads, captured
+    def __init__(
+        self, count: int, *, threads: int = 1, captured: bool = False, modules: Sequence[str] = ()
+    ) -> None:
+        self._count, self._captured = count, captured
+        self._child = partial(_Child, threads, captured, modules)
         self._idle: list[_Child] = []
         self._abandoned, self._abandon = Pipe(duplex=False)  # A message ends all tasks
         with suppress(ValueError):  # outside of the main thread, where it cannot be set
@@ -113,7 +128,7 @@ class Pool:
             while waiting or running:
                 while waiting and len(running) < self._count:
                     name = next(iter(waiting))
-                    child = self._idle.pop() if self._idle else _Child(self._threads, self._captured)
+                    child = self._idle.pop() if self._idle else self._child()
                     running[child.connection] = name, child, monotonic() + timeout_s
                     child.send((pickle.dumps((work, waiting.pop(name))), timeout_s))
                 left = min(end for *_, end in running.values()) - monotonic()
@@ -166,14 +181,18 @@ class Pool:
                 return found
             return ProcessFailed(None)  # Abandoned: nobody asks any more
 
-        if not self._idle:  # here: the system takes the end of a thread for that of its processes' parent
-            self._idle.append(_Child(self._threads, self._captured))
+        self.start()  # here: the system takes the end of a thread for that of its processes' parent
         with ThreadPoolExecutor(1) as thread:
             try:
                 yield thread.submit(answer)
             except BaseException:
                 self._abandon.send(None)
                 raise
+
+    def start(self) -> None:
+        """Start a process, unless one waits for work."""
+        if not self._idle:
+            self._idle.append(self._child())
 
     def stop(self) -> None:
         """End the processes that wait for work."""
@@ -184,7 +203,7 @@ class Pool:
 class _Child:
     """A process, its connection, its folder of temporary files, and what it wrote if that is captured."""
 
-    def __init__(self, threads: int, captured: bool) -> None:
+    def __init__(self, threads: int, captured: bool, modules: Sequence[str]) -> None:
         self.connection, theirs = Pipe()
         self._folder = tempfile.mkdtemp(prefix="pinnray-")
         self._written: IO[str] | None = (
@@ -202,10 +221,10 @@ class _Child:
             pass_fds=[theirs.fileno()],
         )
         theirs.close()
-        self.send(sys.path)
+        self.send((sys.path, modules))
 
     def send(self, content: object) -> None:
-        """Send the search path of modules, and later the tasks."""
+        """Send the search path and the modules to import, and later the tasks."""
         with suppress(OSError):  # it has ended already, which its next message tells
             self.connection.send(content)
 
@@ -304,8 +323,12 @@ def serve() -> None:
     ending = Event()
     tasks: SimpleQueue[tuple[bytes, float] | None] = SimpleQueue()
     try:
-        sys.path += [place for place in connection.recv() if place and place not in sys.path]
+        places, modules = connection.recv()
+        sys.path += [place for place in places if place and place not in sys.path]
         Thread(target=_listen, args=(connection, tasks, ending, patience_s), daemon=True).start()
+        for module in modules:
+            with suppress(ImportError):
+                import_module(module)
         while (message := tasks.get()) is not None:
             content, timeout_s = message
             if timeout_s < inf:  # ends this process if the parent was killed and a library hangs

@@ -37,7 +37,6 @@ class Job:
     out: Path = Path("out/default")  #: Output folder.
     resume: bool = False  #: Whether to take over the finished solutions of an earlier run.
     picture_formats: Sequence[str] = ()  #: Formats of the pictures besides PNG, of `FORMATS`.
-    processes: int = 1  #: Processes that solve at a time; a second one takes the solvers of finite strain.
     options: Mapping[str, object] = field(default_factory=dict)  #: Of the command line, for `run.json`.
 
     @property

@@ -23,7 +23,7 @@ from compare.evaluation.truths import (
 from compare.figures import Picture, draw_all, fields_beside
 from compare.pipeline.job import Job, checked
 from compare.pipeline.shared_mesh import shared_mesh, write_rounds
-from compare.pipeline.solving import ERRORS, second_process, solve_all
+from compare.pipeline.solving import ERRORS, solve_all
 from compare.report.html_report import write_report
 from compare.report.output_files import metrics, write_vtu
 from compare.report.tables import write_markers, write_summary, write_table_one
@@ -42,8 +42,13 @@ from vision.frames.frame import Frame
 from vision.measurements import write_measurements
 
 
-def run(job: Job, stages: Stages) -> Results:
+def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
     """Make the comparison and write its output folder.
+
+    Args:
+        job: What to compare.
+        stages: Is told what is done.
+        pool: A second process, which solves and draws beside this one.
 
     Raises:
         UserError: If the job cannot be done; the output folder is as it was.
@@ -51,7 +56,7 @@ def run(job: Job, stages: Stages) -> Results:
     job = checked(job)
     check_output(job.out)
     kept = job.names if job.resume else ()
-    with replaced_folder(job.out, keep=kept) as folder, second_process(job) as pool:
+    with replaced_folder(job.out, keep=kept) as folder:
         if not isinstance(job.measurements, Film):
             comparison = compute(job, stages, folder, pool)
             _write(folder, job, comparison, stages, pool)

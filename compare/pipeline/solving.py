@@ -1,6 +1,7 @@
-"""The solvers of a comparison: one after another, and those of finite strain beside the linear ones.
+"""The solvers of a comparison: one after another, and on a large mesh in two processes.
 
-The two kinds share no work. On a large mesh they run in two processes, where the job allows that.
+Networks and linear mechanics, which share work, are solved in the process that was asked; finite elements of
+finite strain and statistics beside them.
 """
 
 import traceback
@@ -23,9 +24,12 @@ from compare.runtime.stages import Stages
 from geometry.atomic import write_text
 from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
+from geometry.finger.finger import Finger
+from geometry.mesh.element_size import estimated_triangles
+from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from geometry.processes import Pool, ProcessFailed, end_with_parent
-from solvers.problem import Problem
+from solvers.problem import Material, Problem
 from solvers.shared_work import SharedWork
 from solvers.solver import (
     NoSolutionError,
@@ -49,6 +53,9 @@ LARGE = 5000
 SHARE = max(1, cores() // 2)
 """Threads of the linear algebra in each of two processes."""
 
+THERE = ("solvers.fem.identification", "solvers.statistics.statistical_fem", __name__)
+"""Modules of what the second process solves, which it imports as it starts."""
+
 Stage = Callable[[str], AbstractContextManager[Progress]]
 """Begins a stage of a run, as `Stages.stage`."""
 
@@ -62,9 +69,14 @@ class Outcome:
     failed: dict[str, str] = field(default_factory=dict)  #: Reasons of those that have no result.
 
 
-def second_process(job: Job) -> AbstractContextManager[Pool | None]:
-    """The pool of a second process for a job, with half of the cores; None where it may have only one."""
-    return Pool(1, threads=SHARE) if job.processes > 1 else nullcontext()
+def second_process() -> Pool:
+    """The pool of a second process, with half of the cores; started early, it is ready when it is needed."""
+    return Pool(1, threads=SHARE, modules=THERE)
+
+
+def worth_starting(finger: Finger, mesh: MeshSettings) -> bool:
+    """Whether a finger's mesh will be so large that a second process can be started before it is made."""
+    return estimated_triangles(finger, mesh) >= 3 * LARGE  # nearly two for each node, of a rough estimate
 
 
 def solve_all(
@@ -84,25 +96,37 @@ def solve_all(
     Raises:
         UserError: If a solver refuses, the reference fails, or all fail.
     """
-    linear = [each for each in solvers if with_law(job.material, each).law == "linear"]
-    others = [each for each in solvers if each not in linear]
+    here = [each for each in solvers if _stays(each, job.material)]
+    there = [each for each in solvers if each not in here]
     # A class of the calling script is unknown to other processes.
     elsewhere = all(type(each).__module__ != "__main__" for each in solvers)
-    if pool and elsewhere and linear and others and len(problem.mesh.points) >= LARGE:
+    work = SharedWork()
+    if pool and elsewhere and here and there and len(problem.mesh.points) >= LARGE:
         # Without the solvers of the other part, which would be imported there.
-        here, there = (
-            _Part(replace(job, solvers=own), own, problem, observations, folder) for own in (linear, others)
+        own, other = (
+            _Part(replace(job, solvers=part), part, problem, observations, folder) for part in (here, there)
         )
-        outcome = _beside_each_other(here, there, stages, pool)
+        outcome = _beside_each_other(own, other, work, stages, pool)
     else:
-        outcome = _Part(job, solvers, problem, observations, folder).outcome(stages.stage)
+        outcome = _Part(job, solvers, problem, observations, folder).outcome(stages.stage, work)
+    found = outcome.evaluations
+    if any(each.law == "linear" for each in found.values()):
+        with stages.stage("certificate"), work.used():
+            found |= zip(found, with_certificates(list(found.values()), problem), strict=True)
     if outcome.failed and not outcome.evaluations:
         raise UserError(next(iter(outcome.failed.values())))
     names = [solver.name for solver in solvers]
     return Outcome(*({name: each[name] for name in names if name in each} for each in vars(outcome).values()))
 
 
-def _beside_each_other(own: "_Part", other: "_Part", stages: Stages, pool: Pool) -> Outcome:
+def _stays(solver: Solver, material: Material) -> bool:
+    """Whether a solver is one of those that share work, and are solved in the process that was asked."""
+    family = Traits.of(solver).family
+    linear = with_law(material, solver).law == "linear"
+    return family == "neural network" or (linear and family != "statistics")
+
+
+def _beside_each_other(own: "_Part", other: "_Part", work: SharedWork, stages: Stages, pool: Pool) -> Outcome:
     """Solve a part in this process, which has imported its libraries, and another one in a second process."""
     shown, last = dict[str, Progress](), ExitStack()
 
@@ -116,7 +140,8 @@ def _beside_each_other(own: "_Part", other: "_Part", stages: Stages, pool: Pool)
         found = answer.result()
         if isinstance(found, ProcessFailed):
             raise UserError(
-                f"solvers of finite strain: {found.message}; a resumed run goes on from what was finished"
+                f"{', '.join(each.name for each in other.solvers)}: {found.message}; "
+                "a resumed run goes on from what was finished"
             )
         if isinstance(found, UserError):
             raise found
@@ -135,7 +160,7 @@ def _beside_each_other(own: "_Part", other: "_Part", stages: Stages, pool: Pool)
 
     with threadpool_limits(SHARE), pool.beside(_answered, other, report=told) as answer:
         answer.add_done_callback(lambda _: last.close())
-        outcome = own.outcome(stage)
+        outcome = own.outcome(stage, work)
         for ours, more in zip(vars(outcome).values(), vars(theirs()).values(), strict=True):
             ours.update(more)
     return outcome
@@ -150,7 +175,7 @@ def _answered(part: "_Part", report: Callable[..., None]) -> Outcome | UserError
         return nullcontext(partial(report, name))
 
     try:
-        outcome = part.outcome(stage)
+        outcome = part.outcome(stage, SharedWork())
     except UserError as error:
         return UserError(str(error))
     import_module("compare.figures.gallery")  # while the other part goes on: this process draws next
@@ -167,10 +192,9 @@ class _Part:
     observations: Observations
     folder: Path
 
-    def outcome(self, stage: Stage) -> Outcome:
-        """Solve with one solver after another, in this process, and certify the results."""
+    def outcome(self, stage: Stage, work: SharedWork) -> Outcome:
+        """Solve with one solver after another, in this process."""
         outcome = Outcome()
-        work = SharedWork()
         for solver in self.solvers:
             trained = self._in_context(solver, outcome.evaluations.get("fem"))
             try:
@@ -184,11 +208,6 @@ class _Part:
                 if solver.name == self.job.reference:
                     raise
                 outcome.failed[solver.name] = self._reason(solver, error)
-        found = outcome.evaluations
-        if any(each.law == "linear" for each in found.values()):
-            with stage("certificate"), work.used():
-                certified = with_certificates(list(found.values()), self.problem)
-                found |= zip(found, certified, strict=True)
         return outcome
 
     def _reason(self, solver: Solver, error: UserError) -> str:

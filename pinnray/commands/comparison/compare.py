@@ -1,6 +1,7 @@
 """The main job: solve one finger with several solvers and compare them."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -80,6 +81,7 @@ def command(
     from compare.pipeline.job import Job
     from compare.pipeline.pipeline import run
     from compare.pipeline.shared_mesh import tolerance_reached
+    from compare.pipeline.solving import second_process, worth_starting
     from compare.report.tables import body_table, marker_table
     from compare.runtime.stages import Stages
     from pinnray.commands.launch import on_ranks
@@ -91,37 +93,43 @@ def command(
         note_versions(from_, earlier)
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
-    made = options.read(job_defaults(options.preset).solvers if solvers is None else solvers)
-    physics.check_law(made)
-    finger.check_cost(design, mesh, [solver.name for solver in made] + [EXPERIMENT] * (measurements is None))
-    job = Job(
-        design=design,
-        solvers=made,
-        spare=_optional_solvers(made, options, reference) if solvers is None else (),
-        mesh=mesh,
-        adapt=adapt,
-        material=material,
-        load=load,
-        truth=_truth(truth, measurements),
-        measurements=_measurements(measurements, film),
-        reference=reference,
-        out=out or Path("out") / design.name,
-        resume=resume,
-        picture_formats=comma_list(pictures),
-        processes=1 if on_ranks() else min(cores(), 2),
-        options=given_options(
-            *(finger, physics, options, film),
-            **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
-            **{"reference": reference, "pictures": pictures},
-        ),
-    )
-    try:
-        with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
-            comparison = run(job, stages)
-    except KeyboardInterrupt:
-        kept = job.out.with_name(f"{job.out.name}.partial").exists()
-        note = "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
-        raise KeyboardInterrupt(note) from None
+    with nullcontext() if on_ranks() or cores() < 2 else second_process() as pool:
+        if pool and worth_starting(design, mesh):
+            pool.start()  # which takes as long as to make the solvers here
+        made = options.read(job_defaults(options.preset).solvers if solvers is None else solvers)
+        physics.check_law(made)
+        finger.check_cost(
+            design, mesh, [solver.name for solver in made] + [EXPERIMENT] * (measurements is None)
+        )
+        job = Job(
+            design=design,
+            solvers=made,
+            spare=_optional_solvers(made, options, reference) if solvers is None else (),
+            mesh=mesh,
+            adapt=adapt,
+            material=material,
+            load=load,
+            truth=_truth(truth, measurements),
+            measurements=_measurements(measurements, film),
+            reference=reference,
+            out=out or Path("out") / design.name,
+            resume=resume,
+            picture_formats=comma_list(pictures),
+            options=given_options(
+                *(finger, physics, options, film),
+                **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
+                **{"reference": reference, "pictures": pictures},
+            ),
+        )
+        try:
+            with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
+                comparison = run(job, stages, pool)
+        except KeyboardInterrupt:
+            kept = job.out.with_name(f"{job.out.name}.partial").exists()
+            note = (
+                "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
+            )
+            raise KeyboardInterrupt(note) from None
     if from_ and earlier:
         note_inputs(from_, earlier, job.out / RUN_FILE)
     for remark in comparison.remarks:
