@@ -26,6 +26,9 @@ FORMATS = ("svg", "pdf")
 LARGE = 5000
 """Nodes of a mesh from which pictures of fields take longer than a process that draws them takes to start."""
 
+BESIDE = ("marker_errors", "differences")
+"""Pictures that another process draws besides those of fields: half of the work in all."""
+
 
 def check_formats(formats: Collection[str]) -> None:
     """Raise a `UserError` for a format of pictures that there is not."""
@@ -57,10 +60,10 @@ class Beside:
 
 
 @contextmanager
-def fields_beside(
+def pictures_beside(
     folder: Path, comparison: Results, formats: Collection[str], pool: Pool | None
 ) -> Iterator[Beside | None]:
-    """Begin the pictures of fields in a second process, if there is a pool and they take longer than it.
+    """Begin half of the pictures in a second process, if there is a pool and they take longer than it.
 
     One PDF of all pictures needs them here.
     """
@@ -69,7 +72,7 @@ def fields_beside(
         return
     from compare.figures.fields import QUANTITIES
 
-    names = [quantity.name for quantity in QUANTITIES]
+    names = [*(quantity.name for quantity in QUANTITIES), *BESIDE]
     task = (folder, comparison, names, formats)
     with pool.beside(_drawn_for_parent, task) as drawn:
         yield Beside(names, drawn)
@@ -105,7 +108,7 @@ def draw_all(
     if "pdf" in formats:
         write_pages(folder / "all.pdf", [(figure, each.title, each.caption) for _, each, figure in drawn])
     if beside is not None:
-        progress(0.9, "pictures of fields")
+        progress(0.9, "pictures of the second process")
         theirs = beside.pictures()
         missing = [name for name in beside.names if not theirs]
         pictures |= theirs | {name: each for name, each, _ in _drawn(folder, comparison, missing, formats)}

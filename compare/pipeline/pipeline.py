@@ -20,11 +20,11 @@ from compare.evaluation.truths import (
     no_displacements,
     virtual_experiment,
 )
-from compare.figures import Picture, draw_all, fields_beside
+from compare.figures import Picture, draw_all, pictures_beside
 from compare.pipeline.job import Job, checked
 from compare.pipeline.shared_mesh import shared_mesh, write_rounds
 from compare.pipeline.solving import ERRORS, solve_all
-from compare.report.html_report import write_report
+from compare.report.html_report import viewer, write_report
 from compare.report.output_files import metrics, write_vtu
 from compare.report.tables import write_markers, write_summary, write_table_one
 from compare.runtime.output_folder import check_output, replaced_folder, write_run
@@ -181,25 +181,27 @@ def _write(
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
-    figures = folder / "figures"
-    with fields_beside(figures, comparison, job.picture_formats, pool) as beside:
-        with stages.stage("fields"), SharedWork().used():
+    figures, work = folder / "figures", SharedWork()
+    with pictures_beside(figures, comparison, job.picture_formats, pool) as beside, work.used():
+        with stages.stage("fields"):
             for evaluation in comparison.shown_fields:
                 write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
+            viewed = viewer(comparison)
+        with stages.stage("tables"):
+            write_markers(folder / "markers.csv", comparison)
+            write_table_one(folder / "table1.csv", comparison)
+            write_summary(folder / "summary.csv", comparison)
+            if curves := force_curves(comparison.evaluations, job.load):
+                write_force_displacement(
+                    folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
+                )
+            numbers = metrics(comparison)
+            write_json(folder / "metrics.json", numbers)
         with stages.stage("pictures") as progress:
             pictures = draw_all(figures, comparison, progress, job.picture_formats, beside)
-    with stages.stage("report"), SharedWork().used():
-        write_markers(folder / "markers.csv", comparison)
-        write_table_one(folder / "table1.csv", comparison)
-        write_summary(folder / "summary.csv", comparison)
-        if curves := force_curves(comparison.evaluations, job.load):
-            write_force_displacement(
-                folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
-            )
-        numbers = metrics(comparison)
-        write_json(folder / "metrics.json", numbers)
+    with stages.stage("report"), work.used():
         record = _provenance(folder, job, comparison, stages)
-        write_report(folder / "report.html", comparison, [*pictures, *photographs], record, numbers)
+        write_report(folder / "report.html", comparison, [*pictures, *photographs], record, numbers, viewed)
         write_run(folder, record)
 
 

@@ -164,9 +164,10 @@ def write_report(
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
     numbers: Mapping[str, Any] | None = None,
+    viewed: Mapping[str, Any] | None = None,
 ) -> None:
     """Write the report as one HTML file, atomically; arguments as for `report_html`."""
-    write_text(path, report_html(comparison, pictures, provenance, numbers))
+    write_text(path, report_html(comparison, pictures, provenance, numbers, viewed))
 
 
 def report_html(
@@ -174,11 +175,12 @@ def report_html(
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
     numbers: Mapping[str, Any] | None = None,
+    viewed: Mapping[str, Any] | None = None,
 ) -> str:
     """The report as HTML text.
 
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
-    `numbers` are the comparison's `metrics`, where they are known already.
+    `numbers` are the comparison's `metrics` and `viewed` its `viewer`, where they are known already.
     """
     numbers = metrics(comparison) if numbers is None else numbers
     design = comparison.design
@@ -197,7 +199,7 @@ def report_html(
         regions={name for certificate in certificates for name in certificate.regions},
         near=REGION_RADIUS,
         text=text,
-        viewer=viewer(comparison),
+        viewer=viewed or viewer(comparison),
         urls=picture_urls([picture.path for picture in pictures]),
         pictures=[picture for picture in pictures if picture.path.stem not in fields],
         stills=[picture for picture in pictures if picture.path.stem in fields],

@@ -14,7 +14,7 @@ from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
-from compare.figures import FORMATS, draw_all, fields_beside
+from compare.figures import FORMATS, draw_all, pictures_beside
 from compare.figures.fields import QUANTITIES, draw_field
 from compare.figures.gallery import GALLERY, Illustration, draw
 from compare.figures.overlay import overlay_extent
@@ -100,17 +100,18 @@ def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawing
         assert (picture.path.stem, low < 60, high) == (picture.path.stem, True, 255)
 
 
-def test_a_second_process_draws_fields_as_this_one_and_its_end_does_not_lose_them(
+def test_a_second_process_draws_half_as_this_one_and_its_end_does_not_lose_them(
     comparison, tmp_path, monkeypatch
 ):
-    chosen = {name: GALLERY[name] for name in ("von_mises", "strain_xx", "mesh")}
+    chosen = {name: GALLERY[name] for name in ("marker_errors", "von_mises", "strain_xx", "mesh")}
     monkeypatch.setattr("compare.figures.gallery.GALLERY", chosen)
     monkeypatch.setattr("compare.figures.fields.QUANTITIES", [QUANTITIES[0], QUANTITIES[2]])
+    monkeypatch.setattr("compare.figures.BESIDE", ("marker_errors",))
     monkeypatch.setattr("compare.figures.LARGE", 0)
     alone, died = tmp_path / "alone", ProcessFailed(-9)
     expected = [replace(each, path=each.path.name) for each in draw_all(alone, comparison)]
     for place, lost in ((tmp_path / "beside", False), (tmp_path / "lost", True)):
-        with Pool(1) as pool, fields_beside(place, comparison, (), pool) as beside:
+        with Pool(1) as pool, pictures_beside(place, comparison, (), pool) as beside:
             assert beside is not None
             if lost:
                 monkeypatch.setattr(beside.drawn, "result", lambda: died)
@@ -122,7 +123,7 @@ def test_a_second_process_draws_fields_as_this_one_and_its_end_does_not_lose_the
 
 def test_fields_are_drawn_here_where_a_second_process_would_not_help(comparison, tmp_path):
     for formats, pool in (((), None), (("pdf",), Pool(1)), ((), Pool(1))):  # the last: the mesh is small
-        with fields_beside(tmp_path, comparison, formats, pool) as beside:
+        with pictures_beside(tmp_path, comparison, formats, pool) as beside:
             assert beside is None
 
 

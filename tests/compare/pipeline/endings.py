@@ -74,6 +74,13 @@ def main() -> None:
     solving.LARGE = 0
     solvers = Ending("reporting", laws=("linear",)), Ending(sys.argv[2])
     with interruptible():
-        made = Job(DESIGN, solvers, processes=2)
-        with solving.second_process(made) as pool:
-            solving.solve_all(made, solvers, PROBLEM, MARKERS, Path(sys.argv[1]), Said(), pool)  # type: ignore[arg-type]
+        with solving.second_process() as pool:
+            solving.solve_all(
+                Job(DESIGN, solvers),
+                solvers,
+                PROBLEM,
+                MARKERS,
+                Path(sys.argv[1]),
+                Said(),  # type: ignore[arg-type]
+                pool,
+            )
