@@ -73,14 +73,13 @@ def main() -> None:
     """The program; its classes must not be of `__main__`, which other processes do not know."""
     solving.LARGE = 0
     solvers = Ending("reporting", laws=("linear",)), Ending(sys.argv[2])
-    with interruptible():
-        with solving.second_process() as pool:
-            solving.solve_all(
-                Job(DESIGN, solvers),
-                solvers,
-                PROBLEM,
-                MARKERS,
-                Path(sys.argv[1]),
-                Said(),  # type: ignore[arg-type]
-                pool,
-            )
+    with interruptible(), solving.second_process() as pool:
+        solving.solve_all(
+            Job(DESIGN, solvers),
+            solvers,
+            PROBLEM,
+            MARKERS,
+            Path(sys.argv[1]),
+            Said(),  # type: ignore[arg-type]
+            pool,
+        )
