@@ -18,7 +18,6 @@ from compare.figures.overlay import errors_note
 from compare.figures.style import axes_at, legend_below_heading, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
-from geometry.mesh.boundary import boundary_edges
 from geometry.registration import nearest_similarity
 from vision.frames.frame import Image
 from vision.tracking.trajectories import Tracking
@@ -77,7 +76,7 @@ def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> F
             axes.imshow(_red_first(image), cmap="gray", vmin=0, vmax=255)
             axes.set(xlim=(left, right), ylim=(bottom, top))
             axes.set_axis_off()
-            edges = body[boundary_edges(comparison.mesh.triangles)]
+            edges = body[comparison.mesh.boundary_edges]
             axes.add_collection(LineCollection(list(edges), colors=BODY, lw=0.7, path_effects=RIM))
             computed = comparison.observations.points + evaluation.shown_displacement
             _markers(axes, tracking, plane.pixels(computed))

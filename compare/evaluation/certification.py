@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from compare.evaluation.certificate import ROUNDING, Certificate, Region
 from compare.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation, field_difference
 from geometry.arrays import BoolArray, FloatArray
-from geometry.mesh.boundary import boundary_edges, boundary_loops, mean_thickness, singular_points
+from geometry.mesh.boundary import boundary_loops, mean_thickness, singular_points
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import energy_density_of
 from solvers.fem.boundary_conditions import reaction_by_residual_work
@@ -201,7 +201,7 @@ def body_regions(problem: Problem) -> dict[str, BoolArray]:
     centroids, thickness = mesh.at_centroids().points, mean_thickness(mesh)
     cavities = boundary_loops(mesh)[1:]
     beyond = centroids[:, 0] > max((mesh.points[cavity, 0].max() for cavity in cavities), default=np.inf)
-    boundary = mesh.points[np.unique(boundary_edges(mesh.triangles))]
+    boundary = mesh.points[np.unique(mesh.boundary_edges)]
     depth = cKDTree(boundary).query(centroids[beyond])[0].max(initial=0.0)
     near = REGION_RADIUS * thickness
     belongs = {

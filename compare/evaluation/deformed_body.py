@@ -9,7 +9,6 @@ import shapely
 from compare.evaluation.certification import NOT_FINITE
 from compare.evaluation.evaluation import Evaluation
 from geometry.arrays import BoolArray, FloatArray
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 from solvers.lagrange import LagrangeSpace
 from solvers.solution import Solution, Status
@@ -30,7 +29,7 @@ class DeformedBody:
 
     def __init__(self, mesh: TriangleMesh) -> None:
         self._mesh, self._space = mesh, LagrangeSpace(mesh, 2)
-        self._edges = boundary_edges(mesh.triangles)
+        self._edges = mesh.boundary_edges
         # The middles of its edges cut a quadratic triangle into four.
         quarters = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
         self._quarters = self._space.cell_nodes[:, quarters].reshape(-1, 3)

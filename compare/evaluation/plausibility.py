@@ -10,7 +10,6 @@ import shapely
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import OutsideBodyError, UserError
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.section.thickness import wall_thickness
@@ -204,7 +203,7 @@ def _cosine(one: FloatArray, other: FloatArray) -> float:
 
 def _in_outline(mesh: TriangleMesh, points: FloatArray) -> bool:
     """Whether points lie in the body or its cavities."""
-    edges = shapely.linestrings(mesh.points[boundary_edges(mesh.triangles)])
+    edges = shapely.linestrings(mesh.points[mesh.boundary_edges])
     filled = shapely.union_all(shapely.polygonize(edges))
     return bool(shapely.covers(filled, shapely.points(points)).all())
 

@@ -10,7 +10,7 @@ from compare.figures.pyvista_canvas import Extent
 from compare.figures.style import HALO, axes_at, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
-from geometry.mesh.boundary import boundary_edges, edge_paths
+from geometry.mesh.boundary import edge_paths
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 HEAD, INSET_TITLE, MARGIN = 0.48, 0.24, 0.1
@@ -51,7 +51,7 @@ def corner_near(mesh: TriangleMesh, point: FloatArray) -> tuple[str, FloatArray]
         ahead, behind = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
         cross = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
         np.add.at(angle, mesh.triangles[:, i], np.arctan2(cross, (ahead * behind).sum(axis=1)))
-    boundary = np.unique(boundary_edges(mesh.triangles))
+    boundary = np.unique(mesh.boundary_edges)
     sharp = mesh.points[boundary[angle[boundary] > np.radians(200)]]
     name = "inner corner" if len(sharp) else "end of the base"
     places = sharp if len(sharp) else np.concatenate([line[[0, -1]] for line in body.base_lines(mesh)])
@@ -138,7 +138,7 @@ def _draw(axes: Axes, mesh: TriangleMesh, window: Extent, width: float) -> None:
     )
     inside = ~beyond.any(axis=1)
     axes.add_collection(LineCollection(list(ends[inside]), colors="#3d5a80", linewidths=width), autolim=False)
-    boundary = edge_paths(boundary_edges(mesh.triangles))
+    boundary = edge_paths(mesh.boundary_edges)
     body.draw_outline(axes, boundary, mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0)
     contact = edge_paths(mesh.boundary("contact"))
     body.draw_outline(axes, contact, mesh.points, colour=CONTACT, width=2.2, zorder=4)

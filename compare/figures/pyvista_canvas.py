@@ -20,7 +20,7 @@ import pyvista
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.boundary import boundary_edges, edge_paths
+from geometry.mesh.boundary import edge_paths
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.shared_work import shared
 
@@ -63,7 +63,7 @@ class Canvas(AbstractContextManager["Canvas"]):
 
     def __init__(self, mesh: TriangleMesh, extent: Extent, *, width: int) -> None:
         """Show `extent` in a picture of `width` pixels, seen from the front."""
-        self.extent, self.outline = extent, edge_paths(boundary_edges(mesh.triangles))
+        self.extent, self.outline = extent, edge_paths(mesh.boundary_edges)
         self._mesh, self._size = mesh, (round(width * extent.height / extent.width), width)
 
     @cached_property

@@ -36,7 +36,7 @@ from compare.runtime.html import Packed, base64_text, picture_urls, template_env
 from compare.runtime.tables import distance, number, percent
 from geometry.arrays import FloatArray
 from geometry.atomic import write_text
-from geometry.mesh.boundary import boundary_edges, edge_paths
+from geometry.mesh.boundary import edge_paths
 
 BUDGET = 6_000_000
 """Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""
@@ -57,7 +57,7 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
     manifest = {
         "points": packed.add(mesh.points.astype("<f4")),
         "triangles": packed.add(mesh.triangles.astype("<u4")),
-        "outlines": [path.tolist() for path in edge_paths(boundary_edges(mesh.triangles))],
+        "outlines": [path.tolist() for path in edge_paths(mesh.boundary_edges)],
         "reference": reference.label,
         "differences": [_stop(share) for share in np.linspace(0, 1, 17)],
         "quantities": [

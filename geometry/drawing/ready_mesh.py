@@ -10,8 +10,8 @@ from geometry.drawing.description import PartMaterial
 from geometry.drawing.formats.drawing import MeshInFile, label_of
 from geometry.drawing.placement import Placement
 from geometry.errors import UserError
-from geometry.mesh.boundary import are_among, boundary_edges, counter_clockwise
-from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.mesh.boundary import are_among, counter_clockwise
+from geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
 from geometry.section.section import Section
 
 

@@ -12,15 +12,6 @@ CORNER_ANGLE = np.radians(10.0)
 """Minimum turn of the boundary at a corner."""
 
 
-def boundary_edges(triangles: IntArray) -> IntArray:
-    """Edges that belong to one triangle only, shape (k, 2), with the body on their left."""
-    directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    low, high = directed.min(axis=1), directed.max(axis=1)
-    keys = low * (int(triangles.max()) + 1) + high  # many times faster than unique pairs
-    _, first, count = np.unique(keys, return_index=True, return_counts=True)
-    return np.asarray(directed[np.sort(first[count == 1])], dtype=np.int64)
-
-
 def are_among(edges: IntArray, others: IntArray) -> BoolArray:
     """Mask of the edges (k, 2) that are among others (m, 2), whichever way both run."""
     first, second = (
@@ -40,7 +31,7 @@ def counter_clockwise(points: FloatArray, triangles: IntArray) -> IntArray:
 
 def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
     """The nodes of every closed boundary: the outline first, then the cavities from base to tip."""
-    edges = boundary_edges(mesh.triangles)
+    edges = mesh.boundary_edges
     nodes, local = np.unique(edges, return_inverse=True)
     local = local.reshape(-1, 2)
     graph = coo_matrix((np.ones(len(local)), (local[:, 0], local[:, 1])), shape=(len(nodes), len(nodes)))
@@ -54,7 +45,7 @@ def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
 
 def mean_thickness(mesh: TriangleMesh) -> float:
     """Twice the area over the perimeter, mm: the thickness of a body that is all walls."""
-    ends = mesh.points[boundary_edges(mesh.triangles)]
+    ends = mesh.points[mesh.boundary_edges]
     perimeter = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
     return float(2 * mesh.areas.sum() / perimeter)
 
@@ -68,7 +59,7 @@ def boundary_widths(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     infinite where there is none.
     """
     loops = boundary_loops(mesh)
-    edges = mesh.points[boundary_edges(mesh.triangles)]
+    edges = mesh.points[mesh.boundary_edges]
     middles = edges.mean(axis=1)
     _, nearest = cKDTree(mesh.points[np.concatenate(loops)]).query(edges[:, 0])
     loop_of = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])[nearest]
@@ -123,11 +114,11 @@ def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, Float
     All in mm. A point of an arc is one whose neighbour turns too. Arcs in finer steps than `CORNER_ANGLE`
     count where their radius is below the mean thickness.
     """
-    edges = boundary_edges(mesh.triangles)
+    edges = mesh.boundary_edges
     follows = dict(edges.tolist())
     comes_before = {after: node for node, after in follows.items()}
     nodes = np.array(list(follows))
-    after, before = (np.array([step[node] for node in nodes]) for step in (follows, comes_before))
+    after, before = (np.array([step[node] for node in follows]) for step in (follows, comes_before))
     into, out = mesh.points[nodes] - mesh.points[before], mesh.points[after] - mesh.points[nodes]
     # The body is on the left of its boundary: a right turn opens it beyond a straight angle.
     turn = -np.arctan2(_cross(into, out), (into * out).sum(axis=1))

@@ -11,7 +11,6 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.finger.finger import Finger, outline_with_contact
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.elastic_motion import ElasticMotion
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.section.loop import Loop
@@ -34,7 +33,7 @@ class MovingMesh:
     def __init__(self, mesh: TriangleMesh, finger: Finger) -> None:
         self._mesh, self._loops = mesh, _loops(finger)
         self._motion = ElasticMotion(mesh)
-        self._nodes = np.unique(boundary_edges(mesh.triangles))
+        self._nodes = np.unique(mesh.boundary_edges)
         points = mesh.points[self._nodes]
         self._loop = np.zeros(len(points), dtype=np.int64)
         self._piece, self._share = np.zeros_like(self._loop), np.zeros(len(points))

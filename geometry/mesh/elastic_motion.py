@@ -9,7 +9,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
 from geometry.arrays import FloatArray
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 POISSON = 0.3
@@ -27,7 +26,7 @@ class ElasticMotion:
         count = len(mesh.points)
         stiffness = _stiffness(mesh)
         inner = np.ones(count, dtype=bool)
-        inner[np.unique(boundary_edges(mesh.triangles))] = False
+        inner[np.unique(mesh.boundary_edges)] = False
         self._free = np.repeat(inner, 2)
         self._rows = stiffness[self._free]
         self._factors = splu(self._rows[:, self._free].tocsc()) if inner.any() else None

@@ -15,13 +15,12 @@ from geometry.errors import UserError
 from geometry.finger.finger import Finger, outline_with_contact
 from geometry.mesh.boundary import (
     are_among,
-    boundary_edges,
     counter_clockwise,
     elements_through_thickness,
 )
 from geometry.mesh.element_size import TRIES, contact_points, size_field
 from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
 from geometry.section.loop import Loop
 from geometry.section.section import Section
 

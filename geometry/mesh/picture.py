@@ -7,7 +7,6 @@ from matplotlib.tri import Triangulation
 
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MUTED, Figure, body_figure
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 
@@ -35,7 +34,7 @@ def plot_field(
     area = np.cumsum(mesh.areas[order])
     # The colour scale holds 99.5 % of the area, because stress has no bound at sharp corners.
     high = float(sizes[order][np.searchsorted(area, 0.995 * area[-1])])
-    points, edges = mesh.points + displacement, boundary_edges(mesh.triangles)
+    points, edges = mesh.points + displacement, mesh.boundary_edges
     with body_figure(np.concatenate([mesh.points, points]), title, foot=0.5) as (drawn, axes):
         axes.add_collection(LineCollection(list(mesh.points[edges]), colors=MUTED, linewidths=0.5))
         colours = axes.tripcolor(

@@ -13,7 +13,6 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import UserError
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.section.section import Section
 
@@ -87,7 +86,7 @@ def _middles(mesh: TriangleMesh, cut: BoolArray, section: Section | None) -> Flo
     if section is None:
         return middles
     outside = np.zeros(len(mesh.edges), dtype=bool)
-    outside[mesh.edge_numbers(boundary_edges(mesh.triangles))] = True
+    outside[mesh.edge_numbers(mesh.boundary_edges)] = True
     for loop in section.loops:
         for which in np.setdiff1d(np.arange(len(loop.points)), loop.straight):
             centre, radius = loop.circle(int(which))

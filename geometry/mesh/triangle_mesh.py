@@ -102,6 +102,11 @@ class TriangleMesh:
         numbers = np.unique(first * len(self.points) + second)  # many times faster than unique pairs
         return np.stack(np.divmod(numbers, len(self.points)), axis=1)
 
+    @cached_property
+    def boundary_edges(self) -> IntArray:
+        """The edges of the whole boundary, shape (k, 2), with the body on their left."""
+        return boundary_edges(self.triangles)
+
     def edge_numbers(self, pairs: IntArray) -> IntArray:
         """Rows of `edges` of edges given as node pairs, shape (..., 2), in any order: shape (...)."""
         count, ordered = len(self.points), np.sort(pairs, axis=-1)
@@ -238,6 +243,15 @@ class TriangleMesh:
             "depth": np.asarray(self.depth),
             **moduli,
         } | {BOUNDARY_PREFIX + name: nodes for name, nodes in sorted(self.boundaries.items())}
+
+
+def boundary_edges(triangles: IntArray) -> IntArray:
+    """Edges that belong to one triangle only, shape (k, 2), with the body on their left."""
+    directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    low, high = directed.min(axis=1), directed.max(axis=1)
+    keys = low * (int(triangles.max()) + 1) + high  # many times faster than unique pairs
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    return np.asarray(directed[np.sort(first[count == 1])], dtype=np.int64)
 
 
 def signed_areas(points: FloatArray, triangles: IntArray) -> FloatArray:

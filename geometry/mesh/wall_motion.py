@@ -16,7 +16,6 @@ from scipy.sparse.linalg import splu
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.mesh.boundary import (
     CORNER_ANGLE,
-    boundary_edges,
     boundary_loops,
     mean_thickness,
     walls_and_ribs,
@@ -82,7 +81,7 @@ class WallMotion:
 
 def _cavities(mesh: TriangleMesh) -> list[IntArray]:
     """The nodes of every cavity in order, the body on their left."""
-    follows = dict(boundary_edges(mesh.triangles).tolist())
+    follows = dict(mesh.boundary_edges.tolist())
     loops = []
     for nodes in boundary_loops(mesh)[1:]:
         loop = [int(nodes[0])]
@@ -228,7 +227,7 @@ def harmonic(mesh: TriangleMesh, boundary: FloatArray) -> FloatArray:
     ]
     stiffness = sum(matrix.T @ diags(mesh.areas) @ matrix for matrix in along).tocsr()
     free = np.ones(count, dtype=bool)
-    free[np.unique(boundary_edges(mesh.triangles))] = False
+    free[np.unique(mesh.boundary_edges)] = False
     found = boundary.copy()
     if free.any() and len(boundary):
         flat = boundary.transpose(1, 0, 2).reshape(count, -1)

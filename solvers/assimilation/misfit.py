@@ -21,7 +21,6 @@ from scipy.special import roots_legendre
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
@@ -137,7 +136,7 @@ def leave_one_out_displacements(problem: Problem, residuals: FloatArray) -> Floa
 
 def radius_within(mesh: TriangleMesh, points: FloatArray, radius: float) -> float:
     """The radius, mm, or the least distance of points (m, 2), mm, from the boundary if that is less."""
-    start, end = mesh.points[boundary_edges(mesh.triangles)].transpose(1, 0, 2)
+    start, end = mesh.points[mesh.boundary_edges].transpose(1, 0, 2)
     along, offset = end - start, points[:, None] - start
     share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
     return min(radius, float(np.linalg.norm(offset - share[..., None] * along, axis=2).min()))

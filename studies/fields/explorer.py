@@ -12,7 +12,7 @@ from compare.runtime.html import Packed
 from compare.runtime.provenance import package_versions
 from geometry.arrays import FloatArray
 from geometry.finger.parameters import SYMBOLS, Parameters
-from geometry.mesh.boundary import boundary_edges, edge_paths
+from geometry.mesh.boundary import edge_paths
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.finger_figures import QUANTITIES
 from solvers.lagrange import LagrangeSpace
@@ -117,7 +117,7 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
         "colourStress": float(LARGEST * emulator.scales[-1, 1 + FIGURES.index("von_mises")]),
         "thickness": reader.thickness,
         "contactWidth": reader.contact_width,
-        "outlines": [path.tolist() for path in edge_paths(boundary_edges(mesh.triangles))],
+        "outlines": [path.tolist() for path in edge_paths(mesh.boundary_edges)],
         "points": packed.add(mesh.points.astype("<f8")),
         "cells": packed.add(LagrangeSpace(mesh, 2).cell_nodes.astype("<u4")),
         "front": packed.add(reader.front.astype("<u4")),

@@ -9,7 +9,6 @@ from matplotlib.patches import Circle
 from compare.figures.style import HALO, axes_at, write_heading
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
-from geometry.mesh.boundary import boundary_edges
 from solvers.finger_figures import QUANTITIES
 from solvers.problem import Problem, contact_ends, front_points
 from solvers.solution import Solution
@@ -79,7 +78,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
     for run, solution in solutions.items():
         mesh = solution.problem.mesh
         moved = mesh.points + solution.displacement(mesh.points)
-        shapes.append((run, mesh.points, moved, boundary_edges(mesh.triangles)))
+        shapes.append((run, mesh.points, moved, mesh.boundary_edges))
     ends = {run: cylinder_at_end(solution.problem) for run, solution in solutions.items()}
     circles = {run: circle for run, circle in ends.items() if circle is not None}
     every = np.concatenate([points for _, rest, moved, _ in shapes for points in (rest, moved)])

@@ -6,7 +6,6 @@ import numpy as np
 
 from compare.figures.style import axes_at, solver_colour, write_heading
 from geometry.figure import INK, MUTED, WIDTH, Figure, figure
-from geometry.mesh.boundary import boundary_edges
 from studies.robots.presses import PressedFinger
 from studies.robots.score import ModelScore
 
@@ -17,7 +16,7 @@ SHOWN = (0, 2, 4)
 def draw_score(finger: PressedFinger, scores: Sequence[ModelScore]) -> Figure:
     """Draw the front face at rest, by finite elements and by each model, at three loads."""
     mesh = finger.problem.mesh
-    edges = mesh.points[boundary_edges(mesh.triangles)]
+    edges = mesh.points[mesh.boundary_edges]
     full = list({each.load.place: number for number, each in enumerate(scores[0].presses)}.values())
     chosen = [full[number] for number in SHOWN if number < len(full)]
     moved = np.concatenate([finger.front + each.moved for each in finger.held_out] + [mesh.points])

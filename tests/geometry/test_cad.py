@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from geometry import Design, MeshSettings, UserError, cad, cad_files, load_design, marker_positions
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.mesher import build_mesh
 from tests.meshes import body_area, body_perimeter
 
@@ -122,7 +121,7 @@ def test_the_mesh_has_its_boundary_on_the_cad_face(design: Design) -> None:
     face = cad.section_face(design)
     assert face.Area() == pytest.approx(design.section.area, rel=1e-12)
     wires = cq.Compound.makeCompound([face.outerWire(), *face.innerWires()])
-    nodes = mesh.points[np.unique(boundary_edges(mesh.triangles))]
+    nodes = mesh.points[np.unique(mesh.boundary_edges)]
     assert max(wires.distance(cq.Vertex.makeVertex(x, y, 0)) for x, y in nodes) < 1e-9
 
 

@@ -7,9 +7,8 @@ from math import cos, pi, radians, sin, tan
 import gmsh
 import numpy as np
 
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.mesher import add_section, session, triangulate
-from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges, signed_areas
 from geometry.section.loop import Loop
 from geometry.section.section import Section
 

@@ -9,7 +9,6 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import ShapeError
 from geometry.finger.finger import Finger
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 from vision.rig.print_layers import PrintLayers
@@ -139,7 +138,7 @@ class Bench:
 
     @cached_property
     def _border(self) -> IntArray:
-        return boundary_edges(self.mesh.triangles)
+        return self.mesh.boundary_edges
 
     @cached_property
     def _marker_borders(self) -> LocatedPoints:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.triangle_mesh import boundary_edges
 
 PERIOD = 0.4
 """Width of two layers, a lighter and a darker one, mm."""

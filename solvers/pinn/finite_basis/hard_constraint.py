@@ -8,7 +8,6 @@ import torch
 from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 Points = TypeVar("Points", torch.Tensor, FloatArray)
@@ -113,7 +112,7 @@ def base_distance(mesh: TriangleMesh) -> BaseDistance:
 
 def _with_body_on_left(mesh: TriangleMesh, name: str) -> IntArray:
     """The edges of a named boundary, shape (k, 2), with the body on their left."""
-    every = boundary_edges(mesh.triangles)
+    every = mesh.boundary_edges
     here = np.isin(mesh.edge_numbers(every), mesh.edge_numbers(mesh.boundary(name)))
     return np.asarray(every[here], dtype=np.int64)
 

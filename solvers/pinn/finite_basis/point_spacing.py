@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray
-from geometry.mesh.boundary import boundary_edges, boundary_widths, mean_thickness, re_entrant_points
+from geometry.mesh.boundary import boundary_widths, mean_thickness, re_entrant_points
 from geometry.mesh.quadrature import triangle_rule
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.pinn.finite_basis.load_conditions import contact_end_points
@@ -135,7 +135,7 @@ def spread_points(
     """
     points = np.unique(np.round(triangles.reshape(-1, 2), 9), axis=0)
     distance = spacing.distance(points)
-    from_boundary, _ = cKDTree(mesh.points[np.unique(boundary_edges(mesh.triangles))]).query(points)
+    from_boundary, _ = cKDTree(mesh.points[np.unique(mesh.boundary_edges)]).query(points)
     inside = from_boundary > 1e-9
     tree, radius = cKDTree(points), share * spacing.at(points)
     free = np.ones(len(points), dtype=bool)

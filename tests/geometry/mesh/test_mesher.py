@@ -8,14 +8,14 @@ import pytest
 from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_through_thickness
 from geometry import marker_positions as positions_of
 from geometry.finger.section import cells, corner_angles
-from geometry.mesh.boundary import boundary_edges, boundary_loops
+from geometry.mesh.boundary import boundary_loops
 from geometry.mesh.mesher import build_mesh
 from tests.meshes import body_area, boundary_lengths, corner_area
 
 
 def polygon_of_loop(mesh: TriangleMesh, loop: np.ndarray) -> float:
     """Area inside a closed boundary, mm^2, by the shoelace formula over its edges."""
-    edges = boundary_edges(mesh.triangles)
+    edges = mesh.boundary_edges
     start, end = (mesh.points[edges[np.isin(edges[:, 0], loop)][:, k]] for k in range(2))
     return float(abs(0.5 * (start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]).sum()))
 

@@ -40,11 +40,10 @@ def test_weights_over_the_body_sum_to_its_area(mesh: TriangleMesh) -> None:
 
 def test_body_integral_of_a_polynomial_is_that_of_its_boundary(default_mesh: TriangleMesh) -> None:
     # Divergence theorem: the integral of x^3 y over the body is that of x^4 y / 4 n_x over its boundary.
-    from geometry.mesh.boundary import boundary_edges
 
     rule = body_quadrature(default_mesh, 4)
     x, y = rule.location.points.T
-    edges = boundary_edges(default_mesh.triangles)
+    edges = default_mesh.boundary_edges
     start, end = default_mesh.points[edges[:, 0]], default_mesh.points[edges[:, 1]]
     abscissae, weights = np.polynomial.legendre.leggauss(4)
     total = 0.0

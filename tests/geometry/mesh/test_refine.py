@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from geometry import Design, TriangleMesh, finger_section
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.refinement import refined
 from tests.meshes import smallest_angle
 
@@ -30,7 +29,7 @@ def test_the_body_and_its_boundaries_stay_the_same(case: str, mesh: TriangleMesh
     assert finer.areas.min() > 0
     for name in mesh.boundaries:
         assert finer.boundary_length(name) == pytest.approx(mesh.boundary_length(name), rel=1e-12)
-    outside = {tuple(edge) for edge in boundary_edges(finer.triangles).tolist()}
+    outside = {tuple(edge) for edge in finer.boundary_edges.tolist()}
     named = {tuple(edge) for edges in finer.boundaries.values() for edge in edges.tolist()}
     assert named <= outside  # in the direction that has the body on the left
     assert finer.markers.tolist() == mesh.markers.tolist()
@@ -46,7 +45,7 @@ def test_no_node_hangs(default_mesh: TriangleMesh) -> None:
     length = sum(
         np.linalg.norm(finer.points[a] - finer.points[b]) for (a, b), many in count.items() if many == 1
     )
-    edges = default_mesh.points[boundary_edges(default_mesh.triangles)]
+    edges = default_mesh.points[default_mesh.boundary_edges]
     assert length == pytest.approx(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum(), rel=1e-12)
 
 

@@ -5,7 +5,6 @@ import pytest
 
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 from geometry.mesh.wall_motion import WallMotion
@@ -16,7 +15,7 @@ CHANGE = 0.1
 
 
 def distance_from_boundary(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
-    start, end = mesh.points[boundary_edges(mesh.triangles)].transpose(1, 0, 2)
+    start, end = mesh.points[mesh.boundary_edges].transpose(1, 0, 2)
     along, offset = end - start, points[:, None] - start
     share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
     return np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1)
@@ -35,7 +34,7 @@ def test_the_moved_boundary_is_that_of_the_thicker_wall(name, fillet):
     mesh, other = (finger_mesh(design, settings=SETTINGS) for design in (drawn, thicker))
     motion = WallMotion.of(mesh)
     changes = motion.changes({name: motion.thickness[motion.names.index(name)] + CHANGE})
-    boundary = np.unique(boundary_edges(mesh.triangles))
+    boundary = np.unique(mesh.boundary_edges)
     moved = distance_from_boundary(other, motion.moved(changes)[boundary])
     before = distance_from_boundary(other, mesh.points[boundary])
     assert before.max() > 0.4 * CHANGE

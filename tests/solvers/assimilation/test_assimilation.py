@@ -8,7 +8,6 @@ import shapely
 
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
-from geometry.mesh.boundary import boundary_edges
 from solvers.assimilation.misfit import (
     MIN_STANDARD_DEVIATION,
     MarkerSettings,
@@ -150,7 +149,7 @@ def test_the_mean_over_a_disc_is_that_of_polynomials():
 
 def test_a_disc_is_as_large_as_the_distance_from_the_boundary(coarse_mesh):
     """The distance is shapely's, also where an edge that is lengthened would be nearer."""
-    edges = coarse_mesh.points[boundary_edges(coarse_mesh.triangles)]
+    edges = coarse_mesh.points[coarse_mesh.boundary_edges]
     boundary = shapely.multilinestrings(shapely.linestrings(edges))
     for point in coarse_mesh.points[coarse_mesh.triangles[::7]].mean(axis=1):
         distance = shapely.distance(boundary, shapely.points(point))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from geometry.mesh.boundary import boundary_edges
 from solvers.pinn.finite_basis.hard_constraint import CurveDistance, LineDistance, base_distance
 from tests.solvers.bodies import BODIES, body_mesh
 
@@ -58,7 +57,7 @@ def test_a_line_that_the_body_crosses_elsewhere_clamps_no_other_point():
 def test_near_the_base_it_is_the_distance_with_the_normal_for_its_gradient(name):
     mesh = body_mesh(name, 0.5)
     distance = base_distance(mesh)
-    edges = boundary_edges(mesh.triangles)
+    edges = mesh.boundary_edges
     base = set(map(tuple, np.sort(mesh.boundary("base"), axis=1).tolist()))
     ends = mesh.points[np.array([edge for edge in edges.tolist() if tuple(sorted(edge)) in base])]
     along = ends[:, 1] - ends[:, 0]

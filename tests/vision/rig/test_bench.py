@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from geometry.errors import ShapeError
 from geometry.finger.design import Design
-from geometry.mesh.boundary import boundary_edges
 from vision.rig.bench import FINGER, Bench
 from vision.rig.print_layers import DIRECTION, PERIOD, PrintLayers
 from vision.rig.render import mean_light, pixel_coverage
@@ -67,7 +66,7 @@ def test_layers_at_rest_are_stripes(bench):
     low = bench.mesh.points.min(axis=0)
     size = tuple(np.ceil(np.ptp(bench.mesh.points, axis=0) / cells).astype(int))
     rows, columns, dark = pixel_coverage((edges - low) / cells, size)
-    body = pixel_coverage((bench.mesh.points[boundary_edges(bench.mesh.triangles)] - low) / cells, size).share
+    body = pixel_coverage((bench.mesh.points[bench.mesh.boundary_edges] - low) / cells, size).share
     x, y = np.meshgrid(np.arange(columns.start, columns.stop) + 0.5, np.arange(rows.start, rows.stop) + 0.5)
     layer = (np.stack([x, y], axis=-1) * cells + low) @ DIRECTION / (PERIOD / 2)
     clear = np.abs(layer - np.rint(layer)) > 0.1
