@@ -24,8 +24,6 @@ from compare.figures import Picture, draw_all, pictures_beside
 from compare.pipeline.job import Job, checked
 from compare.pipeline.shared_mesh import shared_mesh, write_rounds
 from compare.pipeline.solving import ERRORS, solve_all
-from compare.report.html_report import viewer, write_report
-from compare.report.output_files import metrics, write_vtu
 from compare.report.tables import write_markers, write_summary, write_table_one
 from compare.runtime.output_folder import check_output, replaced_folder, write_run
 from compare.runtime.provenance import package_versions
@@ -178,6 +176,10 @@ def _write(
     photographs: Sequence[Picture] = (),
 ) -> None:
     """Write every file of a comparison but its solutions; photographs of the tracking are for the report."""
+    # They need the libraries of pictures.
+    from compare.report.html_report import viewer, write_report
+    from compare.report.output_files import metrics, write_vtu
+
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)

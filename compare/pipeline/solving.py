@@ -56,6 +56,9 @@ SHARE = max(1, cores() // 2)
 THERE = ("solvers.fem.identification", "solvers.statistics.statistical_fem", __name__)
 """Modules of what the second process solves, which it imports as it starts."""
 
+PICTURES = "compare.report.html_report"
+"""Module that imports the libraries of pictures, which both processes draw next."""
+
 Stage = Callable[[str], AbstractContextManager[Progress]]
 """Begins a stage of a run, as `Stages.stage`."""
 
@@ -161,6 +164,7 @@ def _beside_each_other(own: "_Part", other: "_Part", work: SharedWork, stages: S
     with threadpool_limits(SHARE), pool.beside(_answered, other, report=told) as answer:
         answer.add_done_callback(lambda _: last.close())
         outcome = own.outcome(stage, work)
+        import_module(PICTURES)  # while the other part goes on: this process draws next
         for ours, more in zip(vars(outcome).values(), vars(theirs()).values(), strict=True):
             ours.update(more)
     return outcome
@@ -178,7 +182,7 @@ def _answered(part: "_Part", report: Callable[..., None]) -> Outcome | UserError
         outcome = part.outcome(stage, SharedWork())
     except UserError as error:
         return UserError(str(error))
-    import_module("compare.figures.gallery")  # while the other part goes on: this process draws next
+    import_module(PICTURES)
     return outcome
 
 

@@ -285,7 +285,7 @@ def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, w
 
     cache = folder / "absent" / "cache"
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
-    monkeypatch.setattr("compare.pipeline.pipeline.write_report", full)
+    monkeypatch.setattr("compare.report.html_report.write_report", full)
     monkeypatch.setattr(
         "pinnray.commands.launch._space", lambda path: 10**3 if path.is_relative_to(cache) else 10**9
     )
