@@ -6,6 +6,7 @@ See `solvers.statistics.statistical_fem` for the random variables and the source
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,13 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from solvers.assimilation.pictures import FreePictures
 from solvers.solution import DisplacementField
-from solvers.statistics.kernel_field import Kernel, KernelField, MarkerPrediction, correlation
+from solvers.statistics.kernel_field import (
+    Kernel,
+    KernelField,
+    MarkerPrediction,
+    correlation,
+    derivative_by_log_length,
+)
 
 SPREADS, LENGTHS, FACTORS = (1e-4, 100.0), (2.0, 500.0), (0.2, 5.0)
 """Search ranges of the amplitudes, mm, the length, mm, and ρ."""
@@ -73,15 +80,16 @@ class Posterior:
     @classmethod
     def of(cls, data: StatFemData) -> "Posterior":
         """Find the hyperparameters, and condition on the markers."""
-
-        def minus_log_likelihood(parameters: FloatArray) -> float:
-            cholesky, residual, coefficients = _condition(data, _exponentials(parameters))
-            return float(0.5 * residual @ coefficients) + log_root_determinant(cholesky)
-
         bounds = np.log([FACTORS, SPREADS, SPREADS, LENGTHS])
         with threadpool_limits(1, user_api="blas"):  # on small matrices its threads wait for one another
             found = [
-                minimize(minus_log_likelihood, np.log(values), method="L-BFGS-B", bounds=bounds)
+                minimize(
+                    partial(minus_log_likelihood, data),
+                    np.log(values),
+                    jac=True,
+                    method="L-BFGS-B",
+                    bounds=bounds,
+                )
                 for values in START
             ]
         best = min(found, key=lambda result: result.fun)
@@ -185,6 +193,31 @@ class StatFemField:
 def _exponentials(parameters: FloatArray) -> Hyperparameters:
     factor, u, v, length = np.exp(parameters)
     return Hyperparameters(float(factor), np.array([u, v]), np.full(2, length))
+
+
+def minus_log_likelihood(data: StatFemData, parameters: FloatArray) -> tuple[float, FloatArray]:
+    """Of hyperparameters by their logarithms, (4,), without its constant, and its derivatives by these, (4,).
+
+    With the covariance C of d, d minus its prior mean r and w = C^-1 r it is (r . w + ln det C) / 2, whose
+    derivative by a parameter is (C^-1 - w w^T) : dC / 2 + w . dr.
+    """
+    constants = _exponentials(parameters)
+    factor, amplitudes, (length, _) = constants
+    cholesky, residual, coefficients = _condition(data, constants)
+    value = float(0.5 * residual @ coefficients) + log_root_determinant(cholesky)
+    inverse = cho_solve((cholesky, True), np.eye(len(residual)))
+    count = len(data.points)
+    by_covariance = 0.5 * (inverse - np.outer(coefficients, coefficients)).reshape(count, 2, count, 2)
+    spread = (factor * data.load_deviation) ** 2
+    by_load = spread * np.einsum("kgc,khd,gchd->", data.shapes, data.shapes, by_covariance)
+    mean = factor * np.einsum("k,kgc,gc->", data.load, data.shapes, coefficients.reshape(count, 2))
+    alike = np.einsum("gchc->cgh", by_covariance) * amplitudes[:, None, None] ** 2
+    kernel, longer = (
+        find(data.points, data.points, length, data.kernel)
+        for find in (correlation, derivative_by_log_length)
+    )
+    by_amplitudes = (alike * kernel).sum(axis=(1, 2))
+    return value, np.array([2 * by_load - mean, *(2 * by_amplitudes), (alike * longer).sum()])
 
 
 def log_root_determinant(cholesky: FloatArray) -> float:

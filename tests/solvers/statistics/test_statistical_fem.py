@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import approx_fprime
 
 from geometry.errors import UserError
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.statistics.statistical_fem import StatFemSolver
-from solvers.statistics.statistical_posterior import log_root_determinant
+from solvers.statistics.statistical_posterior import log_root_determinant, minus_log_likelihood
 from tests.solvers.conftest import check_gradient, observed_at
 from tests.solvers.statistics.kernels import matern
 
@@ -100,6 +101,15 @@ def test_no_other_constants_are_more_likely(solution, units):
     assert stats["log_evidence"] == pytest.approx(best, abs=1e-6)
     for change in 1 + 0.05 * np.concatenate([np.eye(4), -np.eye(4)]):
         assert log_likelihood(*(found * change)) < best
+
+
+@pytest.mark.parametrize("kernel", ["matern32", "matern52", "gaussian"])
+def test_the_likelihood_falls_as_its_derivatives_say(solution, kernel):
+    data = replace(solution.field.posterior.data, kernel=kernel)
+    for place in ([0.1, -1.0, -2.0, 3.0], [-0.2, 0.3, -1.0, 2.5]):
+        _, slopes = minus_log_likelihood(data, np.array(place))
+        expected = approx_fprime(np.array(place), lambda at: minus_log_likelihood(data, at)[0])
+        np.testing.assert_allclose(slopes, expected, rtol=1e-4)
 
 
 def test_a_load_that_is_off_is_found_where_nothing_else_is_wrong(coarse_mesh, units):
