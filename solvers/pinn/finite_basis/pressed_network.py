@@ -26,8 +26,12 @@ from solvers.solver import Progress
 
 STIFF, SOFT = 10.0, 0.3
 """k over Young's modulus, and the same with which the forces of a coarser network are taken over."""
-PENETRATION = 5e-4
-"""Largest gap of a node in contact and penetration of any node, mm."""
+PENETRATION, LOOSE, STALLED = 5e-4, 5e-3, 0.9
+"""Largest gap of a node in contact and penetration of any node, mm.
+
+The windows of a level may be too wide to bring all of these nodes onto the cylinder: their forces would drift
+apart for ever. A gap below LOOSE that is more than STALLED of the one before new multipliers will do.
+"""
 EXACT, ROUGH = 1e-6, 1e-2
 """Newton stops when a step changes this part of the energy, in equilibrium and on the way to it."""
 ITERATIONS, UPDATES = 20, 20
@@ -160,7 +164,7 @@ class PressedNetwork:
 
         Without a tangent near the guess one is formed there, and takes the guess to the nodes with forces.
         """
-        iterations = 0
+        iterations, before = 0, np.inf
         if tangent is None:
             tangent, iterations = self._tangent(output), 1
             if tangent is None:
@@ -179,9 +183,10 @@ class PressedNetwork:
             apart = max(np.abs(gap[forces > 0]).max(initial=0.0), -gap.min())
             if fraction < 1:  # on the way a soft contact will do
                 return NewtonIterate(output, forces, step.size), iterations
-            if apart <= PENETRATION and (state := self._settled(output, multipliers)) is not None:
+            near = apart <= PENETRATION or STALLED * before < apart <= LOOSE
+            if near and (state := self._settled(output, multipliers)) is not None:
                 return state, iterations + 1
-            multipliers = forces
+            multipliers, before = forces, apart
         return None, iterations
 
     def _settled(self, output: torch.Tensor, multipliers: FloatArray) -> NewtonIterate | None:
@@ -252,8 +257,13 @@ class PressedNetwork:
         least: float,
         shortest: float = SHORTEST,
     ) -> Taken | None:
-        """So much of a step that the potential falls; None if a point is turned inside out."""
-        step = self._step(stage, output, np.flatnonzero(self.contact.forces(stage) > 0), tangent)
+        """So much of a step that the potential falls; None if a point is turned inside out.
+
+        A finger that has left the cylinder may be unstable without it: its step is that of one held there.
+        """
+        forces = self.contact.forces(stage)
+        touching = np.flatnonzero(forces > 0 if forces.any() else stage.contact > 0)
+        step = self._step(stage, output, touching, tangent)
         length = 1.0
         while step is not None and length >= shortest:
             moved = output + length * step.change
@@ -303,6 +313,8 @@ class PressedNetwork:
         free, *unit = tangent.factors.solve(np.concatenate([-residual[None], rows]))
         springs = ConstrainedElimination(rows, np.reshape(unit, rows.shape), compliance)
         change, _ = springs.solution(free)
+        if residual @ change > 0:  # the curvature is negative that way: downhill is the other one
+            change = -change
         work = abs(float(residual @ change))
         size = work / max(self.network.energy.total(output), work) if work else 0.0
         unstable = springs.unstable(tangent.factors.negative)

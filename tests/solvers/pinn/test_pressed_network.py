@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,13 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import pressed_network
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
-from solvers.pinn.finite_basis.pressed_network import PENETRATION, PressedNetwork
+from solvers.pinn.finite_basis.pressed_network import (
+    PENETRATION,
+    UPDATES,
+    Minimum,
+    PressedNetwork,
+    Tangent,
+)
 from solvers.pinn.finite_basis.solver import estimated_error
 from solvers.problem import Load, Material, Problem
 
@@ -96,6 +103,52 @@ def test_a_newton_step_is_that_of_the_residual_by_differences(problem, local):
     part = 1e-4
     slope = (residual(output + part * step.change) - residual(output - part * step.change)) / (2 * part)
     np.testing.assert_allclose(slope, -residual(output), atol=1e-6 * np.abs(residual(output)).max())
+
+
+@pytest.fixture
+def coarse(problem):
+    """A network that is too coarse for a wide cylinder."""
+    load = Load(kind="cylinder", radius=15.0, displacement=(0.0, -STROKE))
+    wide = replace(problem, load=load)
+    return PressedNetwork.of(LOCAL.level(wide, 4.0), wide)
+
+
+def test_gaps_that_no_forces_close_are_let_be(coarse, monkeypatch):
+    """As where windows are too wide to bring all nodes onto the cylinder: forces would drift for ever."""
+    output = coarse.network.zero_output
+    tangent, none = coarse._tangent(output), np.zeros(len(coarse.contact.positions))
+    step = coarse._step(coarse.stage(output, 0.0, none), output, np.array([3]), tangent)
+    monkeypatch.setattr(PressedNetwork, "_minimum", lambda *_: (Minimum(output, step, tangent), 1))
+    monkeypatch.setattr(PressedNetwork, "_settled", lambda *_: "settled")
+    for depth, expected in (
+        (0.5 * PENETRATION, ("settled", 2)),
+        (2 * PENETRATION, ("settled", 3)),
+        (1, None),
+    ):
+        pressed = replace(coarse, contact=replace(coarse.contact, travel=np.array([0.0, -depth])))
+        found = pressed._equilibrium(output, 1.0, none, tangent)
+        assert found == expected
+
+
+def test_a_finger_that_has_left_the_cylinder_is_held_at_the_nodes_with_forces(coarse):
+    output = coarse.network.zero_output
+    multipliers = np.zeros(len(coarse.contact.positions))
+    multipliers[[3, 5]] = 1e-6
+    off, tangent = coarse.stage(output, 0.0, multipliers), coarse._tangent(output)
+    off.nodal[coarse.contact.nodes, 1] -= 1.0
+    assert not coarse.contact.forces(off).any()
+    held = coarse._taken(off, output, tangent, np.inf)
+    expected = coarse._step(off, output, np.array([3, 5]), tangent)
+    np.testing.assert_array_equal(held.step.change, expected.change)
+
+
+def test_a_step_where_the_curvature_is_negative_goes_downhill(coarse, local):
+    output, none = coarse.network.project(local.field), np.zeros(0, dtype=int)
+    stage = coarse.stage(output, 0.0, np.zeros(len(coarse.contact.positions)))
+    factors = coarse._tangent(coarse.network.zero_output).factors
+    turned = SimpleNamespace(solve=lambda right: -factors.solve(right), negative=0)
+    downhill, other = (coarse._step(stage, output, none, Tangent(each, output)) for each in (factors, turned))
+    np.testing.assert_array_equal(downhill.change, other.change)
 
 
 @pytest.mark.slow
