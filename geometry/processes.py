@@ -222,9 +222,11 @@ class _Child:
         )
         theirs.close()
         self.send((sys.path, modules))
+        self._unused = True
 
     def send(self, content: object) -> None:
         """Send the search path and the modules to import, and later the tasks."""
+        self._unused = False
         with suppress(OSError):  # it has ended already, which its next message tells
             self.connection.send(content)
 
@@ -242,9 +244,9 @@ class _Child:
             return "death", ProcessFailed(code, reason)
 
     def close(self) -> None:
-        """Let an idle process end, and one with a task after it has saved its state."""
+        """Let a process end, and one with a task after it has saved its state; an unused one may import."""
         self.connection.close()
-        if self._written:
+        if self._written or self._unused:
             self.process.kill()
 
     def end(self, *, kill: bool = False) -> None:

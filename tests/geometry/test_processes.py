@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from geometry.processes import Pool, ProcessFailed, child_environment, end_with_parent
+from geometry.processes import PATIENCE_S, Pool, ProcessFailed, child_environment, end_with_parent
 from pinnray.commands.launch import guarded
 from solvers.solver import Progress
 
@@ -220,6 +220,23 @@ def test_a_process_beside_this_one_stays_for_the_next_task():
                 found.append(answer.result())
             time.sleep(0.1)
     assert found[0] == found[1]
+
+
+def imported(module: str, progress: Progress) -> bool:
+    return module in sys.modules
+
+
+def test_a_process_that_is_started_early_imports_what_it_is_told_as_far_as_there_is():
+    with Pool(1, modules=["no_such_module", "fractions"]) as pool:
+        pool.start()
+        assert list(pool.answers(imported, {0: "fractions"})) == [(0, True)]
+
+
+def test_a_process_that_was_never_asked_is_not_waited_for():
+    with Pool(1, modules=["tests.geometry.slow_module"]) as pool:
+        pool.start()
+        started = time.monotonic()
+    assert time.monotonic() - started < PATIENCE_S
 
 
 def test_a_task_beside_a_block_that_raises_saves_its_state(tmp_path):
