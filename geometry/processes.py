@@ -329,7 +329,7 @@ def serve() -> None:
         sys.path += [place for place in places if place and place not in sys.path]
         Thread(target=_listen, args=(connection, tasks, ending, patience_s), daemon=True).start()
         for module in modules:
-            with suppress(ImportError):
+            with suppress(Exception):  # what is missing or broken is told by the task that needs it
                 import_module(module)
         while (message := tasks.get()) is not None:
             content, timeout_s = message

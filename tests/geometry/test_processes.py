@@ -227,7 +227,7 @@ def imported(module: str, progress: Progress) -> bool:
 
 
 def test_a_process_that_is_started_early_imports_what_it_is_told_as_far_as_there_is():
-    with Pool(1, modules=["no_such_module", "fractions"]) as pool:
+    with Pool(1, modules=["no_such_module", "tests.geometry.broken_module", "fractions"]) as pool:
         pool.start()
         assert list(pool.answers(imported, {0: "fractions"})) == [(0, True)]
 
