@@ -150,3 +150,11 @@ def test_unknowns_are_eliminated_in_the_order_of_least_fill(law):
     problem = DiscreteEquilibrium(Problem(mesh, Material(law=law, poisson=0.3)), LagrangeSpace(mesh, 2))
     ordering, approximate_minimum_fill = 7, 2  # in MUMPS' guide
     assert problem.factors.output(ordering) == approximate_minimum_fill
+
+
+def test_newton_says_whether_its_last_tangent_is_that_of_equilibrium():
+    problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.1, -0.4)))
+    far, near = started(newton(problem, 1), problem), started(newton(problem), problem)
+    assert not far.tangent
+    assert near.tangent
+    assert not newton(problem).solve(near.state).tangent  # none was formed
