@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import ufl
-from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
@@ -28,8 +27,8 @@ from solvers.identification.body import Linearised
 from solvers.identification.contradiction import with_doubts
 from solvers.identification.field import IdentifiedField
 from solvers.identification.fit import Fit
-from solvers.identification.model import ResponseModel
-from solvers.identification.result import Identified
+from solvers.identification.model import Response, ResponseModel
+from solvers.identification.nested_search import ROUGHLY, NestedSearch
 from solvers.identification.search import Identifier
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.tracker import ForceTracker, LawTracker
@@ -84,9 +83,16 @@ class FemBody:
         """(N, 2)."""
         return self._clamped.shape
 
+    def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
+        """At the quadrature points; see `Body`."""
+        walls = np.einsum("k,kqij->qij", changes, self._wall_gradients)
+        gradient = np.stack([derivative @ state for derivative in self._derivatives], axis=-1)
+        inside_out = (deformation_jacobian(walls) <= 0) | (deformation_jacobian(gradient + walls) <= 0)
+        return bool(np.isfinite(state).all() and not inside_out.any())
+
     def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> Linearised | None:
         """Assemble and factorise at a state; see `Body`."""
-        if not self._admissible(state, changes):
+        if not self.admissible(state, changes):
             return None
         self._set(state, lame, changes)
         force = np.where(self._clamped, 0.0, self._distributed.assemble_nodal(self._force))
@@ -153,13 +159,6 @@ class FemBody:
         found: FloatArray = np.stack(by_axis, axis=-1).reshape(len(location.points), len(states), 2, 2)
         return found.swapaxes(0, 1)
 
-    def _admissible(self, state: FloatArray, changes: FloatArray) -> bool:
-        """Whether neither the walls' motion nor the deformation turns a quadrature point inside out."""
-        walls = np.einsum("k,kqij->qij", changes, self._wall_gradients)
-        gradient = np.stack([derivative @ state for derivative in self._derivatives], axis=-1)
-        inside_out = (deformation_jacobian(walls) <= 0) | (deformation_jacobian(gradient + walls) <= 0)
-        return bool(np.isfinite(state).all() and not inside_out.any())
-
     def _set(self, state: FloatArray, lame: Lame, changes: FloatArray) -> None:
         self._distributed.set_function(state)
         self._moved.set(np.einsum("k,knx->nx", changes, self._motion.nodal))
@@ -174,51 +173,6 @@ class FemBody:
         if key not in self._sampled:
             self._sampled[key] = self.space.mesh.locate(points)
         return self._sampled[key]
-
-
-IMPROBABLE = 8.0
-"""Logarithm of the ratio of probabilities on a coarse mesh from which on a law is not carried to a fine one:
-the fine mesh changed it by up to 3.5, and a law of one in a hundred has no weight."""
-
-ROUGHLY = 1e-2
-"""Relative change of the cost below which a search on a coarse mesh has converged: the steps on the fine one
-are as large, and on the coarse one the force's place makes the cost rough."""
-
-
-class NestedSearch:
-    """Finds the unknowns on a coarse mesh and carries them to a fine one; see `Identifier`.
-
-    Args:
-        coarse: Seeks by elements on the coarse mesh.
-        fine: Of the same laws, on the fine one.
-    """
-
-    def __init__(self, coarse: Identifier, fine: Identifier) -> None:
-        self._coarse, self._fine = coarse, fine
-        self._weights: csr_matrix | None = None
-
-    def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
-        """The unknowns under every law, and the laws' probabilities; see `Identifier`."""
-        found = self._coarse.identify(observations, progress)
-        polished = [self._polished(found.best, observations)]
-        least = min(found.best.log_posterior, polished[0].log_posterior) - IMPROBABLE
-        for fit in found.fits[1:]:
-            polished.append(self._polished(fit, observations) if fit.log_posterior > least else fit)
-        return Identified.ranked(polished, found.doubtful, found.lost)
-
-    def _polished(self, fit: Fit, observations: Observations) -> Fit:
-        """A coarse fit, whose response is interpolated at the fine nodes and made exact there."""
-        model, response = self._fine.models[fit.law], fit.response
-        here, there = fit.model.body, model.body
-        if not (isinstance(here, FemBody) and isinstance(there, FemBody)):
-            raise TypeError("the bodies of fem-id are finite elements")
-        if self._weights is None:
-            self._weights = here.space.shape_functions(
-                there.space.mesh.locate_on(here.space.mesh, there.space.nodes)
-            )
-        slopes = np.stack([self._weights @ slope for slope in response.slopes])
-        carried = replace(response, state=self._weights @ response.state, slopes=slopes)
-        return self._fine.polished(fit._replace(model=model, response=carried), observations)
 
 
 def _both_components(values: FloatArray) -> FloatArray:
@@ -305,7 +259,8 @@ class FemIdSolver(IdentifyingSolver):
         if (coarse := coarser(problem)) is None:
             return self._identifier(problem)
         rough = self._identifier(coarse, cost_change=ROUGHLY)
-        return NestedSearch(rough, self._identifier(problem, flexibility=rough.flexibility))
+        fine = self._identifier(problem, flexibility=rough.flexibility)
+        return NestedSearch(rough, fine, _interpolated)
 
     def _identifier(
         self, problem: Problem, cost_change: float = COST_CHANGE, flexibility: float | None = None
@@ -332,3 +287,13 @@ def fem_law_tracker(
         unknowns = Unknowns(replace(problem, material=material, observations=None), DEFAULT)
         trackers[law] = ForceTracker(ResponseModel(FemBody(unknowns, degree), unknowns), points, radius)
     return LawTracker(trackers)
+
+
+def _interpolated(fit: Fit, model: ResponseModel) -> Response:
+    """The response of a coarse fit at the nodes of a fine model."""
+    here, there = fit.model.body, model.body
+    if not (isinstance(here, FemBody) and isinstance(there, FemBody)):
+        raise TypeError("the bodies of fem-id are finite elements")
+    weights = here.space.shape_functions(there.space.mesh.locate_on(here.space.mesh, there.space.nodes))
+    slopes = np.stack([weights @ slope for slope in fit.response.slopes])
+    return replace(fit.response, state=weights @ fit.response.state, slopes=slopes)

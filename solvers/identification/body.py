@@ -37,6 +37,10 @@ class Body(Protocol):
         """Shape of a state."""
         ...
 
+    def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
+        """Whether neither the walls' motion nor the displacement turns a point inside out."""
+        ...
+
     def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> Linearised | None:
         """The force at a state and the tangent, factorised; None if a point is turned inside out."""
         ...

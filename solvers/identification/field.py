@@ -88,14 +88,13 @@ class Member:
     steps: Sequence[Snapshot]  # The finger `STEP` times each of p independent standard errors away
     response: Response
     model: ResponseModel
-    coarser: Snapshot | None = None  # The finger that a coarser discretisation finds, if there is one
 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedField(Snapshot):
     """The displacement by the most probable law, with deviations.
 
-    They include the distances of the other laws, and of a coarser discretisation, from it.
+    They include the distances of the other laws from it, but not the error of the discretisation.
     """
 
     members: Sequence[Member]  # The most probable law first
@@ -136,7 +135,5 @@ class IdentifiedField(Snapshot):
             own, *steps = quantities([member.found, *member.steps])
             best = own if best is None else best
             spread = sum(((step - own) / STEP) ** 2 for step in steps)
-            if member.coarser is not None:
-                spread += (quantities([member.coarser])[0] - own) ** 2
             variance = variance + member.probability * (spread + (own - best) ** 2)
         return np.sqrt(variance)

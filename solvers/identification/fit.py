@@ -32,8 +32,6 @@ class Fit(NamedTuple):
     response: Response  # The equilibrium there
     measurement: MarkerData  # The markers that were believed
     exact: bool  # Whether the equilibrium was found to the last digit, and by the finest discretisation
-    # The fit by a coarser discretisation, whose difference estimates the error of this one
-    coarser: "Fit | None" = None
 
     @property
     def law(self) -> LawName:

@@ -70,7 +70,6 @@ class LawFits:
             estimate=found,
             response=fit.model.extrapolated(about, found.values),
             measurement=measurement,
-            coarser=fit.coarser and self.shifted(fit.coarser, measurement),
         )
 
     def fit(
@@ -103,7 +102,8 @@ class LawFits:
                 reached[values.tobytes()] = found
                 return markers.predicted(found)
             lost.append(values)
-            if len(lost) > MOST_LOST or (explained_elsewhere and not reached):
+            nowhere = not reached and (explained_elsewhere or len(lost) > 1)  # nor where the priors are
+            if nowhere or len(lost) > MOST_LOST:
                 raise nothing
             return None
 

@@ -74,6 +74,7 @@ class ResponseModel:
         *,
         iterations: int = MAX_ITERATIONS,
         halvings: int = HALVINGS,
+        slopes: FloatArray | None = None,
     ) -> Response | None:
         """The response at values of the unknowns, shape (p,); None if no equilibrium is found on the way.
 
@@ -82,9 +83,10 @@ class ResponseModel:
             tolerance: `ROUGH` or `EXACT`.
             iterations: Newton iterations from one hypothesis to the next.
             halvings: Times that the way is halved where no equilibrium is found.
+            slopes: Derivatives to take in place of computed ones, shape (p, *shape).
         """
         self.evaluations += 1
-        found = self._reached(values, tolerance, iterations, halvings)
+        found = self._reached(values, tolerance, iterations, halvings, slopes)
         if found is not None:
             self._last = found
         return found
@@ -134,23 +136,25 @@ class ResponseModel:
         return rows, np.array(moved_rows).reshape(-1, *rows.shape)
 
     def _reached(
-        self, values: FloatArray, tolerance: float, iterations: int, halvings: int
+        self, values: FloatArray, tolerance: float, iterations: int, halvings: int, slopes: FloatArray | None
     ) -> Response | None:
         """The response, by way of those halfway where it is too far from the last one."""
-        found, before = self._near(values, tolerance, iterations), self._last
+        found, before = self._near(values, tolerance, iterations, slopes), self._last
         # At rest there is no force, and the other unknowns are as expected.
         rest = np.array([parameter.start for parameter in self.unknowns.parameters(1.0)])
         start = rest if before is None else before.values
         if found is not None or not halvings or (start == values).all():
             return found
-        self._last = self._reached(0.5 * (start + values), ROUGH, iterations, halvings - 1)
+        self._last = self._reached(0.5 * (start + values), ROUGH, iterations, halvings - 1, slopes)
         if self._last is not None:
-            found = self._reached(values, tolerance, iterations, halvings - 1)
+            found = self._reached(values, tolerance, iterations, halvings - 1, slopes)
         if found is None:
             self._last = before
         return found
 
-    def _near(self, values: FloatArray, tolerance: float, iterations: int) -> Response | None:
+    def _near(
+        self, values: FloatArray, tolerance: float, iterations: int, slopes: FloatArray | None
+    ) -> Response | None:
         """The response by Newton's method from the last one, extrapolated along its derivatives."""
         hypothesis = self.unknowns.hypothesis(values)
         state = np.zeros(self.body.shape)
@@ -181,24 +185,25 @@ class ResponseModel:
             if not np.isfinite(size) or size > max(before, 0.1):
                 return None
             if size < tolerance:
-                return self._with_slopes(values, hypothesis, (state + step, state), linearised, traction)
+                if self.body.admissible(state + step, hypothesis.changes):
+                    state = state + step
+                if slopes is None:
+                    slopes = self._slopes(values, hypothesis, state, linearised, traction)
+                return self._response(values, hypothesis, state, slopes, traction)
             before = size
         return None
 
-    def _with_slopes(
+    def _slopes(
         self,
         values: FloatArray,
         hypothesis: Hypothesis,
-        states: tuple[FloatArray, FloatArray],
+        state: FloatArray,
         linearised: Linearised,
         traction: FloatArray,
-    ) -> Response:
-        """The response at the first of two states or, where that turns a point inside out, at the second."""
+    ) -> FloatArray:
+        """C' at a state."""
         force, couple, slope = hypothesis.force, hypothesis.couple, self.unknowns.slopes(values)
-        for state in states:
-            parts = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
-            if all(np.isfinite(part).all() for part in parts):
-                break
+        parts = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
         right = np.tensordot(slope.force, traction[0], axes=1)
         right += np.tensordot(slope.couple, traction[1], axes=1)
         for by, moved, turned in zip((slope.position, slope.width), traction[1:3], traction[3:], strict=True):
@@ -206,7 +211,17 @@ class ResponseModel:
             right += np.multiply.outer(by, change)
         for by, part in zip((slope.changes, slope.moduli, slope.feet), parts, strict=True):
             right -= np.tensordot(by, part, axes=1)
-        slopes = linearised.solve(right) + np.tensordot(slope.feet, self.body.feet, axes=1)
+        return linearised.solve(right) + np.tensordot(slope.feet, self.body.feet, axes=1)
+
+    def _response(
+        self,
+        values: FloatArray,
+        hypothesis: Hypothesis,
+        state: FloatArray,
+        slopes: FloatArray,
+        traction: FloatArray,
+    ) -> Response:
+        force, slope = hypothesis.force, self.unknowns.slopes(values)
         inner = tuple(range(1, slopes.ndim))
         contact, by_position, by_width = np.asarray(np.tensordot(traction[:3], state, axes=state.ndim))
         contact_slopes: FloatArray = np.tensordot(slopes, traction[0], axes=(inner, inner))

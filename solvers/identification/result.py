@@ -255,7 +255,6 @@ def _member(fit: Fit, probability: float, problem: Problem) -> Member:
         [_snapshot(fit, problem, error) for error in (STEP * fit.standard_errors).T],
         fit.response,
         fit.model,
-        None if fit.coarser is None else _snapshot(fit.coarser, problem),
     )
 
 

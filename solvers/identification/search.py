@@ -4,7 +4,7 @@ Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, Chapman 
 without an observation.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from solvers.identification.body import Body
 from solvers.identification.contradiction import MUCH_NEARER, likely_order
 from solvers.identification.fit import Fit
 from solvers.identification.law_fits import LawFits, LawModels
-from solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
+from solvers.identification.model import MarkerData, MarkerModel, ResponseModel
 from solvers.identification.result import Identified
 from solvers.identification.settings import IdentifyingSolver
 from solvers.identification.unknowns import LAWS, Unknowns
@@ -31,9 +31,10 @@ QUICK, ROUGH = 4, 2
 WIDE = (2.0, 4.0)
 """Standardised widths of a contact from which to start again where none explains the markers."""
 
-POLISHES, POLISHED = 6, 0.5
-"""Steps of first order on a finer mesh at most, and the size of the last one in the posterior's metric, in
-standard deviations: what a step leaves was measured to be a third of it."""
+POLISHES, POLISHED, SHRUNK = 6, 0.5, 0.2
+"""Steps of first order by a finer discretisation at most; the size of the last one in the posterior's metric,
+in standard deviations, of which it leaves about a third; and the share of the step before it that a step has
+where the derivatives serve."""
 
 IMPROBABLE = 15.0
 """Logarithm of the ratio of probabilities from which on a law is not fitted to the end."""
@@ -50,7 +51,6 @@ class Identifier:
         settings: Unknowns, priors, radius of the markers and reaction.
         problem: The finger; of its load only the drawn contact counts, of its law nothing unless it is given.
         body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
-        laws: The laws to choose from; None: by the settings.
         cost_change: Relative change of the cost below which a search has converged.
         flexibility: Of the finger if it is known, mm per N/mm; see `ResponseModel.flexibility`.
     """
@@ -61,7 +61,6 @@ class Identifier:
         problem: Problem,
         body: Callable[[Unknowns], Body],
         *,
-        laws: Sequence[LawName] | None = None,
         cost_change: float = COST_CHANGE,
         flexibility: float | None = None,
     ) -> None:
@@ -72,15 +71,13 @@ class Identifier:
             unknowns = Unknowns(own, settings.unknowns)
             return ResponseModel(body(unknowns), unknowns)
 
-        if laws is None:
-            laws = LAWS if settings.law == "evidence" else (problem.material.law,)
+        laws = LAWS if settings.law == "evidence" else (problem.material.law,)
         self.models = LawModels(laws, model)
-        first = self.models[laws[0]]
-        self._names = first.unknowns.names
-        self.flexibility = first.flexibility() if flexibility is None else flexibility
-        self.parameters = first.unknowns.parameters(self.flexibility, settings.prior)
+        self.flexibility = self.models[laws[0]].flexibility() if flexibility is None else flexibility
+        unknowns = Unknowns(problem, settings.unknowns)
+        self._names, self._feet = unknowns.names, unknowns.feet.names
+        self.parameters = unknowns.parameters(self.flexibility, settings.prior)
         self._fits = LawFits(self.models, self.parameters, cost_change)
-        self._feet = first.unknowns.feet.names
         self._known: dict[LawName, Fit] = {}
 
     def measurement(self, observations: Observations) -> MarkerData:
@@ -142,57 +139,37 @@ class Identifier:
             other = self._fits.fit(law, fit.measurement, other)
         return other
 
-    def start_from(self, fit: Fit) -> None:
-        """Start the next search from a fit, whose response has a state of this discretisation."""
-        self._known[fit.law] = fit
+    def polished(self, fit: Fit, observations: Observations) -> Fit:
+        """A fit after steps of first order, each from an equilibrium, with the derivatives that the fit has.
 
-    def refined(
-        self,
-        fit: Fit,
-        model: ResponseModel,
-        state: FloatArray,
-        observations: Observations,
-        *,
-        from_rest: bool = False,
-    ) -> Fit | None:
-        """A fit by a finer discretisation: its equilibrium, and from there the unknowns to first order.
+        Where the steps do not settle, the unknowns are sought from there; where there is no equilibrium
+        either, the fit is marked as inexact.
 
         Args:
-            fit: By a coarser discretisation.
-            model: The finger by the fit's law, discretised more finely.
-            state: Of the finer discretisation, near equilibrium for the fit's values.
-            observations: The fit's, with the standard deviations for the finer discretisation.
-            from_rest: Whether to go there from rest where the state is too far from equilibrium.
-
-        Returns:
-            None if no equilibrium is found in many iterations.
+            fit: Its response is near equilibrium, with derivatives that are nearly those there.
+            observations: Those of the fit.
         """
-        model.restart(carried(fit.response, state))
-        response = model.response(fit.response.values, iterations=20, halvings=0)
-        if response is None and from_rest:
-            model.restart(None)
-            response = model.response(fit.response.values)
-        if response is None:
-            return None
-        about = fit._replace(model=model, response=response, coarser=None)
+        model, start, before = fit.model, fit, np.inf
         measurement = self.measurement(observations).only(fit.measurement.kept)
-        return self._fits.shifted(about, measurement)._replace(coarser=fit)
-
-    def polished(self, fit: Fit, observations: Observations) -> Fit:
-        """A fit whose response is near equilibrium, after some steps of first order; see `refined`.
-
-        Where there is no equilibrium near the fit, it stays as it is, marked as inexact.
-        """
+        model.restart(fit.response)
         for _ in range(POLISHES):
-            before = fit.estimate.z
-            found = self.refined(fit, fit.model, fit.response.state, observations, from_rest=True)
-            if found is None:
-                return fit._replace(exact=False)
-            fit = found._replace(coarser=None)
-            step = fit.estimate.z - before
-            if step @ np.linalg.solve(fit.estimate.covariance, step) < POLISHED**2:
+            values, slopes = fit.response.values, fit.response.slopes
+            response = model.response(values, iterations=20, halvings=0, slopes=slopes)
+            if response is None:
                 break
-        return fit
+            start = fit._replace(response=response)
+            fit = self._fits.shifted(start, measurement)
+            step = fit.estimate.z - start.estimate.z
+            size = float(np.sqrt(step @ np.linalg.solve(fit.estimate.covariance, step)))
+            if size < POLISHED:
+                return fit
+            if size > SHRUNK * before:
+                break
+            before = size
+        try:
+            return self._fits.fit(fit.law, measurement, start)
+        except NoSolutionError:
+            return fit._replace(exact=False)
 
     def updated(self, found: Identified, observations: Observations) -> Identified:
         """The unknowns for observations near those of fits, to first order: no equilibrium is solved."""
@@ -329,9 +306,3 @@ def _explained(fit: Fit) -> bool:
     found = fit.estimate
     cost = float(found.residuals @ found.residuals + found.z @ found.z)
     return found.inflation == 1 and cost < chdtri(len(found.residuals), 1e-3)
-
-
-def carried(response: Response, state: FloatArray) -> Response:
-    """A response with the state of another discretisation, from which a search can start."""
-    slopes = np.zeros((len(response.values), *state.shape))
-    return replace(response, state=state, slopes=slopes)

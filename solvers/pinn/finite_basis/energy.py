@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray, IntArray
@@ -100,6 +101,11 @@ class NetworkEnergy:
     def with_basis(self, basis: FiniteBasis) -> "NetworkEnergy":
         """The energy of a network of the same windows, with which much is done."""
         return replace(self, basis=basis, kept={} if self.small else None)
+
+    @property
+    def places(self) -> FloatArray:
+        """The quadrature points, shape (q, 2), mm."""
+        return torch.cat([patch.points for patch in self.patches]).numpy()
 
     @property
     def points(self) -> int:
@@ -217,16 +223,17 @@ class NetworkEnergy:
         """
         functions = np.arange(self.basis.per_window)
 
-        def task(number: int) -> tuple[FloatArray, IntArray, IntArray]:
+        def task(number: int) -> tuple[FloatArray, IntArray, NDArray[np.int32]]:
             patch = self.patches[number]
             along = self._along(number).flatten(2).transpose(0, 1).flatten(0, 1).numpy()
             row, column = np.nonzero(along)
-            reached = (patch.near.numpy()[:, None] * self.basis.per_window + functions).ravel()
-            return along[row, column], np.bincount(row, minlength=len(along)), reached[column]
+            reached = patch.near.numpy()[:, None] * self.basis.per_window + functions
+            columns = reached.ravel().astype(np.int32)[column]
+            return along[row, column], np.bincount(row, minlength=len(along)), columns
 
         parts = imap_in_threads(task, range(len(self.patches)))
         values, counts, columns = (np.concatenate(part) for part in zip(*parts, strict=True))
-        starts = np.concatenate([[0], np.cumsum(counts)])
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         return csr_matrix((values, columns, starts), shape=(2 * self.points, self.basis.size))
 
     def hessian(self, tangent: torch.Tensor) -> BlockMatrix:

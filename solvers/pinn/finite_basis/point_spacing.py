@@ -101,14 +101,14 @@ def graded_triangles(mesh: TriangleMesh, spacing: PointSpacing, share: float) ->
 
 
 def graded_quadrature(
-    triangles: FloatArray, spacing: PointSpacing, share: float, single: float = 0.25
+    triangles: FloatArray, spacing: PointSpacing, share: float
 ) -> tuple[FloatArray, FloatArray]:
     """Points (q, 2), mm, and weights (q,), mm^2, in triangles (t, 3, 2).
 
-    Three points of degree 2; one point in a triangle whose edges are below `single` times `share` of the
-    spacing: with a quarter, sixteen of them stand for one.
+    Three points of degree 2; one point in a triangle whose edges are below a quarter of `share` of the
+    spacing: sixteen of them stand for one.
     """
-    small = _longest_edge(triangles) <= single * share * spacing.at(triangles.mean(axis=1))
+    small = _longest_edge(triangles) <= 0.25 * share * spacing.at(triangles.mean(axis=1))
     parts = [_element_rule(triangles[small], 1), _element_rule(triangles[~small], 2)]
     points, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
     return points, weights

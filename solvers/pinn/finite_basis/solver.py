@@ -207,20 +207,19 @@ class FiniteBasisSolver(NetworkSolver):
             left_out=None if fit is None else leave_one_out_displacements(problem, fit.residual_without),
         )
 
-    def level(self, problem: Problem, scale: float, single: float = 0.25) -> ConstrainedNetwork:
+    def level(self, problem: Problem, scale: float) -> ConstrainedNetwork:
         """The network of a refinement level, with spacings of `scale` times the settings'.
 
         Args:
             problem: The body and the load.
             scale: Of the spacings.
-            single: Share of a quadrature cell below which an element of the mesh has one point.
         """
         bare = replace(problem, observations=None)
-        key = (type(self).windows, *self._of_network.items(), bare.digest, scale, single)
-        energy = shared(key, lambda: self._energy(bare, scale, single))
+        key = (type(self).windows, *self._of_network.items(), bare.digest, scale)
+        energy = shared(key, lambda: self._energy(bare, scale))
         return ConstrainedNetwork.of(energy, problem, self.weighting)
 
-    def _energy(self, problem: Problem, scale: float, single: float) -> NetworkEnergy:
+    def _energy(self, problem: Problem, scale: float) -> NetworkEnergy:
         mesh = problem.mesh
         spacing = PointSpacing.of(
             problem,
@@ -240,7 +239,7 @@ class FiniteBasisSolver(NetworkSolver):
             constraint=HardConstraint.of(mesh, self.base_length),
             rng=rng,
         )
-        quadrature = graded_quadrature(triangles, spacing, self.cell, single)
+        quadrature = graded_quadrature(triangles, spacing, self.cell)
         return NetworkEnergy.of(basis, problem.material, *quadrature)
 
     def _status(

@@ -71,7 +71,6 @@ class NetworkBody:
         problem: Problem,
         motion: WallMotion,
         scale: float = 1.0,
-        single: float = 0.25,
     ) -> "NetworkBody":
         """The body by a solver's windows, their spacings times a scale.
 
@@ -80,11 +79,9 @@ class NetworkBody:
             problem: The body, its law, and the load at whose place the windows are denser.
             motion: Of the walls.
             scale: Of the spacings.
-            single: Share of a quadrature cell below which an element of the mesh has one point.
         """
-        energy = solver.level(problem, scale, single).energy
-        points = torch.cat([patch.points for patch in energy.patches]).numpy()
-        return cls(energy, motion.gradients()[:, problem.mesh.locate(points).cells])
+        energy = solver.level(problem, scale).energy
+        return cls(energy, motion.gradients()[:, problem.mesh.locate(energy.places).cells])
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -92,18 +89,23 @@ class NetworkBody:
         basis = self._energy.basis
         return basis.windows.count, 2, basis.per_window
 
+    def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
+        """At the quadrature points; see `Body`."""
+        with pool():
+            return self._strained(state, self._metric(changes)) is not None
+
     def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> Linearised | None:
         """The force at a state and the tangent; None if a point is turned inside out."""
         metric = self._metric(changes)
         with pool():
-            if (gradient := self._admissible(state, metric)) is None:
+            if (gradient := self._strained(state, metric)) is None:
                 return None
             stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
             force = self._forces(_pulled_back(stress, metric)[None])[0]
         tangent = _tangent_pulled_back(tangent, metric)
         return Linearised(force.numpy(), partial(self._solved, tangent), partial(self._negative, tangent))
 
-    def _admissible(self, state: FloatArray, metric: WallMetric) -> torch.Tensor | None:
+    def _strained(self, state: FloatArray, metric: WallMetric) -> torch.Tensor | None:
         """G of a state at the quadrature points, (q, 2, 2); None if a point is turned inside out."""
         gradient = self._gradient(state) @ metric.inverse
         inside_out = not ((metric.volume > 0).all() and (deformation_jacobian(gradient) > 0).all())
@@ -185,22 +187,25 @@ class NetworkBody:
             ),
         ).swapaxes(0, 1)
 
-    def projected(
-        self, other: "NetworkBody", state: FloatArray, lame: Lame, changes: FloatArray
-    ) -> FloatArray:
-        """The state nearest to another network's, in the energy norm of the tangent there.
+    @property
+    def points(self) -> FloatArray:
+        """The quadrature points, shape (q, 2), mm."""
+        return self._energy.places
 
-        Its factors are kept for the solves that follow.
+    def projected(self, gradients: FloatArray, lame: Lame, changes: FloatArray) -> FloatArray:
+        """States (s, *shape) nearest to displacement gradients (s, q, 2, 2) at the points.
+
+        That is in the energy norm of the tangent at the first one, whose factors are kept for the solves that
+        follow.
         """
-        metric = self._metric(changes)
+        metric, given = self._metric(changes), torch.from_numpy(np.ascontiguousarray(gradients))
         with pool():
-            gradient = self._energy.gradients_of(other.field(state))
-            _, tangent = piola_stress_and_tangent(gradient @ metric.inverse, lame, self._law)
+            first = given[0] @ metric.inverse
+            first[deformation_jacobian(first) <= 0] = 0.0  # turned inside out between points of the elements
+            _, tangent = piola_stress_and_tangent(first, lame, self._law)
             tangent = _tangent_pulled_back(tangent, metric)
-            stress = torch.einsum("nijkl,nkl->nij", tangent, gradient)
-            self._factorised(tangent)
-            found: FloatArray = self._solved(tangent, self._forces(stress[None]).numpy())[0]
-        return found
+            forces = self._forces(torch.einsum("nijkl,snkl->snij", tangent, given))
+            return _back_substituted(self._factorised(tangent), forces).numpy()
 
     def _both_components(self, rows: FloatArray) -> FloatArray:
         found = np.zeros((len(rows), 2, *self.shape))

@@ -26,7 +26,7 @@ QUICK = {
         "preset": "local",
         **{"wall_spacing": 0.9, "corner_spacing": 0.3, "neurons": 4, "tolerance": 1.0},
     },
-    "pinn-id": {"coarse": 3.0, "fine": 3.0},
+    "pinn-id": {"spacing": 3.0},
 }
 """Settings that make a solver quick enough for the tests."""
 

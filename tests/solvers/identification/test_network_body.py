@@ -167,11 +167,21 @@ def test_a_state_is_carried_to_a_finer_network(mesh, motion, state):
     """The finer network's functions include nothing of the coarser's; both are within 2 % of each other."""
     coarse, fine = body_of(mesh, motion), body_of(mesh, motion, scale=0.8)
     changes = np.zeros(len(motion.names))
-    found = fine.projected(coarse, state, LAME, changes)
+    states = np.array([state, -0.5 * state])
+    found, half = fine.projected(coarse.gradients(states, mesh.locate(fine.points)), LAME, changes)
+    np.testing.assert_allclose(half, -0.5 * found, atol=1e-9 * np.abs(found).max())
     there = mesh.at_nodes()
     expected = coarse.field(state).displacement(there)
     error = np.linalg.norm(fine.field(found).displacement(there) - expected)
     assert error < 0.02 * np.linalg.norm(expected)
+
+
+def test_gradients_of_a_body_turned_inside_out_are_carried_as_well(mesh, motion, state):
+    """Elements may be turned inside out between their points of quadrature: the norm is another one there."""
+    body, changes = body_of(mesh, motion), np.zeros(len(motion.names))
+    gradients = body.gradients(state[None], mesh.locate(body.points))
+    gradients[0, :5] = [[-2.0, 0.0], [0.0, 0.0]]
+    assert np.isfinite(body.projected(gradients, LAME, changes)).all()
 
 
 def test_gradients_of_several_states_are_those_of_their_fields(body, mesh, state):

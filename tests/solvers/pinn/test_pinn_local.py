@@ -125,17 +125,6 @@ def test_triangles_far_smaller_than_the_spacing_take_one_point(coarse_mesh, spac
     assert weights.sum() == pytest.approx(coarse_mesh.areas.sum(), rel=1e-12)
 
 
-def test_single_points_are_taken_up_to_the_share_of_a_cell(coarse_mesh, spacing):
-    triangles = graded_triangles(coarse_mesh, spacing, 0.6)
-    area = coarse_mesh.areas.sum()
-    counts = []
-    for single in (0.25, 0.5, 1.0):
-        points, weights = graded_quadrature(triangles, spacing, 0.6, single)
-        assert abs(weights.sum() - area) < 1e-9 * area
-        counts.append(len(points))
-    assert counts[0] > counts[1] > counts[2] == len(triangles)
-
-
 def test_spread_points_keep_their_distance_and_leave_no_hole(coarse_mesh, spacing):
     centres = spread_points(graded_triangles(coarse_mesh, spacing, 0.6), coarse_mesh, spacing, 0.75)
     gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2) + 1e9 * np.eye(len(centres))
