@@ -1,7 +1,7 @@
 """The solvers of a comparison: one after another, and on a large mesh in two processes.
 
-Networks and linear mechanics, which share work, are solved in the process that was asked; finite elements of
-finite strain and statistics beside them.
+Networks and finite elements of the linear law, which share work, are solved in the process that was asked;
+the others where less is to be done.
 """
 
 import traceback
@@ -53,7 +53,18 @@ LARGE = 5000
 SHARE = max(1, cores() // 2)
 """Threads of the linear algebra in each of two processes."""
 
-THERE = ("solvers.fem.identification", "solvers.statistics.statistical_fem", __name__)
+SECONDS = {
+    "pinn-id": 11.0,
+    "pinn-std": 6.0,
+    "fem-id": 5.0,
+    "fem-nonlinear": 2.5,
+    "pinn-asm": 1.7,
+    "statfem": 1.2,
+    "gp": 0.7,
+}
+"""Processor seconds on the default finger; of any other solver one."""
+
+THERE = ("solvers.pinn.identification.solver", "solvers.statistics.statistical_fem", __name__)
 """Modules of what the second process solves, which it imports as it starts."""
 
 PICTURES = "compare.report.html_report"
@@ -99,8 +110,7 @@ def solve_all(
     Raises:
         UserError: If a solver refuses, the reference fails, or all fail.
     """
-    here = [each for each in solvers if _stays(each, job.material)]
-    there = [each for each in solvers if each not in here]
+    here, there = shares(solvers, job.material)
     # A class of the calling script is unknown to other processes.
     elsewhere = all(type(each).__module__ != "__main__" for each in solvers)
     work = SharedWork()
@@ -122,11 +132,24 @@ def solve_all(
     return Outcome(*({name: each[name] for name in names if name in each} for each in vars(outcome).values()))
 
 
-def _stays(solver: Solver, material: Material) -> bool:
-    """Whether a solver is one of those that share work, and are solved in the process that was asked."""
-    family = Traits.of(solver).family
-    linear = with_law(material, solver).law == "linear"
-    return family == "neural network" or (linear and family != "statistics")
+def shares(solvers: Sequence[Solver], material: Material) -> tuple[list[Solver], list[Solver]]:
+    """The solvers of the process that was asked, and of another one, both in their order."""
+    here = [each for each in solvers if _shares_work(each, material)]
+    there: list[Solver] = []
+    rest = [each for each in solvers if each not in here]
+    for solver in sorted(rest, key=_seconds, reverse=True):
+        parts = sorted((there, here), key=lambda part: sum(map(_seconds, part)))
+        parts[0].append(solver)
+    return sorted(here, key=solvers.index), sorted(there, key=solvers.index)
+
+
+def _shares_work(solver: Solver, material: Material) -> bool:
+    """Whether a solver is of the linear law, and no statistics: these share factors and networks."""
+    return with_law(material, solver).law == "linear" and Traits.of(solver).family != "statistics"
+
+
+def _seconds(solver: Solver) -> float:
+    return SECONDS.get(solver.name, 1.0)
 
 
 def _beside_each_other(own: "_Part", other: "_Part", work: SharedWork, stages: Stages, pool: Pool) -> Outcome:
