@@ -152,6 +152,12 @@ class FemBody:
         """The finite-element field."""
         return LagrangeField(self.space, state)
 
+    def displacements(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
+        """Displacements (s, n, 2) of states (s, N, 2) at points of the drawn body."""
+        columns = np.concatenate(list(states), axis=1)
+        found: FloatArray = (self.space.shape_functions(location) @ columns).reshape(-1, len(states), 2)
+        return found.swapaxes(0, 1)
+
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacement gradients (s, n, 2, 2) of states (s, N, 2) at points of the drawn body."""
         columns = np.concatenate(list(states), axis=1)

@@ -75,6 +75,10 @@ class Body(Protocol):
         """The displacement as a function of the drawn position."""
         ...
 
+    def displacements(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
+        """Displacements (s, n, 2) of states (s, *shape) at points of the drawn body."""
+        ...
+
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
         ...

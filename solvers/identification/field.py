@@ -49,10 +49,7 @@ class Snapshot:
 
     def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
         """Displacement of the material that is at points before the load, to first order, (n, 2), mm."""
-        shifts = self.walls.shifts(location, self.changes)
-        moved = np.einsum("nij,nj->ni", self.drawn.gradient(location), shifts)
-        drawn = location.points + self.drawn.displacement(location)
-        return self.clamp.moved(drawn - moved) - location.points
+        return displacements_in_space([self], location)[0]
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Gradient of the displacement by the place before the load, shape (n, 2, 2)."""
@@ -67,11 +64,25 @@ class Snapshot:
         return np.asarray(self.clamp.rotation @ (np.eye(2) + gradient) - np.eye(2))
 
 
-def von_mises_stresses(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
-    """Von Mises stress of snapshots of one body, each of shape (n,), MPa.
+def displacements_in_space(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
+    """`Snapshot.displacement_in_space` of snapshots of one body, each of shape (n, 2), mm.
 
     The functions of the body at the points, most of the work for a network, are evaluated once for all.
     """
+    body, states = snapshots[0].body, np.array([each.state for each in snapshots])
+    found, drawn = (
+        [],
+        zip(body.displacements(states, location), body.gradients(states, location), strict=True),
+    )
+    for each, (displacement, gradient) in zip(snapshots, drawn, strict=True):
+        shift = each.walls.shifts(location, each.changes)
+        place = location.points + displacement - np.einsum("nij,nj->ni", gradient, shift)
+        found.append(each.clamp.moved(place) - location.points)
+    return found
+
+
+def von_mises_stresses(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
+    """Von Mises stress of snapshots of one body, each of shape (n,), MPa, as `displacements_in_space`."""
     drawn = snapshots[0].body.gradients(np.array([each.state for each in snapshots]), location)
     return [
         State.from_gradient(each._gradient(gradient, location), each.problem).von_mises
@@ -102,14 +113,15 @@ class IdentifiedField(Snapshot):
     def standard_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of `displacement_in_space` at points (n, 2), mm: shape (n, 2), mm."""
         location = self._located(points)
-        return self._deviation(lambda them: [each.displacement_in_space(location) for each in them])
+        return self._deviation(lambda them: displacements_in_space(them, location))
 
     def shown_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of what pictures show of the displacement at points (n, 2), mm: (n, 2), mm."""
         location = self._located(points)
         return self._deviation(
             lambda them: [
-                each.pictures.shown(location.points, each.displacement_in_space(location)) for each in them
+                each.pictures.shown(location.points, moved)
+                for each, moved in zip(them, displacements_in_space(them, location), strict=True)
             ]
         )
 

@@ -247,14 +247,14 @@ class ShepardWindows:
         bumps = base**3
         total = _total(bumps)
         value = bumps / total
-        gradient = (-6 * base.square() / self.radii[near])[:, :, None] * local
-        along = gradient.permute(2, 0, 1)
+        along = (base.square().mul_(-6) / self.radii[near]) * local
         return value, (along - value * along.sum(dim=2, keepdim=True)) / total
 
     def _local(self, points: torch.Tensor, near: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Positions in the windows, in radii, (n, w, 2), and 1 - |x - c|^2 / R^2 or zero outside, (n, w)."""
-        local = (points[:, None] - self.centres[near]) / self.radii[near, None]
-        return local, (1 - local.square().sum(dim=-1)).clamp_(min=0)
+        """Positions in the windows, in radii, (2, n, w), and 1 - |x - c|^2 / R^2 or zero outside, (n, w)."""
+        local = (points.T[:, :, None] - self.centres[near].T[:, None]).div_(self.radii[near])
+        x, y = local
+        return local, torch.addcmul(1 - x * x, y, y, value=-1).clamp_(min=0)
 
 
 def _total(bumps: torch.Tensor) -> torch.Tensor:

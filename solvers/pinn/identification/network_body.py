@@ -177,6 +177,16 @@ class NetworkBody:
         """The displacement as a function of the drawn position."""
         return FiniteBasisField(self._energy.basis, torch.from_numpy(state))
 
+    def displacements(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
+        """Displacements (s, n, 2) of states (s, *shape) at points of the drawn body."""
+        outputs = torch.from_numpy(states)
+        return self._energy.basis.evaluated(
+            location.points,
+            lambda points, near: torch.einsum(
+                "nuw,swiu->nsi", self._energy.basis.values(points, near), outputs[:, near]
+            ),
+        ).swapaxes(0, 1)
+
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
         outputs = torch.from_numpy(states)
