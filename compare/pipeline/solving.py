@@ -54,7 +54,7 @@ SHARE = max(1, cores() // 2)
 """Threads of the linear algebra in each of two processes."""
 
 SECONDS = {
-    "pinn-id": 13.0,
+    "pinn-id": 14.0,
     "pinn-std": 6.0,
     "fem-id": 5.0,
     "fem-nonlinear": 2.5,
