@@ -15,8 +15,18 @@ HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 LEGEND_LINE = 0.17
 """Height of a line of a legend, inches."""
 
-SOLVER_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#56b4e9", "#d55e00", "#000000", "#8c6bb1", "#999933")
-"""Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and two more."""
+SOLVER_COLOURS = (
+    "#0072b2",
+    "#e69f00",
+    "#009e73",
+    "#56b4e9",
+    "#d55e00",
+    "#000000",
+    "#8c6bb1",
+    "#999933",
+    "#8c510a",
+)
+"""Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and three more."""
 
 
 def solver_colour(number: int) -> str:

@@ -209,7 +209,7 @@ def test_the_complete_table_and_that_of_the_paper_are_solvers_that_exist():
     complete, paper = (
         SolverOptions(preset=preset).read(job_defaults(preset).solvers) for preset in (None, "paper")
     )
-    assert len(complete) == 8
+    assert len(complete) == 9
     assert [solver.name for solver in paper] == ["fem", "pinn-std", "pinn-asm"]
     assert [solver.settings().get("preset") for solver in paper] == [None, "paper", "paper"]
 
