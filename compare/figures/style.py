@@ -26,7 +26,7 @@ SOLVER_COLOURS = (
     "#999933",
     "#8c510a",
 )
-"""Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and three more."""
+"""Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and more."""
 
 
 def solver_colour(number: int) -> str:
