@@ -54,7 +54,7 @@ SHARE = max(1, cores() // 2)
 """Threads of the linear algebra in each of two processes."""
 
 SECONDS = {
-    "pinn-id": 14.0,
+    "pinn-id": 17.0,
     "pinn-std": 6.0,
     "fem-id": 5.0,
     "fem-nonlinear": 2.5,
@@ -62,7 +62,7 @@ SECONDS = {
     "statfem": 1.2,
     "gp": 0.7,
 }
-"""Processor seconds on the default finger; of any other solver one."""
+"""On the default finger, beside another process; of any other solver one."""
 
 THERE = ("solvers.pinn.identification.solver", "solvers.statistics.statistical_fem", __name__)
 """Modules of what the second process solves, which it imports as it starts."""

@@ -97,9 +97,8 @@ class ResponseModel:
         there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
         if there is None:
             raise NoSolutionError("the finger that was found is inside out")
-        rows = self._traction(hypothesis.position, hypothesis.width)[0]
-        held = ConstrainedElimination(rows, there.solve(rows))
-        return held.unstable(there.negative())
+        rows, negative = self._traction(hypothesis.position, hypothesis.width)[0], there.negative()
+        return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
 
     def restart(self, response: Response | None) -> None:
         """Start the next response from this one, also by another body; None: from rest."""
