@@ -10,6 +10,7 @@ for every derivative by X:
     P_ij = det(I + ∇W) P(G)_im M_jm        A_ijkl = det(I + ∇W) A(G)_imkn M_jm M_ln
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -179,23 +180,26 @@ class NetworkBody:
 
     def displacements(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacements (s, n, 2) of states (s, *shape) at points of the drawn body."""
-        outputs = torch.from_numpy(states)
-        return self._energy.basis.evaluated(
-            location.points,
-            lambda points, near: torch.einsum(
-                "nuw,swiu->nsi", self._energy.basis.values(points, near), outputs[:, near]
-            ),
-        ).swapaxes(0, 1)
+        return self._summed(self._energy.basis.values, "nuw,swiu->nsi", states, location)
 
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
+        return self._summed(self._energy.basis.gradients, "xnwu,swiu->nsix", states, location)
+
+    def _summed(
+        self,
+        functions: Callable[[torch.Tensor, torch.Tensor], torch.Tensor],
+        sums: str,
+        states: FloatArray,
+        location: LocatedPoints,
+    ) -> FloatArray:
+        """Sums (s, n, ...) of functions of the windows near points, times the states, as for `einsum`."""
         outputs = torch.from_numpy(states)
-        return self._energy.basis.evaluated(
+        found = self._energy.basis.evaluated(
             location.points,
-            lambda points, near: torch.einsum(
-                "xnwu,swiu->nsix", self._energy.basis.gradients(points, near), outputs[:, near]
-            ),
-        ).swapaxes(0, 1)
+            lambda points, near: torch.einsum(sums, functions(points, near), outputs[:, near]),
+        )
+        return found.swapaxes(0, 1)
 
     @property
     def points(self) -> FloatArray:
