@@ -179,3 +179,13 @@ def check_taylor(model, markers, name, values):
         return
     assert left[0] / left[1] > 3.0  # 2 with a wrong derivative, 8 where the second one is small
     assert left[0] < 0.2 * first
+
+
+def test_a_displacement_in_space_is_that_of_the_material_there(identified):
+    """Where the walls have moved by W it was drawn W away; what is left is of second order in W."""
+    field, mesh = identified[2].field, identified[2].problem.mesh
+    drawn = mesh.locate(mesh.markers)
+    there = mesh.locate(mesh.markers + field.walls.shifts(drawn, field.changes))
+    expected = field.displacement(drawn)
+    left, unmoved = (np.abs(field.displacement_in_space(at) - expected).max() for at in (there, drawn))
+    assert left < 0.1 * unmoved
