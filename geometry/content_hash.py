@@ -52,6 +52,11 @@ def sources_digest(*modules: str) -> str:
     return sha.hexdigest()
 
 
+def has_source(module: str) -> bool:
+    """Whether `sources_digest` counts the code of an imported module: no for that of a notebook or shell."""
+    return getattr(sys.modules.get(module.partition(".")[0]), "__file__", None) is not None
+
+
 def _array_or_text(value: object) -> object:
     if isinstance(value, np.ndarray):
         return [str(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()]

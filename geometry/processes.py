@@ -34,6 +34,7 @@ from ctypes import CDLL
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
+from importlib.machinery import PathFinder
 from math import inf
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
@@ -270,6 +271,21 @@ def _end(children: Iterable[_Child]) -> None:
         child.close()
     for child in ending:
         child.end()
+
+
+def known_to_children(value: object) -> bool:
+    """Whether a process of a `Pool` can be given a value, and can import its class.
+
+    It does not run the calling script, and imports nothing from the working folder.
+    """
+    module, places = type(value).__module__, [place for place in sys.path if place]
+    if module == "__main__" or PathFinder.find_spec(module.partition(".")[0], places) is None:
+        return False
+    try:
+        pickle.dumps(value)
+    except (pickle.PicklingError, AttributeError, TypeError):  # such as the class of a function
+        return False
+    return True
 
 
 def child_environment(environment: Mapping[str, str]) -> dict[str, str]:

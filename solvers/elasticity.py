@@ -8,14 +8,16 @@ A. N. Gent's (Rubber Chem. Technol. 69 (1996) 59-61), which stiffens as chains a
 volumetric part of the neo-Hookean.
 """
 
-from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, NamedTuple, assert_never, get_args
 
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.errors import UserError
 
 LawName = Literal["linear", "neo-hookean", "st-venant-kirchhoff", "gent"]
+PLANES = ("strain", "stress")
 
 LIMIT = 1.0
 """Value of tr C - 3 - 2 ln J that Gent's law cannot reach: of much filler; gum has 30 to 100.
@@ -35,8 +37,15 @@ class Lame(NamedTuple):
     λ_out: float  # σ_zz over the trace of the in-plane strain: λ in plane strain, 0 in plane stress
 
 
+def check_known(what: str, name: str, known: Sequence[str]) -> None:
+    """Refuse a name, such as that of a law, with a `UserError` that lists the known ones."""
+    if name not in known:
+        raise UserError(f"the {what} {name!r} is not known here; take {' or '.join(known)}")
+
+
 def lame_constants(young: float, poisson: float, plane: str) -> Lame:
     """Lamé constants from Young's modulus (MPa) and Poisson's ratio for plane "strain" or "stress"."""
+    check_known("plane state", plane, PLANES)
     μ = young / (2 * (1 + poisson))
     if plane == "stress":
         return Lame(λ=young * poisson / ((1 + poisson) * (1 - poisson)), μ=μ, λ_out=0.0)
@@ -46,6 +55,7 @@ def lame_constants(young: float, poisson: float, plane: str) -> Lame:
 
 def lame_derivatives(young: float, poisson: float, plane: str) -> Lame:
     """Derivatives of the Lamé constants by Poisson's ratio, MPa."""
+    check_known("plane state", plane, PLANES)
     μ = -young / (2 * (1 + poisson) ** 2)
     if plane == "stress":
         return Lame(λ=young * (1 + poisson**2) / (1 - poisson**2) ** 2, μ=μ, λ_out=0.0)
@@ -72,7 +82,12 @@ def deformation_jacobian(gradient: Field) -> Field:
 
 
 def strain_of(law: LawName, gradient: Field) -> list[list[Field]]:
-    """Components of the infinitesimal strain for the linear law, else of Green-Lagrange's (F^T F - I) / 2."""
+    """Components of the infinitesimal strain for the linear law, else of Green-Lagrange's (F^T F - I) / 2.
+
+    Raises:
+        UserError: If there is no such law; the same holds for energy and stress.
+    """
+    check_known("law", law, get_args(LawName))
     axes = range(_dimension(gradient))
 
     def component(i: int, j: int) -> Field:
@@ -96,15 +111,17 @@ def energy_density_of(
     strain = strain_of(law, gradient)
     axes = range(len(strain))
     trace = sum(strain[i][i] for i in axes)
-    if law in ("linear", "st-venant-kirchhoff"):
+    if law == "linear" or law == "st-venant-kirchhoff":
         squares = sum(strain[i][i] * strain[i][i] for i in axes)
         shears = sum(strain[i][j] * strain[i][j] for i in axes for j in axes if i < j)
         return 0.5 * lame.λ * trace * trace + lame.μ * (squares + 2 * shears)
     log_j = log(deformation_jacobian(gradient))
-    if law == "gent":
+    if law == "neo-hookean":
+        isochoric = lame.μ * trace - lame.μ * log_j
+    elif law == "gent":
         isochoric = -0.5 * lame.μ * LIMIT * log(1 - 2 * (trace - log_j) / LIMIT)
     else:
-        isochoric = lame.μ * trace - lame.μ * log_j
+        assert_never(law)
     return isochoric + 0.5 * lame.λ * log_j * log_j
 
 
@@ -122,24 +139,27 @@ def stress_of(law: LawName, gradient: FloatArray, lame: Lame) -> tuple[FloatArra
     )
     volume = lame.λ * trace
     across = lame.λ_out * trace
-    if law in ("linear", "st-venant-kirchhoff"):
+    if law == "linear" or law == "st-venant-kirchhoff":
         stress = volume[:, None, None] * unit + 2 * np.reshape(lame.μ, (-1, 1, 1)) * strain
         if law == "st-venant-kirchhoff":
             jacobian = deformation_jacobian(gradient)
             stress = (unit + gradient) @ stress @ (unit + transposed) / jacobian[:, None, None]
             across = across / jacobian
-    else:
+    elif law == "neo-hookean" or law == "gent":
         jacobian = deformation_jacobian(gradient)
         log_j = np.log(jacobian)
         μ = lame.μ / (1 - 2 * (trace - log_j) / LIMIT) if law == "gent" else np.full(len(trace), lame.μ)
         left = gradient + transposed + gradient @ transposed
         across = lame.λ * log_j / jacobian
         stress = (μ / jacobian)[:, None, None] * left + across[:, None, None] * unit
+    else:
+        assert_never(law)
     return stress, across if len(unit) == 2 else stress[:, 2, 2]
 
 
 def piola_stress(law: LawName, gradient: FloatArray, stress: FloatArray) -> FloatArray:
     """First Piola-Kirchhoff stress J σ F^-T of plane states, (n, 2, 2), MPa; σ itself at small strain."""
+    check_known("law", law, get_args(LawName))
     if law == "linear":
         return stress
     trace = np.trace(gradient, axis1=1, axis2=2)[:, None, None] + 1

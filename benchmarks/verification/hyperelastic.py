@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import FloatArray
+from solvers.elasticity import check_known
 from solvers.problem import Material
 
 
@@ -36,7 +37,8 @@ class Hyperelastic:
 
     @classmethod
     def of(cls, material: Material) -> "Hyperelastic":
-        """The law of a material."""
+        """The law of a material; a `UserError` if there is no independent form of it here."""
+        check_known("law", material.law, ("neo-hookean", "st-venant-kirchhoff"))
         shear = material.young / (2 * (1 + material.poisson))
         bulk = material.young / (3 * (1 - 2 * material.poisson))
         return cls(material.law, bulk - 2 / 3 * shear, shear)

@@ -28,22 +28,24 @@ Newest = TypeVar("Newest")
 class NewestOnly(Generic[Newest]):
     """Does work on items in a thread: always on the newest one, on none twice; the others are passed over.
 
-    A context manager, at whose end the last item is worked on. An error in the work is raised by `finish`,
-    which may be called before the end; no item may follow it.
+    A context manager, at whose end the last item is worked on. An error in the work is raised by the next
+    `put` or `finish`, and no work is done after it. `finish` may be called before the end; no item may follow
+    it.
     """
 
     def __init__(self, work: Callable[[Newest], None]) -> None:
         self.passed_over = 0  #: Number of items that were not worked on.
         self._work = work
         self._thread = ThreadPoolExecutor(max_workers=1)
-        self._taken: list[Future[None]] = []
+        self._last: Future[None] | None = None
+        self._error: BaseException | None = None
 
     def put(self, item: Newest) -> None:
         """Leave an item to be worked on, in place of one that waits."""
-        if self._taken and self._taken[-1].cancel():
-            self._taken.pop()
+        self._raise()
+        if self._last is not None and self._last.cancel():
             self.passed_over += 1
-        self._taken.append(self._thread.submit(self._work, item))
+        self._last = self._thread.submit(self._worked, item)
 
     def __enter__(self) -> Self:
         return self
@@ -56,8 +58,19 @@ class NewestOnly(Generic[Newest]):
     def finish(self) -> None:
         """Wait until the last item is done."""
         self._thread.shutdown()
-        for work in self._taken:
-            work.result()
+        self._raise()
+
+    def _worked(self, item: Newest) -> None:
+        """In the thread: do the work, or keep its error for `_raise`."""
+        if self._error is None:
+            try:
+                self._work(item)
+            except BaseException as error:
+                self._error = error
+
+    def _raise(self) -> None:
+        if self._error is not None:
+            raise self._error
 
 
 MESH = MeshSettings(size=1.0, corner_size=0.2)
@@ -157,7 +170,8 @@ class _Markers(NamedTuple):
 class LiveForce:
     """Follows the force while a film is tracked: in the newest frame, as fast as it can.
 
-    A context manager around the tracking. Displacements are those since the frames before the first motion.
+    A context manager around the tracking, which an error of the estimate ends at the next frame.
+    Displacements are those since the frames before the first motion.
 
     Args:
         tracker: With the design's markers.
@@ -171,9 +185,11 @@ class LiveForce:
         self._tracker, self._depth = tracker, depth
         self.forces: list[FrameForce] = []
         self._newest = NewestOnly(self._answer)
-        self._answered: list[float] = []
-        self._still: list[FloatArray] = []
+        self._started = self._answered = 0.0  # when the first and the last force were found, s
         self._moves = False
+        # Over the frames before the markers move: sum of their places, mm, and number of frames in which each
+        # was seen. The first frame gives them the shapes (m, 2) and (m, 1).
+        self._sum, self._count = np.zeros((1, 2)), np.zeros((1, 1))
 
     def __enter__(self) -> "LiveForce":
         self._newest.__enter__()
@@ -191,8 +207,8 @@ class LiveForce:
     @property
     def live_rate(self) -> LiveRate:
         """How it kept up with the film."""
-        spent = self._answered[-1] - self._answered[0] if self._answered else 0.0
-        rate = (len(self._answered) - 1) / spent if spent else 0.0
+        spent = self._answered - self._started
+        rate = (len(self.forces) - 1) / spent if spent else 0.0
         return LiveRate(self._newest.passed_over, rate)
 
     def watch(self, frame: Frame, detections: FrameDetections) -> None:
@@ -201,37 +217,34 @@ class LiveForce:
         seen = np.isfinite(discs.radii)
         per_mm = np.linalg.norm(np.ptp(detections.guesses, axis=0)) / np.linalg.norm(np.ptp(places, axis=0))
         noise = np.sqrt(np.nan_to_num(np.trace(discs.covariances, axis1=1, axis2=2) / 2)) / per_mm
-        rest = self._rest(np.where(seen[:, None], places, np.nan), noise)
-        known = seen & np.isfinite(rest).all(axis=1)
-        deviations = np.repeat((noise * np.sqrt(1 + 1 / len(self._still)))[:, None], 2, axis=1)
-        moved = np.where(known[:, None], places - rest, 0.0)
+        self._watch_rest(np.where(seen[:, None], places, np.nan), noise)
+        known, count = seen & (self._count > 0).all(axis=1), np.maximum(self._count, 1)
+        deviations = np.repeat(noise[:, None] * np.sqrt(1 + 1 / count), 2, axis=1)
+        moved = np.where(known[:, None], places - self._rest, 0.0)
         self._newest.put(_Markers(frame.number, frame.time, moved, deviations, known, time.perf_counter()))
 
     def line(self) -> str:
         """The last force in words."""
         return force_line(self.forces[-1], self._depth) if self.forces else "force: not yet"
 
-    def _rest(self, places: FloatArray, noise: FloatArray) -> FloatArray:
+    @property
+    def _rest(self) -> FloatArray:
         """Mean of the markers in the frames before they move, shape (m, 2), mm; nan for one not seen."""
-        if not self._moves and self._still:
-            away = np.linalg.norm(places - _mean(self._still), axis=1)
-            self._moves = bool((away > np.maximum(STILL * noise, LEAST)).any())
+        return np.where(self._count > 0, self._sum / np.maximum(self._count, 1), np.nan)
+
+    def _watch_rest(self, places: FloatArray, noise: FloatArray) -> None:
+        """Add a frame to the rest unless markers move: places (m, 2), mm, nan if hidden; deviations (m,)."""
+        away = np.linalg.norm(places - self._rest, axis=1)
+        self._moves |= bool((away > np.maximum(STILL * noise, LEAST)).any())
         if not self._moves:
-            self._still.append(places)
-        return _mean(self._still)
+            self._sum = self._sum + np.nan_to_num(places)
+            self._count = self._count + np.isfinite(places).all(axis=1, keepdims=True)
 
     def _answer(self, markers: _Markers) -> None:
         reading = self._tracker.update(markers.displacements, markers.deviations, markers.visible)
-        delay = time.perf_counter() - markers.tracked
-        self.forces.append(FrameForce(markers.frame, markers.time, reading, delay))
-        self._answered.append(markers.tracked + delay)
-
-
-def _mean(places: Sequence[FloatArray]) -> FloatArray:
-    """Mean of arrays, without their nan; nan where all are."""
-    stacked = np.stack(places)
-    count = np.isfinite(stacked).sum(axis=0)
-    return np.where(count > 0, np.nansum(stacked, axis=0) / np.maximum(count, 1), np.nan)
+        self._answered = time.perf_counter()
+        self._started = self._started or self._answered
+        self.forces.append(FrameForce(markers.frame, markers.time, reading, self._answered - markers.tracked))
 
 
 def force_line(force: FrameForce, depth: float) -> str:

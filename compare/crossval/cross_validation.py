@@ -1,8 +1,10 @@
 """Cross-validation: solvers scored at markers, loads and fields that they were not given."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,17 +25,21 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from geometry.processes import ProcessFailed
 from geometry.registration import FIXED
+from solvers.fem.assimilating import FemAsmSolver
 from solvers.problem import Problem
+from solvers.solver import Progress
 
 DEFINITION = "definition.json"
+
+Answer = TypeVar("Answer")
 
 
 def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> CrossvalResult:
     """Score the solvers of a study in every fold and write the study's output folder.
 
-    Solvers run in processes of their own. A Python script that calls this must do so below
-    `if __name__ == "__main__":`, because those processes import the script. Finished folds stay in the output
-    folder: the same study again goes on where it was stopped.
+    Solvers run in processes of their own; one whose class those cannot import, such as a class of the calling
+    script or notebook, runs in this process after them. Finished folds stay in the output folder: the same
+    study again goes on where it was stopped.
 
     Args:
         study: The finger, the solvers and what to hold out.
@@ -72,9 +78,10 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
             case: folds_of(study.schemes, len(seeds[0][0].points), load_cases)
             for case, seeds in observations.items()
         }
+        own = replace(study, variants=())  # other processes may not know the classes of all solvers
         tasks = {
             (case, variant.label): SolverTask(
-                study,
+                own,
                 case.layout,
                 variant,
                 load_cases,
@@ -108,9 +115,9 @@ def _true_fields(
     study: CrossvalStudy, load_cases: Sequence[LoadCase], stages: Stages
 ) -> dict[Case, list[Path]]:
     """Files of the true fields at every load, each of which is simulated in its own process."""
-    truths = study.chosen_truths
+    truths, own = study.chosen_truths, replace(study, variants=())
     tasks = {
-        "truth, " + (f"{name}, " if len(truths) > 1 else "") + case.name: TruthTask(study, truth, case)
+        "truth, " + (f"{name}, " if len(truths) > 1 else "") + case.name: TruthTask(own, truth, case)
         for name, truth in truths.items()
         for case in load_cases
     }
@@ -176,17 +183,9 @@ def _results(
     cases = list(dict.fromkeys(case for case, _ in tasks))
     named = {case.named(label, cases): (case, label) for case, label in tasks}
     order = {label: -place for place, (_, label) in enumerate(tasks)}
-    answers = dict(
-        in_stages(
-            run_folds,
-            # Slow solvers are usually named last: started first, they leave no processor idle at the end.
-            {name: tasks[named[name]] for name in sorted(named, key=lambda name: order[named[name][1]])},
-            processes=study.processes,
-            stages=stages,
-            kind="solvers",
-            note=note,
-        )
-    )
+    # Slow solvers are usually named last: started first, they leave no processor idle at the end.
+    ordered = {name: tasks[named[name]] for name in sorted(named, key=lambda name: order[named[name][1]])}
+    answers = _answers(run_folds, ordered, study.processes, stages, "solvers", note)
     results: dict[Case, dict[str, SeedResults]] = {case: {} for case in cases}
     failed: dict[Case, dict[str, str]] = {case: {} for case in cases}
     for name, (case, label) in named.items():
@@ -201,6 +200,24 @@ def _results(
     return results, failed
 
 
+def _answers(
+    work: Callable[[SolverTask, Progress], Answer],
+    tasks: Mapping[str, SolverTask],
+    processes: int,
+    stages: Stages,
+    kind: str,
+    note: Callable[[str, Answer | ProcessFailed], str],
+) -> dict[str, Answer | ProcessFailed]:
+    """The answers of tasks by name: of those for a pool in processes, then of the others in this one."""
+    pooled = {name: task for name, task in tasks.items() if task.for_pool}
+    found = dict(in_stages(work, pooled, processes=processes, stages=stages, kind=kind, note=note))
+    for name in (each for each in tasks if each not in pooled):
+        with stages.stage(name) as progress:
+            found[name] = work(tasks[name], progress)
+            progress(1.0, note(name, found[name]))
+    return found
+
+
 def _sweeps(
     tasks: Mapping[tuple[Case, str], SolverTask],
     results: Mapping[Case, Mapping[str, SeedResults]],
@@ -208,12 +225,12 @@ def _sweeps(
     stages: Stages,
 ) -> dict[Case, dict[str, list[float]]]:
     """The sweep of `sweep_weights` for each truth and layout, if its solver is there."""
-    cases = {f"{case.truth}, {case.layout}": case for case, each in results.items() if SWEPT in each}
+    cases = {
+        f"{case.truth}, {case.layout}": case
+        for case, each in results.items()
+        if SWEPT in each and isinstance(tasks[case, SWEPT].variant.solver, FemAsmSolver)
+    }
     swept = {name: tasks[case, SWEPT] for name, case in cases.items()}
-    answers = dict(
-        in_stages(
-            sweep_weights, swept, processes=processes, stages=stages, kind="curves", note=lambda *_: "weighed"
-        )
-    )
+    answers = _answers(sweep_weights, swept, processes, stages, "curves", lambda *_: "weighed")
     found = {case: answers[name] for name, case in cases.items()}  # in this order, whichever ended first
     return {case: each for case, each in found.items() if not isinstance(each, ProcessFailed)}

@@ -116,8 +116,8 @@ class CaseResult:
             ],
             "solvers": {
                 variant.label: {
-                    "solver": variant.solver,
-                    "settings": dict(variant.settings),
+                    "solver": variant.solver.name,
+                    "settings": variant.settings,
                     "assimilates": Traits.of(variant.make(0)).assimilates,
                     "schemes": {scheme: asdict(one) for scheme, one in self.scores[variant.label].items()},
                     "against": {

@@ -17,10 +17,11 @@ from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
 from compare.evaluation.deformed_body import DeformedBody
 from compare.evaluation.truths import SLIDING, Truth
 from geometry.atomic import write_bytes
-from geometry.content_hash import sources_digest
+from geometry.content_hash import has_source, sources_digest
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from geometry.processes import known_to_children
 from solvers.assimilation.marker_forces import root_mean_square
 from solvers.assimilation.marker_weighting import FACTORS
 from solvers.fem.assimilating import FemAsmSolver
@@ -69,6 +70,11 @@ class SolverTask:
         """Folder of finished folds."""
         parts = [] if self.truth is None else [self.truth.name]
         return self.study.out.joinpath("runs", *parts, self.layout, self.variant.label.replace(" ", "_"))
+
+    @property
+    def for_pool(self) -> bool:
+        """Whether a process of a pool can run it: none knows a solver's class of the calling script."""
+        return known_to_children(self.variant.solver)
 
 
 @dataclass(frozen=True)
@@ -133,9 +139,10 @@ class FoldRunner:
     def run(self, seed: int, progress: Progress) -> list[FoldResult]:
         """The results of all folds for a seed."""
         path = self._task.folder / f"seed-{seed}.json"
-        settings = to_jsonable_python(self._solver.settings())
-        settings["program_sha256"] = sources_digest(type(self._solver).__module__)
-        results = _kept(path, settings)
+        settings, kind = to_jsonable_python(self._solver.settings()), type(self._solver)
+        settings["program_sha256"] = sources_digest(kind.__module__)
+        settings["class"] = f"{kind.__module__}.{kind.__qualname__}"
+        results = _kept(path, settings) if has_source(kind.__module__) else {}
         self._fit = None
         for number, fold in enumerate(self._task.folds):
             progress(number / len(self._task.folds), f"{fold.scheme}: {fold.name}")

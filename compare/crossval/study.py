@@ -1,9 +1,9 @@
 """A cross-validation to run: finger, solvers, held-out markers and loads, and the output folder."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, is_dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,9 +18,9 @@ from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from geometry.registration import FIXED, PARTS, Homography, Registration
+from solvers.assimilation.misfit import MarkerSettings
 from solvers.problem import Load, Material
-from solvers.registry import make_solver
-from solvers.solver import Solver, check_load, with_law
+from solvers.solver import Solver, check_load, check_name, with_law
 
 ELEMENT_SIZE = 0.5
 """Usual element size, mm: `fem` is off by 0.01 mm at the markers, a hundredth of its model error."""
@@ -32,24 +32,42 @@ EVERY_TRUTH = "all"
 
 @dataclass(frozen=True)
 class SolverVariant:
-    """A solver with settings.
+    """A solver, some of whose settings are changed.
 
     Attributes:
         label: Its name in tables: the solver's name, and how it differs from others of that name.
-        solver: The solver's name.
-        settings: Its settings.
+        solver: The solver, of any class.
+        changes: The settings that are changed.
     """
 
     label: str
-    solver: str
-    settings: Mapping[str, object]
+    solver: Solver
+    changes: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def settings(self) -> dict[str, object]:
+        """All settings of the variant, ready for JSON."""
+        return self.make(0).settings()
 
     def make(self, seed: int) -> Solver:
-        """The solver; `seed` is added to its own seed, if it draws random numbers."""
-        settings = dict(self.settings)
-        if isinstance(first := settings.get("seed"), int):
-            settings["seed"] = first + seed
-        return make_solver(self.solver, **settings)
+        """The solver; `seed` is added to its own seed, if it draws random numbers.
+
+        Raises:
+            UserError: If its class cannot be made with the settings.
+        """
+        changes, kind = dict(self.changes), type(self.solver)
+        if seed and isinstance(first := self.solver.settings().get("seed"), int):
+            changes["seed"] = first + seed
+        if not changes:
+            return self.solver
+        try:
+            if is_dataclass(self.solver):
+                return cast(Solver, replace(cast(Any, self.solver), **changes))
+            return kind(**{**self.solver.settings(), **changes})
+        except UserError:
+            raise
+        except Exception as error:  # the constructor of another package may raise anything
+            raise UserError(f"solver {self.solver.name} cannot be made with {changes}: {error}") from error
 
 
 def solver_variants(
@@ -66,12 +84,12 @@ def solver_variants(
     """
     variants = []
     for solver in solvers:
-        settings = solver.settings()
-        variants.append(SolverVariant(solver.name, solver.name, settings))
-        if "choose" in settings and solver.name not in fixed and with_law(material, solver).law == "linear":
+        variants.append(SolverVariant(solver.name, solver))
+        chooses = isinstance(solver, MarkerSettings)
+        if chooses and solver.name not in fixed and with_law(material, solver).law == "linear":
             for choice in ("left-out", "evidence"):
-                chosen = {**settings, "weights": "precision", "choose": choice}
-                variants.append(SolverVariant(f"{solver.name} {choice}", solver.name, chosen))
+                chosen = {"weights": "precision", "choose": choice}
+                variants.append(SolverVariant(f"{solver.name} {choice}", solver, chosen))
     return variants
 
 
@@ -192,6 +210,7 @@ class CrossvalStudy:
             )
         for variant in self.variants:
             solver = variant.make(0)
+            check_name(solver.name)
             check_load(solver, self.load)
             with_law(self.material, solver)
         normal = self.load.displacement[1]

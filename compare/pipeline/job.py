@@ -1,6 +1,5 @@
 """A comparison to make, and the checks that refuse an impossible one before anything is computed."""
 
-import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,6 +8,7 @@ from compare.camera.film import Film
 from compare.evaluation.comparison import supported_solvers
 from compare.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
 from compare.figures import check_formats
+from geometry.content_hash import has_source
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
@@ -66,8 +66,7 @@ def checked(job: Job) -> Job:
     if job.reference is not None and job.reference not in job.names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
     for solver in job.solvers if job.resume else ():
-        package = sys.modules.get(type(solver).__module__.partition(".")[0])
-        if getattr(package, "__file__", None) is None:
+        if not has_source(type(solver).__module__):
             raise UserError(
                 f"solver {solver.name} has no source file, so that an edit of its class cannot be told; do "
                 "not resume, or move the class from the notebook or shell into a module"

@@ -35,14 +35,31 @@ from solvers.solution import IdentifiedForce
 SCHEMA = 1
 """Keys may be added to a schema; a key that is renamed or removed makes a new one."""
 
+ABSENT = {
+    "twin",
+    "force",
+    "position",
+    "figures",
+    "certificate",
+    "held_out",
+    "rigid_motion_off",
+    "uncertainty",
+    "reference_uncertainty",
+    "to_truth",
+}
+"""Keys of a solver in `metrics.json` whose null says that it has none of these."""
+
 
 def metrics(comparison: Results) -> dict[str, Any]:
     """The content of `metrics.json`.
 
     `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was
     not given: those same markers for a solver that was given none; each marker held out in its turn for one
-    that assimilated them, null if it does not tell. Markers that were not seen are NaN.
-    `to_truth` is null where the markers were measured, since nobody knows the fields of a real finger.
+    that assimilated them, null if it does not tell. `to_truth` is null where the markers were measured,
+    since nobody knows the fields of a real finger.
+
+    Any number can be NaN, such as the error at a marker that was not seen. The file has null for it, which
+    `read_solvers` undoes.
     """
     observations = comparison.observations
     return {
@@ -61,6 +78,22 @@ def metrics(comparison: Results) -> dict[str, Any]:
             evaluation.solver: _solver(evaluation, comparison) for evaluation in comparison.evaluations
         },
     }
+
+
+def read_solvers(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The solvers in the content of a file `metrics.json`: NaN where null stands for a number.
+
+    JSON has no word for a number that is not finite, such as the force by a solver that finds none.
+    """
+
+    def read(value: Any, key: str) -> Any:
+        if isinstance(value, Mapping):
+            return {name: read(entry, name) for name, entry in value.items()}
+        if isinstance(value, list):
+            return [read(entry, key) for entry in value]
+        return math.nan if value is None and key not in ABSENT else value
+
+    return {name: read(own, "") for name, own in content["solvers"].items()}
 
 
 def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
@@ -93,7 +126,7 @@ def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
         "to_reference": _differences(differences)
         | {"reference_uncertainty": reference.uncertainty and _differences(reference.uncertainty)},
         "to_truth": None if truth is None else _by_component(truth_differences(evaluation, truth)._asdict()),
-        "force_to_truth_rel": None if truth is None else force_error(evaluation, truth),
+        "force_to_truth_rel": math.nan if truth is None else force_error(evaluation, truth),
     }
 
 

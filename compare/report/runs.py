@@ -3,12 +3,12 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot, isfinite, nan
+from math import hypot, isfinite
 from pathlib import Path
 from typing import Any
 
 from compare.evaluation.metrics import MEANS
-from compare.report.output_files import SCHEMA
+from compare.report.output_files import SCHEMA, read_solvers
 from compare.report.summary import RunAnswer, answers
 from compare.runtime.html import picture_urls, write_html
 from compare.runtime.output_folder import RUN_FILE, check_links
@@ -26,7 +26,7 @@ class Run:
 
     name: str  # on the page
     folder: Path
-    metrics: Mapping[str, Any]  # content of `metrics.json`
+    metrics: Mapping[str, Any]  # content of `metrics.json`, with NaN for a number that is null there
     record: Mapping[str, Any]  # content of `run.json`
 
     @property
@@ -86,8 +86,8 @@ def _read(name: str, folder: Path) -> Run:
         raise UserError(
             f"{folder / 'metrics.json'} is not of `compare`, or of another version; make the run again"
         )
-    run = Run(name, folder, metrics, record)
     try:  # what is asked of it later
+        run = Run(name, folder, metrics | {"solvers": read_solvers(metrics)}, record)
         _ = run.answers, run.settings, run_rows([run])
     except (AttributeError, LookupError, TypeError, ValueError):
         raise UserError(
@@ -164,11 +164,12 @@ def _row(run: Run, solver: str, own: Mapping[str, Any]) -> dict[str, Cell]:
         f"to_reference_{name}_rel_l2": _cell(to[f"rel_l2_{name}"]) for name in ("displacement", "von_mises")
     }
     row["energy_N_mm_per_mm"] = _cell(own["energy"])
-    row["force_N_per_mm"] = _cell(hypot(*(nan if part is None else part for part in own["reaction"])))
+    row["force_N_per_mm"] = _cell(hypot(*own["reaction"]))
     return row | {"seconds_s": _cell(own["seconds"])}
 
 
 def _cell(value: float | None) -> Cell:
+    """An empty cell for a number that is not finite, or does not exist."""
     return "" if value is None or not isfinite(value) else value
 
 

@@ -11,7 +11,7 @@ from compare.runtime.tables import NONE, TextTable, number, percent
 from solvers.finger_figures import break_warning
 
 Metrics = Mapping[str, Any]
-"""`metrics.json`, or a part of it."""
+"""`metrics.json`, or a part of it, with NaN for a number that is not known."""
 
 TRUTH_FIELDS = ("displacement", "von Mises stress", "force")
 """Quantities that are compared with the simulated finger, in the order of `_to_truth`."""
@@ -91,13 +91,16 @@ def _figures(metrics: Metrics) -> RunAnswer | None:
     values = known[name]["values"]
     low, high = (values.get(f"force_{end}_N") for end in ("low", "high"))
     interval = "" if low is None else f" (95 % interval {number(low, 3)} to {number(high, 3)} N)"
+    force, strain = values["force_N"], values["principal_strain"]
     moved = hypot(values["tip_u_mm"], values["tip_v_mm"])
-    verdict = (
-        f"By {name} it grips with {number(values['force_N'], 3)} N{interval}, its tip moves by "
-        f"{number(moved, 3)} mm, and the largest strain away from corners is "
-        f"{percent(values['principal_strain'], 2)}."
-    )
-    broken = break_warning(max(each["values"].get("strain_over_break") or 0.0 for each in known.values()))
+    parts = {
+        f"it grips with {number(force, 3)} N{interval}": force,
+        f"its tip moves by {number(moved, 3)} mm": moved,
+        f"the largest strain away from corners is {percent(strain, 2)}": strain,
+    }
+    said = _listed([words for words, value in parts.items() if isfinite(value)])
+    shares = [each["values"].get("strain_over_break", nan) for each in known.values()]
+    broken = break_warning(max(filter(isfinite, shares), default=0.0))
     rows = []
     for key, words, unit in FIGURES:
         cells = [_figure(each, key) for each in known.values()]
@@ -106,7 +109,7 @@ def _figures(metrics: Metrics) -> RunAnswer | None:
     caption = "* At nodes that are a wall thickness away from re-entrant corners, base and contact."
     return RunAnswer(
         "What does the finger do?",
-        verdict,
+        f"By {name} {said}." if said != NONE else f"{name} does not tell.",
         [broken] if broken else [],
         TextTable("", ["", *known], rows, caption, left=[""]),
     )
@@ -144,6 +147,8 @@ def _verdict(name: str, own: Metrics, metrics: Metrics) -> str:
         return f"No, not with {name}."
     if own["law"] != metrics["solvers"][reference]["law"]:
         return f"{name} has another material law than {reference}, so that this run does not tell."
+    if not isfinite(to["rel_l2_displacement"]):
+        return f"How far {name} is from {reference} in displacement is not known."
     known = to["reference_uncertainty"]
     if known and to["rel_l2_displacement"] < known["rel_l2_displacement"]:
         return (
@@ -157,12 +162,14 @@ def _verdict(name: str, own: Metrics, metrics: Metrics) -> str:
 def _against_reference(name: str, own: Metrics, metrics: Metrics) -> list[str]:
     reference, to, certificate = metrics["reference"], own["to_reference"], own["certificate"]
     known = to["reference_uncertainty"] or {}
-    fields = ", ".join(
-        f"{_plus_minus(to[key], known.get(key))} in {field}"
+    fields = [
+        f"{_plus_minus(to[key], known.get(key, nan))} in {field}"
         for key, field in (("rel_l2_displacement", "displacement"), ("rel_l2_von_mises", "von Mises stress"))
-    )
-    own_error = f"; after ± the estimated error of {reference} itself" if known else ""
-    said = [f"{name} is {fields} away from {reference} (relative L² over the body{own_error})."]
+        if isfinite(to[key])
+    ]
+    own_error = f"; after ± the estimated error of {reference} itself" if "±" in str(fields) else ""
+    away = f"{name} is {', '.join(fields)} away from {reference} (relative L² over the body{own_error})."
+    said = [away] if fields else []
     if certificate and certificate["rel_excess"] > 0:
         above = percent(certificate["rel_excess"], 2)
         said.append(f"On the shared mesh its energy is {above} above the least that is possible.")
@@ -182,6 +189,8 @@ def _beside_twin(name: str, own: Metrics, twin: str, other: Metrics, source: str
     if not (own["held_out"] and other["held_out"]):
         return ""
     off, of_twin = own["held_out"]["mae_sum"], other["held_out"]["mae_sum"]
+    if not isfinite(off + of_twin):
+        return ""
     return (
         f"{name}, which is given the markers, is {off:.3f} mm off (mean |Δu| + |Δv|) at held-out {source} "
         f"markers; {twin}, its twin by finite elements, {of_twin:.3f} mm."
@@ -195,7 +204,7 @@ def _markers(metrics: Metrics) -> RunAnswer | None:
     given = {name: own for name, own in solvers.items() if own["markers"]["in_sample"]}
     if not given or plain["markers"]["in_sample"] or not plain["held_out"]:
         return None
-    told = {name: own for name, own in given.items() if own["held_out"]}
+    told = {name: own for name, own in given.items() if isfinite(_held_out(own)[0] + _held_out(plain)[0])}
     listed = {reference: plain, **given}
     nearer, inside = [], []
     heads, columns = ["Solver"], [list(listed)]
@@ -209,7 +218,8 @@ def _markers(metrics: Metrics) -> RunAnswer | None:
         heads.append(field)
         columns.append([_signed(share, field == "force") for share in found.values()])
         better = [name for name in given if abs(found[name]) < abs(found[reference])]
-        inside.append(f"in {field} {_those(better, given)}")
+        if any(isfinite(found[name] + found[reference]) for name in given):
+            inside.append(f"in {field} {_those(better, given)}")
     if inside:
         nearer.append(f"over the simulated body {', '.join(inside)}")
     held_out = (
@@ -238,18 +248,18 @@ def _held_out(own: Metrics) -> tuple[float, float, float]:
     if not means:
         return nan, nan, nan
     pairs = zip(means.get("ae_u", ()), means.get("ae_v", ()), strict=True)
-    each = [u + v for u, v in pairs if u is not None and v is not None and isfinite(u + v)] or [nan]
+    each = [u + v for u, v in pairs if isfinite(u + v)] or [nan]
     return means["mae_sum"], min(each), max(each)
 
 
 def _held_out_cells(own: Metrics) -> list[str]:
     mean, least, largest = _held_out(own)
-    return [f"{mean:.3f}", f"{least:.3f} to {largest:.3f}"] if isfinite(least) else [NONE, NONE]
+    return [f"{mean:.3f}", f"{least:.3f} to {largest:.3f}"] if isfinite(mean + least) else [NONE, NONE]
 
 
 def _force_interval(name: str, own: Metrics, metrics: Metrics) -> str:
     """The force that a solver found, with its 95 % interval, beside the true one where that is known."""
-    if not own.get("force"):
+    if not own.get("force") or not isfinite(own["force"]["size"]["value"]):
         return ""
     (size, low, high), place = own["force"]["size"].values(), own["force"]["position"]
     source, depth = metrics["measurements"]["source"], metrics["design"].get("depth")
@@ -260,11 +270,13 @@ def _force_interval(name: str, own: Metrics, metrics: Metrics) -> str:
     if place:
         middle, start, end = (number(place[key], 3) for key in ("value", "low", "high"))
         said += f" at x = {middle} mm ({start} to {end} mm)"
-    if own["force_to_truth_rel"] is None:
-        return f"{said} from the {source} markers."
+    said += f" from the {source} markers"
     true = hypot(*own["reaction"]) / (1 + own["force_to_truth_rel"])
+    if not isfinite(true):
+        return f"{said}."
     where = "inside" if low <= true <= high else "outside"
-    return f"{said} from the {source} markers; that of the simulated finger is {number(true, 3)}, {where} it."
+    placed = f", {where} it" if isfinite(low + high) else ""
+    return f"{said}; that of the simulated finger is {number(true, 3)}{placed}."
 
 
 def _convergence(metrics: Metrics, unsupported: Mapping[str, str], failed: Mapping[str, str]) -> RunAnswer:
@@ -318,8 +330,8 @@ def _signed(share: float, sign: bool) -> str:
     return f"{'+' if sign and share > 0 else ''}{percent(share, 2)}"
 
 
-def _plus_minus(share: float, own: float | None) -> str:
-    if own is None:
+def _plus_minus(share: float, own: float) -> str:
+    if not isfinite(own):
         return percent(share, 2)
     return f"{percent(share, 2, sign=False)} ± {percent(abs(own), 2)}"
 

@@ -1,6 +1,7 @@
 """Words, numbers and sentences of the report."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 
 import numpy as np
 from markupsafe import Markup
@@ -261,17 +262,24 @@ def truth_sentences(comparison: Results) -> list[str]:
     sentences = [f"{label}, which was given none: {sizes} away from the simulated finger."]
     for name, own in found.items():
         changes = [
-            f"{field} {percent(own[field])} ({'nearer' if own[field] < before else 'farther'})"
+            f"{field} {percent(own[field])}"
+            + (f" ({words})" if (words := _nearer(own[field], before)) else "")
             for field, before in plain.items()
         ]
         sentences.append(f"{name}, given the markers: {', '.join(changes)}.")
-    nearer = {
-        field: ", ".join(name for name, own in found.items() if own[field] < before) or "none"
-        for field, before in plain.items()
-    }
+    nearer = {}
+    for field, before in plain.items():
+        known = {name: words for name, own in found.items() if (words := _nearer(own[field], before))}
+        names = ", ".join(name for name, words in known.items() if words == "nearer")
+        nearer[field] = names or ("none" if known else "unknown")
     answer = f"Nearer than {label} in displacement: {nearer['displacement']}. "
     answer += f"Nearer in von Mises stress: {nearer['von Mises stress']}. "
     return [*sentences, f"{answer}Nearer in the indenter's force: {nearer['force']}."]
+
+
+def _nearer(own: float, before: float) -> str:
+    """Whether a distance is shorter than another one, in a word; empty if either is not known."""
+    return ("nearer" if own < before else "farther") if isfinite(own + before) else ""
 
 
 def _distances(evaluation: Evaluation, truth: Evaluation) -> dict[str, float]:

@@ -3,7 +3,7 @@
 import csv
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from math import isnan
+from math import isfinite, isnan
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
@@ -98,7 +98,12 @@ def significant(value: float, digits: int) -> str:
 
 
 def number(value: float, digits: int = 4) -> str:
-    """The same with trailing zeros and a typographic minus; no exponent from 1 to a million."""
+    """The same with trailing zeros and a typographic minus; no exponent from 1 to a million.
+
+    A dash for a number that is not finite.
+    """
+    if not isfinite(value):
+        return NONE
     text = f"{value:#.{digits}g}"
     if 1 <= abs(value) < 1e6:
         text = f"{float(text):.0f}" if "e" in text else text
@@ -106,14 +111,16 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def percent(share: float, digits: int = 3, *, sign: bool = True) -> str:
-    """A share in per cent: so many significant digits, at least all before the point; a dash for NaN.
+    """A share in per cent: so many significant digits, at least all before the point.
+
+    A dash for a share that is not finite.
 
     Args:
         share: 0.123 is 12.3 %.
         digits: How many significant digits.
         sign: Whether the per cent sign follows, after a no-break space.
     """
-    if isnan(share):
+    if not isfinite(share):
         return NONE
     value = 100 * share
     if value == 0:

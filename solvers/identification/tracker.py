@@ -36,6 +36,8 @@ GROWTH = 1.02
 
 Frames with less, down to the inverse of this, join the mean.
 """
+FEWEST = 3
+"""Markers that must be seen for a force: six numbers for the four of the contact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +91,8 @@ class ForceTracker:
         radius: Of their discs, mm; less is taken where one is nearer to the boundary.
 
     Attributes:
-        largest: Root mean square motion of the markers, mm, in the frame with the largest one so far.
-        log_evidence: Logarithm of the evidence for the law in that frame; see `Fit.log_evidence`.
+        log_evidence: Logarithm of the evidence for the law in the last frame, with the finger's drawn prior;
+            None if the frame has no estimate or much less motion than an earlier one. See `Fit.log_evidence`.
 
     Raises:
         UserError: If the unknowns lack the force or its place.
@@ -108,8 +110,9 @@ class ForceTracker:
         self._markers = MarkerModel(model, measurement)
         self._of_finger = ~np.isin(names, (*CONTACT, SHARE, *model.unknowns.feet.names))
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
-        self._known, self.largest, self._learnt = self._drawn, 0.0, 0
-        self.log_evidence = 0.0
+        self._known, self._learnt = self._drawn, 0
+        self._largest = 0.0  # root mean square motion of the markers, mm
+        self.log_evidence: float | None = None
         rest = self._linearised(np.zeros(len(names)))
         if rest is None:
             raise UserError("the finger has no equilibrium at rest")
@@ -132,23 +135,24 @@ class ForceTracker:
                 f"a frame has displacements and deviations of shape {shape} and a mask of shape {shape[:1]}, "
                 f"got {displacements.shape}, {deviations.shape} and {visible.shape}"
             )
-        self._evaluations = 0
+        self._evaluations, self.log_evidence = 0, None
         reading = self._updated(displacements, deviations, visible)
         return replace(reading, evaluations=self._evaluations, seconds=time.perf_counter() - started)
 
     def _updated(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
-        if (seen := int(visible.sum())) < 3:  # six numbers for the four of the contact
+        if (seen := int(visible.sum())) < FEWEST:
             return self._unknown(f"{seen} of {len(visible)} markers are seen, too few for a force")
         rows = np.repeat(visible, 2)
         observed = displacements.ravel()[rows]
         noise = np.maximum(deviations.ravel()[rows], MIN_STANDARD_DEVIATION)
-        moved = float(np.sqrt((displacements[visible] ** 2).sum(axis=1).mean()))
-        grown, near = moved > GROWTH * self.largest, GROWTH * moved > self.largest
+        moved = _motion(displacements, visible)
+        grown, near = moved > GROWTH * self._largest, GROWTH * moved > self._largest
         found = self._searched(self._drawn if near else self._known, rows, observed, noise)
         if found is not None and near:
             self._learn(found, anew=grown)
+            self.log_evidence = found.log_evidence
             if grown:
-                self.largest, self.log_evidence = moved, found.log_evidence
+                self._largest = moved
             else:
                 found = self._searched(self._known, rows, observed, noise)
         if found is None:
@@ -281,9 +285,10 @@ class ForceTracker:
 class LawTracker:
     """Estimates the force in one frame after another by the law that is most probable by the markers.
 
-    All laws are compared whenever the markers have moved by a quarter farther than at the last comparison; in
-    between only the most probable one is followed. A law is dropped once the logarithm of its probability is
-    less than another's by 7: it is a thousand times less probable.
+    All laws are compared, by the evidence of one frame, whenever the markers have moved by a quarter farther
+    than at the last comparison; in between only the most probable one is followed. A law is dropped once the
+    logarithm of its probability is less than another's by 7: it is a thousand times less probable. A law
+    without an equilibrium in that frame comes after those that have one, and is compared again at the next.
 
     Args:
         trackers: By the name of the law; the first is taken before there is a motion.
@@ -294,19 +299,35 @@ class LawTracker:
 
     def __init__(self, trackers: Mapping[LawName, ForceTracker]) -> None:
         self._trackers = dict(trackers)
-        self._compared = 0.0
+        self._compared = 0.0  # root mean square motion of the markers in the last comparison, mm
         self.laws: tuple[LawName, ...] = tuple(trackers)
 
     def update(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
         """The force in a frame by the most probable law; see `ForceTracker.update`."""
-        started, first = time.perf_counter(), self._trackers[self.laws[0]]
-        found = {self.laws[0]: first.update(displacements, deviations, visible)}
-        if len(self.laws) > 1 and first.largest > self._compared * 1.25:
-            self._compared = first.largest
+        started, first = time.perf_counter(), self.laws[0]
+        found = {first: self._trackers[first].update(displacements, deviations, visible)}
+        moved = _motion(displacements, visible) if visible.sum() >= FEWEST else 0.0
+        if len(self.laws) > 1 and moved > self._compared * 1.25:
             for law in self.laws[1:]:
                 found[law] = self._trackers[law].update(displacements, deviations, visible)
-            known = {law: self._trackers[law].log_evidence + log_prior(law) for law in self.laws}
-            order = sorted(known, key=lambda law: -known[law])
-            self.laws = tuple(law for law in order if known[law] >= known[order[0]] - 7.0)
+            self._compare(moved)
         evaluations = sum(reading.evaluations for reading in found.values())
         return replace(found[self.laws[0]], evaluations=evaluations, seconds=time.perf_counter() - started)
+
+    def _compare(self, moved: float) -> None:
+        """Sort and drop the laws by their evidence in the last frame, in which the markers moved by mm."""
+        known = {
+            law: evidence + log_prior(law)
+            for law in self.laws
+            if (evidence := self._trackers[law].log_evidence) is not None
+        }
+        if known:
+            self._compared = moved
+            order = sorted(known, key=lambda law: -known[law])
+            probable = (law for law in order if known[law] >= known[order[0]] - 7.0)
+            self.laws = (*probable, *(law for law in self.laws if law not in known))
+
+
+def _motion(displacements: FloatArray, visible: BoolArray) -> float:
+    """Root mean square motion, mm, of the visible markers, from displacements of shape (m, 2), mm."""
+    return float(np.sqrt((displacements[visible] ** 2).sum(axis=1).mean()))

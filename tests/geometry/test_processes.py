@@ -10,10 +10,18 @@ import warnings
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from geometry.processes import PATIENCE_S, Pool, ProcessFailed, child_environment, end_with_parent
+from geometry.processes import (
+    PATIENCE_S,
+    Pool,
+    ProcessFailed,
+    child_environment,
+    end_with_parent,
+    known_to_children,
+)
 from pinnray.commands.launch import guarded
 from solvers.solver import Progress
 
@@ -47,6 +55,32 @@ def die_once(folder: Path, progress: Progress) -> str:
         return "alive"
     os.kill(os.getpid(), signal.SIGKILL)
     raise AssertionError
+
+
+@pytest.mark.parametrize(
+    ("module", "known"),
+    [
+        ("fractions", True),  # on the search path
+        ("__main__", False),  # the calling script
+        ("of_the_working_folder", False),
+        ("a_notebook", False),
+    ],
+)
+def test_a_child_knows_classes_of_modules_on_the_path(module, known, tmp_path, monkeypatch):
+    (tmp_path / "of_the_working_folder.py").touch()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend("")
+    kind = type("Own", (), {"__module__": module})
+    monkeypatch.setitem(sys.modules, module, sys.modules.get(module, SimpleNamespace()))
+    monkeypatch.setattr(sys.modules[module], "Own", kind, raising=False)  # so that it can be pickled
+    assert known_to_children(kind()) == known
+
+
+def test_a_child_cannot_be_given_an_object_of_a_function_s_class():
+    class Local:
+        pass
+
+    assert not known_to_children(Local())
 
 
 def process_number(_: object, progress: Progress) -> int:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from geometry.errors import UserError
 from solvers.elasticity import (
     deformation_jacobian,
     energy_density_of,
@@ -35,6 +36,29 @@ def flat():
 
 def rotation(angle: float) -> np.ndarray:
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda law, flat: strain_of(law, flat),
+        lambda law, flat: energy_density_of(law, flat, LAME),
+        lambda law, flat: stress_of(law, flat, LAME),
+        lambda law, flat: piola_stress(law, flat, flat),
+    ],
+)
+def test_a_law_that_is_not_known_is_refused_and_not_taken_for_another(use, flat):
+    said = "the law 'ogden' is not known here; take linear or neo-hookean or st-venant-kirchhoff or gent"
+    with pytest.raises(UserError, match=f"^{said}$"):
+        use("ogden", flat)
+
+
+def test_a_plane_state_that_is_not_known_is_refused():
+    for constants in (lame_constants, lame_derivatives):
+        with pytest.raises(
+            UserError, match=r"^the plane state 'sress' is not known here; take strain or stress$"
+        ):
+            constants(YOUNG, POISSON, "sress")
 
 
 def test_printed_constants_of_the_paper_are_plane_stress():

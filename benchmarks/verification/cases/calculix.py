@@ -13,6 +13,7 @@ from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
+from solvers.elasticity import check_known
 from solvers.extrusion import ExtrudedSpace
 from solvers.fem.boundary_conditions import dirichlet_conditions
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -110,7 +111,13 @@ def table(printed: str, title: str) -> FloatArray:
 
 
 def deck(problem: Problem, space: LagrangeSpace | ExtrudedSpace) -> str:
-    """Input of `ccx`: nodes, quadratic elements, one step; plane elements are 1 mm deep."""
+    """Input of `ccx`: nodes, quadratic elements, one step; plane elements are 1 mm deep.
+
+    Raises:
+        UserError: If the material has another law than those of `BOUNDS`, or is in plane stress.
+    """
+    check_known("law", problem.material.law, tuple(BOUNDS))
+    check_known("plane state", problem.material.plane, ("strain",))
     solid = isinstance(space, ExtrudedSpace)
     held, values = dirichlet_conditions(problem, space)
     conditions = [

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray, IntArray
-from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
+from solvers.elasticity import Lame, LawName, check_known, deformation_jacobian, energy_density_of
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix, Factors
 from solvers.pinn.threading import boxes_around, imap_in_threads
@@ -31,6 +31,9 @@ KEPT = 2**30
 The two levels of `pinn-std` on the default finger have 0.12 and 0.4 GB of them. Above the limit they are
 computed anew for every evaluation.
 """
+
+LAWS: tuple[LawName, ...] = ("linear", "neo-hookean", "st-venant-kirchhoff")
+"""Those of `solvers.elasticity` that have a tangent here."""
 
 CHUNK = 1024
 """Blocks that are turned into a tangent's at a time, which stay in a cache."""
@@ -339,7 +342,7 @@ def energy_density(gradient: torch.Tensor, lame: Lame, law: LawName) -> torch.Te
 def piola_stress_and_tangent(
     gradient: torch.Tensor, lame: Lame, law: LawName
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """P = dψ/dH and A = dP/dH of the laws of `solvers.elasticity`.
+    """P = dψ/dH and A = dP/dH of `LAWS`.
 
     With G = F^-T, the neo-Hookean law has P = μ (F - G) + λ ln(J) G and
 
@@ -359,7 +362,11 @@ def piola_stress_and_tangent(
     Returns:
         P, shape (n, 2, 2), MPa, not a number where a finite deformation turns the material inside out, and
         A, shape (n, 2, 2, 2, 2), MPa.
+
+    Raises:
+        UserError: If the law is another one.
     """
+    check_known("law", law, LAWS)
     λ, μ = lame.λ, lame.μ
     one = torch.eye(2, dtype=gradient.dtype)
     if law == "linear":

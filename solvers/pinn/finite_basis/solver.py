@@ -16,7 +16,7 @@ from solvers.assimilation.misfit import MarkerSettings, leave_one_out_displaceme
 from solvers.assimilation.pictures import FreePictures
 from solvers.cylinder_contact import CONTACT_AT_END
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from solvers.pinn.finite_basis.energy import NetworkEnergy
+from solvers.pinn.finite_basis.energy import LAWS, NetworkEnergy
 from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
 from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
@@ -81,7 +81,7 @@ class FiniteBasisSolver(NetworkSolver):
     cell: float
     base_length: float = 5.0
     seed: int = 0
-    laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
+    laws: ClassVar[tuple[str, ...]] = LAWS
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
 
     def __post_init__(self) -> None:

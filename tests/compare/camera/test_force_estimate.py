@@ -4,6 +4,7 @@ import csv
 import importlib
 import json
 import os
+from time import sleep
 
 import cv2
 import numpy as np
@@ -126,6 +127,49 @@ def test_a_live_marker_that_is_hidden_or_was_not_seen_at_rest_has_no_displacemen
     assert given[0][2].tolist() == [True, False, True]
     assert given[1][2].tolist() == [True, False, False]
     np.testing.assert_array_equal(given[1][0][1:], 0.0)
+
+
+class Failing(Recorder):
+    """Fails in its second frame."""
+
+    def update(self, displacements, deviations, visible):
+        if self.given:
+            raise ValueError("the factors are not finite")
+        return super().update(displacements, deviations, visible)
+
+
+def test_an_error_of_the_live_force_ends_the_tracking_at_the_next_frame():
+    told = []
+
+    def track():
+        with LiveForce(Failing(), DEPTH) as force:
+            for number in range(1000):
+                force.watch(Frame(number, number / 30, np.zeros((2, 2), dtype=np.uint8)), seen(REST))
+                told.append(number)
+                sleep(0.01)
+
+    with pytest.raises(ValueError, match="the factors are not finite"):
+        track()
+    assert len(told) < 1000
+
+
+def test_a_finger_at_rest_takes_no_more_memory_with_every_frame():
+    kept = []
+    for count in (3, 30):
+        _, force = followed(count * [seen(REST)])
+        kept.append(sum(np.size(each) for name, each in vars(force).items() if name != "forces"))
+    assert kept[0] == kept[1]
+
+
+def test_a_marker_seen_in_fewer_frames_at_rest_has_the_mean_of_those():
+    shifts = [0.01, -0.01, -0.02, 1.0]
+    hidden = [(), (), (1,), ()]
+    given, _ = followed(
+        [seen(REST + np.array([0, shift]), hidden=each) for shift, each in zip(shifts, hidden, strict=True)]
+    )
+    np.testing.assert_allclose(given[3][0][:, 1], [1 + 0.02 / 3, 1.0, 1 + 0.02 / 3], rtol=1e-9)
+    # 0.08 pixels are 0.01 mm; the mean of so many frames adds as small a part of the variance.
+    np.testing.assert_allclose(given[3][1][:, 0], 0.01 * np.sqrt(1 + 1 / np.array([3, 2, 3])), rtol=1e-9)
 
 
 def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(capsys):

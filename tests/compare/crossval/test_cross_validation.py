@@ -4,6 +4,8 @@ import csv
 import json
 import re
 import shlex
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -261,6 +263,34 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
     pulled = replace(study, measurements=None, truths=["mixed"], load=Load(displacement=(1.0, 0.0)))
     with pytest.raises(UserError, match="truth mixed: a cylinder presses on the finger: prescribe a v"):
         cross_validate(pulled)
+
+
+OWN_SCRIPT = """
+import pinnray as pr
+from solvers.fem.linear import FemSolver
+
+class Own(FemSolver):
+    name = {name!r}
+
+    def solve(self, problem, progress=print):
+        print("solved by the own class")
+        return super().solve(problem)
+
+solvers = ["gp", Own(degree=1)]
+pr.crossval("default", solvers, out="out", measurements="markers.csv", size=2, schemes="one-out", seeds=1)
+"""
+
+
+@pytest.mark.parametrize("name", ["fem", "own"])
+def test_a_class_of_the_calling_script_is_judged_beside_solvers_in_processes(tmp_path, observations, name):
+    """Also one that has the name of a built-in solver."""
+    write_measurements(tmp_path / "markers.csv", replace(observations, simulated=False))
+    (tmp_path / "script.py").write_text(OWN_SCRIPT.format(name=name))
+    command = [sys.executable, "-W", "ignore", "script.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert "solved by the own class" in done.stdout
+    assert list(layouts_of(tmp_path / "out", "measured")["measured"]["solvers"]) == ["gp", name]
 
 
 @pytest.mark.parametrize(

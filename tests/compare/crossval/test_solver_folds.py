@@ -1,6 +1,7 @@
 """A solver in folds: it does not see what is held out; finished folds are kept."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -11,14 +12,17 @@ from compare.crossval.solver_folds import SolverTask, run_folds, sweep_weights
 from compare.crossval.study import CrossvalStudy, SolverVariant
 from compare.crossval.true_fields import FieldSampler, TrueContact, TrueField
 from geometry.arrays import FloatArray
+from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.registration import Homography, Pictures
 from solvers.assimilation.misfit import misfit_of
+from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
-from solvers.solution import Estimated, IdentifiedForce, State, Uncertainty
+from solvers.solution import Estimated, IdentifiedForce, Solution, State, Uncertainty
+from solvers.solver import FieldSettings, Progress, silent
 from tests.compare.crossval.conftest import NOISE
 
 QUICK = {"degree": 1, "law": "given", "parameters": "normal_force,position"}
@@ -51,12 +55,91 @@ def task(tmp_path, coarse_mesh, truth, observations) -> SolverTask:
 
 
 def variant(name: str, **settings: object) -> SolverVariant:
-    return SolverVariant(name, name, make_solver(name, **settings).settings())
+    return SolverVariant(name, make_solver(name, **settings))
 
 
 def judged(task: SolverTask) -> list[FoldResult]:
     (outcomes,) = run_folds(task)
     return outcomes
+
+
+class Doubled(FemSolver):
+    """Stands for a user's class with the name of another solver: `fem`, and all displacements twice."""
+
+    factor: ClassVar = 2.0
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        found = super().solve(problem)
+        return replace(found, field=replace(found.field, values=self.factor * found.field.values))
+
+
+class Tripled(Doubled):
+    """All displacements three times."""
+
+    factor = 3.0
+
+
+def test_a_solver_of_ones_own_is_judged_whatever_its_name(task, observations):
+    task = replace(task, folds=[Fold(ONE, "marker 4", (3,))])
+    given = observations.displacements
+    plain, twice, thrice = (
+        np.array(judged(replace(task, variant=SolverVariant("fem", kind(degree=1))))[0].errors) + given
+        for kind in (FemSolver, Doubled, Tripled)  # in one folder: no fold of another class is taken over
+    )
+    np.testing.assert_allclose(twice, 2 * plain, rtol=1e-12)
+    np.testing.assert_allclose(thrice, 3 * plain, rtol=1e-12)
+
+
+def test_folds_of_a_class_without_source_are_not_kept(task, monkeypatch):
+    """An edit of a notebook's class cannot be told."""
+    task = replace(task, folds=[Fold(ONE, "marker 4", (3,))], variant=SolverVariant("fem", Doubled(degree=1)))
+    monkeypatch.setattr(Doubled, "__module__", "a notebook")
+    before = judged(task)
+    monkeypatch.setattr(Doubled, "solve", FemSolver.solve)
+    assert judged(task)[0].errors != before[0].errors
+
+
+class Drawing:
+    """A class that is no dataclass, whose seed is a setting."""
+
+    name, laws, loads = "drawing", ("linear",), ("mean",)
+
+    def __init__(self, seed=3, size=1.0):
+        self.given = seed, size
+
+    def settings(self):
+        return dict(zip(("seed", "size"), self.given, strict=True))
+
+
+@dataclass(frozen=True)
+class DrawingData(FieldSettings):
+    """The same as a dataclass."""
+
+    name, laws, loads = "drawing", ("linear",), ("mean",)
+    seed: int = 3
+    size: float = 1.0
+
+    @property
+    def given(self):
+        return self.seed, self.size
+
+
+@pytest.mark.parametrize("kind", [Drawing, DrawingData])
+def test_a_variant_keeps_class_and_settings_and_changes_the_seed(kind):
+    variant = SolverVariant("drawing", kind(size=2.0))
+    made = [variant.make(seed) for seed in (0, 2)]
+    assert [type(each) for each in made] == [kind, kind]
+    assert [each.given for each in made] == [(3, 2.0), (5, 2.0)]
+    assert variant.settings == {"seed": 3, "size": 2.0}
+
+
+def test_a_class_that_cannot_be_made_from_its_settings_is_refused_in_one_line():
+    class Fixed(Drawing):
+        def __init__(self):
+            super().__init__()
+
+    with pytest.raises(UserError, match=r"solver drawing cannot be made with {'seed': 4}: .*unexpected"):
+        SolverVariant("drawing", Fixed()).make(1)
 
 
 @pytest.mark.parametrize("name", ["gp", "fem-asm", "fem-id", "statfem"])

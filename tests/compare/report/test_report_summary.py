@@ -141,6 +141,22 @@ def test_what_the_markers_change_is_said_of_displacement_stress_and_force(fem, p
     )
 
 
+def test_a_solver_without_a_force_is_neither_nearer_nor_farther_in_it(compared, fem, given, pinn, evaluate):
+    """In words and in the table; one with a force is still judged."""
+    without = replace(given, reaction=np.full(2, np.nan))
+    truth = evaluate("fem-nonlinear", 1.5)
+    alone = asked(compared(fem, without, truth=truth))[MARKERS]
+    assert alone.verdict.endswith(
+        "over the simulated body in displacement fem-asm, in von Mises stress fem-asm."
+    )
+    assert alone.table.rows[1][-1] == "–"
+    both = asked(compared(fem, without, replace(pinn, in_sample=True), truth=truth))[MARKERS]
+    assert both.verdict.endswith("in force only pinn-std.")
+    *_, changed, answer = truth_sentences(compared(fem, without, truth=truth))
+    assert changed.endswith("(nearer), force –.")
+    assert answer.endswith("Nearer in the indenter's force: unknown.")
+
+
 def test_there_is_nothing_to_say_without_a_truth_or_a_solver_with_markers(fem, pinn, compared):
     given = replace(pinn, in_sample=True)
     assert truth_sentences(compared(fem, given)) == []

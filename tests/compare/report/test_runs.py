@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from compare.report.output_files import metrics
 from compare.report.runs import differing_settings, read_runs
 from geometry.atomic import write_json
 from pinnray.cli import main
+from solvers.solution import Estimated, IdentifiedForce
 
 Save = Callable[..., Path]
 
@@ -104,6 +106,75 @@ def test_a_wrong_folder_is_refused_in_a_line(save, tmp_path, monkeypatch, capsys
     assert main(["report", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
+
+
+def without_numbers(value):
+    """The content with null for every number."""
+    if isinstance(value, dict):
+        return {key: without_numbers(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [without_numbers(entry) for entry in value]
+    return None if isinstance(value, float) else value
+
+
+@pytest.fixture
+def truthful(save, compared, estimated, evaluate, finished) -> Path:
+    """A run with a truth, a found force and its place, and figures."""
+    folder = save("truthful")
+    given = evaluate("fem-asm", 1.02)
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(36.0, 35.0, 37.5))
+    given = replace(given, in_sample=True, left_out=estimated.marker_displacement, identified=force)
+    network = evaluate("pinn-asm", 1.01)
+    network = replace(network, in_sample=True, left_out=estimated.marker_displacement, twin="fem-asm")
+    plain, truth = evaluate("pinn-std", 1.05), evaluate("fem-nonlinear", 1.1)
+    content = metrics(compared(estimated, plain, network, given, truth=truth))
+    figures = json.loads((finished / "metrics.json").read_text(encoding="utf-8"))["solvers"]["fem"]["figures"]
+    figures["values"] |= {"force_low_N": 4.0, "force_high_N": 5.0, "strain_over_break": 0.8}
+    for own in content["solvers"].values():
+        own["figures"] = figures
+    write_json(folder / "metrics.json", content)
+    return folder
+
+
+@pytest.mark.parametrize("solvers", [["fem"], ["pinn-std"], ["pinn-asm"], ["fem-asm"], None])
+def test_a_number_that_is_null_is_no_number(truthful, capsys, solvers):
+    """A number that is not finite is null in JSON: here all numbers of one solver, and of all."""
+    content = json.loads((truthful / "metrics.json").read_text(encoding="utf-8"))
+    for name in solvers or content["solvers"]:
+        content["solvers"][name] = without_numbers(content["solvers"][name])
+    write_json(truthful / "metrics.json", content)
+    assert main(["report", str(truthful)]) == 0
+    both = truthful.parent / "both"
+    copy = shutil.copytree(truthful, truthful.parent / "copy")
+    assert main(["report", str(truthful), str(copy), "--out", str(both)]) == 0
+    words = [capsys.readouterr().out, *(path.read_text("utf-8") for path in both.iterdir())]
+    for text in words:
+        assert not re.search(r"\b(nan|None|inf)\b", text)
+    rows = [
+        row
+        for row in csv.DictReader((both / "runs.csv").open())
+        if row["solver"] in (solvers or row["solver"])
+    ]
+    assert {row["force_N_per_mm"] for row in rows} == {""}
+
+
+def test_each_number_alone_may_be_null(truthful):
+    content = json.loads((truthful / "metrics.json").read_text(encoding="utf-8"))
+
+    def holders(value):
+        entries = value.items() if isinstance(value, dict) else enumerate(value[:1])
+        for key, entry in entries:
+            if isinstance(entry, dict | list):
+                yield from holders(entry)
+            elif isinstance(entry, float):
+                yield value, key, entry
+
+    for holder, key, number in holders(content["solvers"]):
+        holder[key] = None
+        write_json(truthful / "metrics.json", content)
+        (run,) = read_runs([truthful])
+        assert not re.search(r"\bnan\b", str([[a.verdict, a.sentences, a.table] for a in run.answers]))
+        holder[key] = number
 
 
 @pytest.mark.parametrize(

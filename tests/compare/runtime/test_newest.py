@@ -1,6 +1,9 @@
 """Work on the newest item: none is done twice, what came in between is passed over, errors come out."""
 
+import gc
+from concurrent.futures import Future
 from threading import Event
+from time import sleep
 
 import pytest
 
@@ -42,6 +45,41 @@ def test_an_error_in_the_work_is_raised_at_the_end():
 
     with pytest.raises(ValueError, match="spoilt"), NewestOnly(work) as newest:
         newest.put("spoilt")
+
+
+def test_an_error_in_the_work_is_raised_with_the_next_item_and_no_more_is_done():
+    done, failing, go_on = [], Event(), Event()
+
+    def work(item):
+        done.append(item)
+        failing.set()
+        assert go_on.wait(10)
+        raise ValueError(item)
+
+    def all_items():
+        with NewestOnly(work) as newest:
+            newest.put("spoilt")
+            assert failing.wait(10)
+            newest.put("waiting")
+            go_on.set()
+            for _ in range(1000):  # of which the first ones may still replace the one that waits
+                sleep(0.01)
+                newest.put("next")
+
+    with pytest.raises(ValueError, match="spoilt"):
+        all_items()
+    assert done == ["spoilt"]
+
+
+def test_work_that_is_done_is_not_kept():
+    done = []
+    with NewestOnly(done.append) as newest:
+        for number in range(100):
+            newest.put(number)
+            while len(done) <= number:
+                pass
+        assert sum(isinstance(each, Future) for each in gc.get_objects()) < 10
+    assert done == list(range(100))
 
 
 def test_an_error_beside_the_work_is_not_hidden_by_one_in_it():

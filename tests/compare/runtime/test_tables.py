@@ -12,6 +12,7 @@ from compare.runtime.tables import distance, number, percent, plain, write_csv
     ("value", "digits", "expected"),
     [
         (-0.25, 4, "−0.2500"),  # a typographic minus, and the digits that it has
+        (float("inf"), 3, "–"),  # what is not known
         (1234.0, 4, "1234"),  # no full stop after a whole number
         (0.0, 4, "0.000"),
         (29471.4, 3, "29500"),  # no exponent where a reader does not need one

@@ -170,6 +170,63 @@ def test_the_law_is_that_of_the_finger(problem, tracker_of_laws, law):
     assert np.sqrt(np.mean((column(found, "size") - true) ** 2)) < 0.03 * true.max()
 
 
+def fails_below(tracker, law, largest):
+    """Leave a law without an equilibrium in frames whose motion, root mean square, mm, is below a limit."""
+    lost = tracker._trackers[law]
+    searched = lost._searched
+
+    def search(prior, rows, observed, noise):
+        moved = np.sqrt(2 * np.mean(observed**2))
+        return None if moved < largest else searched(prior, rows, observed, noise)
+
+    lost._searched = search
+
+
+def laws_followed(problem, *laws):
+    return fem_law_tracker(problem, problem.mesh.markers, RADIUS, laws, degree=1)
+
+
+def test_a_law_without_equilibrium_never_wins(problem, drawn_path):
+    tracker = laws_followed(problem, "neo-hookean", "st-venant-kirchhoff")
+    fails_below(tracker, "st-venant-kirchhoff", np.inf)
+    for reading in readings(tracker, drawn_path[0][:16]):
+        assert np.isfinite(reading.size)
+        assert tracker.laws[0] == "neo-hookean"
+
+
+def test_the_laws_are_compared_where_the_first_one_has_no_equilibrium(problem, drawn_path):
+    places, forces = drawn_path
+    tracker = laws_followed(problem, "st-venant-kirchhoff", "neo-hookean")
+    fails_below(tracker, "st-venant-kirchhoff", np.inf)
+    found = readings(tracker, places[:16])
+    assert found[15].size == pytest.approx(np.linalg.norm(forces[15]), rel=0.03)
+
+
+def test_a_law_that_had_no_equilibrium_in_a_frame_may_win_in_a_later_one(problem, drawn_path):
+    places, _ = drawn_path
+    tracker = laws_followed(problem, "st-venant-kirchhoff", "neo-hookean")
+    fails_below(tracker, "neo-hookean", 0.5 * np.sqrt((places[15] ** 2).sum(axis=1).mean()))
+    assert tracker.laws[0] == "st-venant-kirchhoff"
+    readings(tracker, places[:6])
+    assert tracker.laws == ("st-venant-kirchhoff", "neo-hookean")
+    readings(tracker, places[6:16])
+    assert tracker.laws[0] == "neo-hookean"
+
+
+def test_old_evidence_does_not_speak_for_a_law_that_has_no_equilibrium_now(problem, drawn_path):
+    places, _ = drawn_path
+    tracker = laws_followed(problem, "neo-hookean", "st-venant-kirchhoff")
+    readings(tracker, places[:5])
+    assert len(tracker.laws) == 2  # the motion is too small to tell
+    fails_below(tracker, "st-venant-kirchhoff", np.inf)
+    off = (
+        places[5:16] + 0.5 * SHARES[5:16, None, None] * np.eye(9)[4][:, None]
+    )  # evidence far below any earlier one
+    for reading in readings(tracker, off):
+        assert np.isfinite(reading.size)
+        assert tracker.laws[0] == "neo-hookean"
+
+
 def test_arrays_of_another_finger_are_refused(tracker_of):
     with pytest.raises(ShapeError, match=r"shape \(9, 2\) and a mask of shape \(9,\), got \(8, 2\)"):
         tracker_of().update(np.zeros((8, 2)), np.zeros((8, 2)), np.ones(8, dtype=bool))
