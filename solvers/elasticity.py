@@ -9,13 +9,12 @@ volumetric part of the neo-Hookean.
 """
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from geometry.arrays import FloatArray
-
-LawName = Literal["linear", "neo-hookean", "st-venant-kirchhoff", "gent"]
+from solvers.names import LawName as LawName
 
 LIMIT = 1.0
 """Value of tr C - 3 - 2 ln J that Gent's law cannot reach: of much filler; gum has 30 to 100.
