@@ -1,6 +1,6 @@
 """The command line: `compare`, the main job, and `pinnray` with every command.
 
-The commands, which take most of a second to import, are imported when Ctrl-C no longer gives a traceback.
+The rest is imported when Ctrl-C no longer gives a traceback.
 """
 
 import atexit

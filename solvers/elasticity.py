@@ -9,14 +9,14 @@ volumetric part of the neo-Hookean.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, NamedTuple, assert_never, get_args
+from typing import Any, NamedTuple, assert_never, get_args
 
 import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
+from solvers.names import LawName as LawName
 
-LawName = Literal["linear", "neo-hookean", "st-venant-kirchhoff", "gent"]
 PLANES = ("strain", "stress")
 
 LIMIT = 1.0

@@ -11,9 +11,9 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.parameters import CheckedModel, bounded
-from solvers.elasticity import Lame, LawName, lame_constants
-
-LoadKind = Literal["mean", "point", "patch", "cylinder"]
+from solvers.elasticity import Lame, lame_constants
+from solvers.names import LawName
+from solvers.names import LoadKind as LoadKind
 
 RADIUS = 5.0
 """Default radius of the cylinder, mm."""

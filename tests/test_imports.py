@@ -1,17 +1,27 @@
 """The program's imports, also those inside functions and for type checkers alone, and its layers."""
 
 import ast
+import json
 import re
 from pathlib import Path
 
 import grimp
 import numpy as np
+import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from geometry.content_hash import PROGRAM
+from pinnray.commands.app import COMMANDS
+from tests.pinnray.commands.programs import run_python
 
 ROOT = Path(__file__).parents[1]
+
+HEAVY = {
+    *("cadquery", "cv2", "dask", "distributed", "dolfinx", "gmsh", "matplotlib", "mpi4py", "mujoco", "OCP"),
+    *("pandas", "petsc4py", "pyvista", "scipy", "shapely", "sklearn", "torch", "ufl", "vtk", "vtkmodules"),
+}
+"""Libraries that take a tenth of a second of processor to import, most of them a second."""
 
 
 def test_no_modules_import_one_another_in_a_circle():
@@ -47,3 +57,24 @@ def test_quantiles_come_without_the_distributions_of_scipy():
         if re.search(r"^\s*(from|import) scipy\.stats", path.read_text(encoding="utf-8"), re.MULTILINE)
     ]
     assert importing == ["studies/sweep/sampling.py"]
+
+
+@pytest.mark.parametrize(
+    ("command_lines", "absent"),
+    [
+        (["--version", "--help"], {"numpy", "pydantic", "pinnray.options.shared"}),  # nor any command
+        (["compare --help"], {"numpy", "pydantic"}),
+        ([f"{command.rpartition('.')[2]} --help" for command in COMMANDS], set()),
+    ],
+)
+def test_help_comes_without_heavy_libraries(command_lines, absent):
+    code = (
+        "import json, sys\n"
+        "from pinnray.cli import main\n"
+        "codes = [main(line.split()) for line in json.loads(sys.argv[1])]\n"
+        "json.dump([codes, sorted(sys.modules)], sys.stderr)"
+    )
+    done = run_python("-c", code, json.dumps(command_lines))
+    codes, modules = json.loads(done.stderr)
+    assert codes == [0] * len(command_lines)
+    assert (HEAVY | absent) & set(modules) == set()

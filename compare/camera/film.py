@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from geometry.content_hash import file_digest
 from geometry.finger.finger import Finger
 
-if TYPE_CHECKING:  # it imports OpenCV, and the list of commands has to come at once
+if TYPE_CHECKING:  # it imports OpenCV
     from vision.tracking.scene import FilmedScene
 
 

@@ -14,22 +14,24 @@ PACKAGES = (
 
 def package_versions() -> dict[str, str]:
     """Versions of all packages that affect the numbers or pictures."""
-    versions = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            versions[package] = _version(package)
-        except PackageNotFoundError:
-            module = sys.modules.get({"fenics-dolfinx": "dolfinx", "fenics-ufl": "ufl"}.get(package, package))
-            versions[package] = str(getattr(module, "__version__", "unknown"))
-    return versions
-
-
-_version = cache(version)
+    return {"python": platform.python_version()} | {package: _version(package) for package in PACKAGES}
 
 
 def program_version() -> str:
     """Version of pinn-ray, as it is installed."""
-    return package_versions()["pinn-ray"]
+    return _version("pinn-ray")
+
+
+def _version(package: str) -> str:
+    """Version of a package; that of its module where it is not installed by pip."""
+    try:
+        return _installed_version(package)
+    except PackageNotFoundError:
+        module = sys.modules.get({"fenics-dolfinx": "dolfinx", "fenics-ufl": "ufl"}.get(package, package))
+        return str(getattr(module, "__version__", "unknown"))
+
+
+_installed_version = cache(version)
 
 
 def machine() -> dict[str, str | int]:

@@ -1,34 +1,49 @@
 """The application of the command line with every command."""
 
+from inspect import cleandoc
+from pathlib import Path
+
 from cyclopts import App
 
 from compare.runtime.provenance import program_version
-from pinnray.commands.camera import calibrate, fiducials, pick, points, rig, track
-from pinnray.commands.comparison import compare, crossval, report, solvers
-from pinnray.commands.finger import design, export, material, mesh, sensitivity, solve
 from pinnray.commands.launch import EXIT_CODES
-from pinnray.commands.quiet import quietable
-from pinnray.commands.studies import app, explore, gridsearch, optimise, predict, sweep
 from pinnray.options.file import take_options
+
+COMMANDS = (
+    *("comparison.compare", "comparison.report"),
+    *("finger.design", "finger.mesh", "finger.material", "finger.solve", "finger.sensitivity"),
+    *("finger.export", "studies.sweep", "studies.predict", "studies.explore", "studies.app"),
+    *("studies.optimise", "studies.gridsearch", "comparison.crossval", "comparison.solvers"),
+    *("camera.fiducials", "camera.calibrate", "camera.pick", "camera.points", "camera.rig", "camera.track"),
+)
+"""Modules of this package with a function `command`; each is imported when its command is asked for."""
+
+
+def described(module: str) -> str:
+    """The docstring of a module's `command`, out of its source: to import all of them would take a second."""
+    source = Path(__file__).parent.joinpath(*module.split(".")).with_suffix(".py").read_text(encoding="utf-8")
+    return cleandoc(source.partition("\ndef command(")[2].split('"""', maxsplit=2)[1])
+
 
 pinnray = App(
     name="pinnray",
     version=program_version,
+    version_format="plaintext",
     help="Can a physics-informed neural network stand in for finite elements on a real Fin Ray finger?",
     help_epilogue=EXIT_CODES,
+    help_format="plaintext",  # Markdown would cost a third of the start
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-COMMANDS = (
-    *(compare, report, design, mesh, material, solve, sensitivity, export),
-    *(sweep, predict, explore, app, optimise),
-    *(gridsearch, crossval, solvers),
-    *(fiducials, calibrate, pick, points, rig, track),
-)
 for module in COMMANDS:
-    config = take_options if module is compare else None
-    name = module.__name__.rpartition(".")[2]
+    name = module.rpartition(".")[2]
     pinnray.command(
-        quietable(module.command), name=name, help_epilogue=EXIT_CODES, version=program_version, config=config
+        f"{__package__}.{module}:command",
+        name=name,
+        help=described(module),
+        help_format="markdown",
+        help_epilogue=EXIT_CODES,
+        version=program_version,
+        config=take_options if name == "compare" else None,
     )
 pinnray.register_install_completion_command(help="Install the completion of commands and options in a shell.")

@@ -15,7 +15,6 @@ from shutil import disk_usage
 from tempfile import TemporaryFile, gettempdir
 from typing import Any, TextIO
 
-import pydantic
 from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 
 from compare.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
@@ -83,8 +82,10 @@ def _with_messages(command: Callable[[], Any]) -> int:
         except UnusedCliTokensError as error:
             say(f"error: {' '.join(error.unused_tokens or ())!r} belongs to no option; see --help")
         except ValidationError as error:  # of settings that are given as options
+            from pydantic import ValidationError as Invalid
+
             cause = error.__cause__
-            problems = cause.errors() if isinstance(cause, pydantic.ValidationError) else []
+            problems = cause.errors() if isinstance(cause, Invalid) else []
             said = [problem["msg"].removeprefix("Value error, ") for problem in problems] or [str(error)]
             say(f"error: {'; '.join(said)}")
         except (UserError, CycloptsError) as error:

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from compare.camera.film import Film
 from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.options.shared import Flag, Repeated, existing
-from solvers.problem import Material
-from vision.tracking.workspace import Workspace
 
-if TYPE_CHECKING:  # OpenCV comes with them, and `--help` has to be quick
+if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
+    from compare.camera.film import Film
+    from geometry.finger.finger import Finger
+    from geometry.mesh.triangle_mesh import TriangleMesh
+    from solvers.physics import Material
     from vision.calibration.camera import Camera, Pose
     from vision.calibration.chessboard import Board
     from vision.rig.bench import Bench
+    from vision.tracking.workspace import Workspace
 
 CAMERA = Group("Camera", sort_key=4)
 FORCE = Group("Force", sort_key=5)
@@ -50,12 +50,14 @@ class FilmOptions:
     method: Literal["precise", "hough"] = "precise"
     fps: float | None = None
 
-    def film(self, source: str) -> Film:
+    def film(self, source: str) -> "Film":
         """The film from `source`.
 
         Raises:
             UserError: If the camera's or the workspace's file does not exist.
         """
+        from compare.camera.film import Film
+
         return Film(
             source,
             camera=existing(self.camera),
@@ -83,12 +85,14 @@ class ForceOptions:
     poisson: float | None = None
     law: Literal["neo-hookean", "st-venant-kirchhoff"] | None = None
 
-    def read(self) -> Material | None:
+    def read(self) -> "Material | None":
         """The material; None without --force.
 
         Raises:
             UserError: If a constant is out of its range or given without --force.
         """
+        from solvers.physics import Material
+
         given: dict[str, Any] = {
             name: value for name in ("young", "poisson", "law") if (value := getattr(self, name)) is not None
         }
@@ -116,7 +120,7 @@ class CameraOptions:
     tilt_direction: float = 60.0
     turn: float = 0.0
 
-    def read(self, workspace: Workspace) -> "tuple[Camera, Pose]":
+    def read(self, workspace: "Workspace") -> "tuple[Camera, Pose]":
         """The camera and its pose."""
         from vision.calibration.camera_file import load_camera
         from vision.rig.virtual_camera import default_camera, viewing_pose
@@ -160,7 +164,7 @@ class SceneOptions:
     cover_paint: Literal["dark", "light"] = "dark"
     cover_during: Literal["all", "rest", "moving", "held"] = "all"
 
-    def bench(self, mesh: TriangleMesh, finger: Finger, workspace: Workspace) -> "Bench":
+    def bench(self, mesh: "TriangleMesh", finger: "Finger", workspace: "Workspace") -> "Bench":
         """The finger on the bench, with markers as they are printed.
 
         Raises:

@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from cyclopts import App, ArgumentCollection
-from cyclopts.config import Dict
 
 from compare.runtime.exits import say
-from compare.runtime.output_folder import SCHEMA
 from compare.runtime.provenance import package_versions
 from geometry.errors import UserError
 from geometry.text_files import read_json, read_toml
@@ -23,6 +21,8 @@ def take_options(app: App, commands: tuple[str, ...], arguments: ArgumentCollect
     """Give every option that the command line leaves out its value in the file of --from, if it has one."""
     files = [token.value for argument in arguments if OPTION in argument.names for token in argument.tokens]
     if files:
+        from cyclopts.config import Dict
+
         content = read_options_file(Path(files[-1]))
         nested = content["options"]
         for command in reversed(commands):
@@ -37,6 +37,8 @@ def read_options_file(file: Path) -> dict[str, Any]:
         UserError: If it cannot be read, has no options, has a key beside them and is not of a run, or names
             an output folder elsewhere: the file may be somebody else's.
     """
+    from compare.runtime.output_folder import SCHEMA
+
     is_json = file.suffix.lower() == ".json"
     content = read_json(file, "options file") if is_json else read_toml(file, "options file")
     options = content.get("options") if isinstance(content, dict) else None

@@ -12,22 +12,16 @@ from cyclopts import Group, Parameter
 
 from compare.runtime.exits import errors_of_interruption, say
 from compare.runtime.provenance import cores
-from geometry.cache import drawn_finger
-from geometry.drawing.description import description_beside, load_description
 from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.parameters import SYMBOLS, symbols
-from geometry.finger.presets import load_design, parse_overrides
-from geometry.mesh.settings import MeshSettings
 from geometry.text_files import parse_toml
-from pinnray.options.preset_jobs import job_defaults
-from solvers.elasticity import LawName
-from solvers.problem import Load, LoadKind, Material, Physics
-from solvers.registry import PRESETS, make_solver
-from solvers.solver import Solver
+from solvers.names import LawName, LoadKind
 
-if TYPE_CHECKING:  # pandas comes with it, and `--help` has to be quick
+if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
+    from geometry.finger.design import Design
+    from geometry.finger.finger import Finger
+    from geometry.mesh.settings import MeshSettings
+    from solvers.physics import Load, Material
+    from solvers.solver import Solver
     from studies.sweep.job import S, StudyJob
 
 FINGER = Group("Finger", sort_key=1)
@@ -73,8 +67,11 @@ class FingerOptions:
     mesh_size: float | None = None
     yes: Flag = False
 
-    def read(self, preset: str | None = None) -> tuple[Finger, MeshSettings]:
+    def read(self, preset: str | None = None) -> "tuple[Finger, MeshSettings]":
         """The finger and the mesh settings; a preset of the solvers may have its own mesh settings."""
+        from geometry.mesh.settings import MeshSettings
+        from pinnray.options.preset_jobs import job_defaults
+
         settings = job_defaults(preset).mesh.model_dump()
         if self.mesh_size is not None:
             settings["size"] = self.mesh_size
@@ -86,17 +83,24 @@ class FingerOptions:
 
     def files(self) -> list[Path]:
         """The files that describe the finger."""
+        from geometry.drawing.description import description_beside
+
         given = [Path(self.design), self.section, self.section and description_beside(self.section)]
         return [path for path in given if path is not None and path.is_file()]
 
-    def check_cost(self, finger: Finger, mesh: MeshSettings, parts: Sequence[str] = ()) -> None:
+    def check_cost(self, finger: "Finger", mesh: "MeshSettings", parts: Sequence[str] = ()) -> None:
         """Raise a `UserError` with the price of a fine mesh, unless --yes is given; see `check_mesh_cost`."""
         if not self.yes:
             from pinnray.options.cost import check_mesh_cost
 
             check_mesh_cost(finger, mesh, parts)
 
-    def _designed(self) -> Design:
+    def _designed(self) -> "Design":
+        from geometry.finger.design import Design
+        from geometry.finger.parameters import SYMBOLS, symbols
+        from geometry.finger.presets import load_design, parse_overrides
+        from solvers.physics import Physics
+
         for option in ("clamp", "contact", "markers"):
             if getattr(self, option) is not None:
                 raise UserError(f"--{option} belongs to a drawing; give it by --section FILE")
@@ -114,7 +118,10 @@ class FingerOptions:
             say(f"markers of {design.marker_diameter:g} mm: {design.small_markers}")
         return design
 
-    def _drawn(self, file: Path) -> Finger:
+    def _drawn(self, file: Path) -> "Finger":
+        from geometry.cache import drawn_finger
+        from geometry.drawing.description import description_beside, load_description
+
         if self.design != "default":
             raise UserError(f"--section {file} and --design {self.design}: give one of them")
         lines = [
@@ -140,7 +147,7 @@ def toml_value(text: str) -> str:
     return text
 
 
-def _changed_name(design: Design, changes: Mapping[str, object]) -> str:
+def _changed_name(design: "Design", changes: Mapping[str, object]) -> str:
     """The preset's name with the changes, in the letters and the length that a name may have."""
     parts = (f"-{name}-{value}" for name, value in changes.items())
     name = design.name + re.sub(r"[^A-Za-z0-9._-]", "", "".join(parts))
@@ -181,8 +188,10 @@ class PhysicsOptions:
     direction: float = 0.0
     slide: Flag = False
 
-    def read(self, preset: str | None = None) -> tuple[Material, Load]:
+    def read(self, preset: str | None = None) -> "tuple[Material, Load]":
         """Material and load; a preset of the solvers may choose the kind of load."""
+        from solvers.physics import Physics
+
         material, load = Physics(**self.values(preset)).parts
         if self.material is None:
             return material, load
@@ -192,6 +201,8 @@ class PhysicsOptions:
 
     def values(self, preset: str | None = None) -> dict[str, Any]:
         """Material and load by the names of a study."""
+        from pinnray.options.preset_jobs import job_defaults
+
         given = {**asdict(self), "load": self.load or job_defaults(preset).load}
         if (name := given.pop("material")) is not None:
             from solvers.materials.presets import preset as material_preset
@@ -202,7 +213,7 @@ class PhysicsOptions:
                     given[constant] = getattr(known, constant)
         return {name: value for name, value in given.items() if value is not None}
 
-    def check_law(self, solvers: Sequence[Solver]) -> None:
+    def check_law(self, solvers: "Sequence[Solver]") -> None:
         """Raise a `UserError` if none of the solvers has the law."""
         if self.law is not None and not any(self.law in solver.laws for solver in solvers):
             known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
@@ -230,12 +241,14 @@ class SolverOptions:
     device: str | None = None
     seed: int = 0
 
-    def read(self, names: str) -> list[Solver]:
+    def read(self, names: str) -> "list[Solver]":
         """The solvers with these names, separated by commas.
 
         Raises:
             UserError: If a solver, preset or setting does not exist or a text cannot be read.
         """
+        from solvers.registry import PRESETS
+
         if self.seed < 0:
             raise UserError(f"--seed {self.seed}: give a whole number from 0")
         chosen = comma_list(names)
@@ -260,6 +273,8 @@ class SolverOptions:
 
 def _presets_with_device(name: str) -> list[str]:
     """The presets of a solver that can choose a device."""
+    from solvers.registry import PRESETS, make_solver
+
     presets = PRESETS.get(name, ())
     return [preset for preset in presets if "device" in make_solver(name, preset=preset).settings()]
 
@@ -280,8 +295,10 @@ def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, o
     return given
 
 
-def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) -> Solver:
+def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) -> "Solver":
     """The solver with its own settings and those of the shared settings that it has."""
+    from solvers.registry import make_solver
+
     solver = make_solver(name, **given)
     had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
     return make_solver(name, **given, **had)

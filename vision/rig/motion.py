@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from geometry.arrays import FloatArray
 from geometry.finger.parameters import CheckedModel, bounded
+
+if TYPE_CHECKING:  # the options of the rig are motions, and `--help` has to be quick
+    from scipy.interpolate import CubicSpline
 
 
 class Motion(CheckedModel):
@@ -99,5 +102,7 @@ class Course:
         return np.asarray(self._spline(share))
 
     @cached_property
-    def _spline(self) -> CubicSpline:
+    def _spline(self) -> "CubicSpline":
+        from scipy.interpolate import CubicSpline
+
         return CubicSpline(self.shares, self.displacements)

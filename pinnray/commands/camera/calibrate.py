@@ -8,11 +8,13 @@ from rich.console import Console
 from compare.runtime.exits import say
 from compare.runtime.provenance import package_versions
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import Flag, OutputPath, Repeated
 
 VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
 
 
+@quietable
 def command(
     *images: Path,
     board: str,

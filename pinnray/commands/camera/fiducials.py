@@ -3,9 +3,11 @@
 from pathlib import Path
 
 from compare.runtime.exits import say
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
+@quietable
 def command(
     finger: FingerOptions = FingerOptions(),
     *,

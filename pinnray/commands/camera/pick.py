@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from compare.runtime.exits import say
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OutputPath
 
 AMBIGUOUS = 0.05
@@ -18,6 +19,7 @@ FEWEST = 3
 """Number of discs that a marker's colour shows at least; a track needs as many."""
 
 
+@quietable
 def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     *,

@@ -5,9 +5,11 @@ from typing import cast, get_args
 
 from geometry.errors import UserError
 from pinnray.commands.camera.pick import read_numbers
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
+@quietable
 def command(
     rest: Path,
     pressed: Path,

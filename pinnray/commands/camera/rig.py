@@ -6,12 +6,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.camera import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
 from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 
 
+@quietable
 def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),

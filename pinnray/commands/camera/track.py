@@ -10,10 +10,12 @@ from rich.live import Live
 
 from compare.runtime.exits import say
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.camera import FilmOptions, ForceOptions
 from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
 
 
+@quietable
 def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     finger: FingerOptions = FingerOptions(),

@@ -1,17 +1,13 @@
 """The main job: solve one finger with several solvers and compare them."""
 
-from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 from rich.console import Console
 
-from compare.camera.film import Film
-from compare.evaluation.truths import SLIDING
 from compare.runtime.exits import NOT_CONVERGED, say
-from compare.runtime.output_folder import RUN_FILE
 from compare.runtime.provenance import cores
 from geometry.errors import UserError
 from pinnray.options.camera import FilmOptions
@@ -27,7 +23,12 @@ from pinnray.options.shared import (
     comma_list,
     existing,
 )
-from solvers.solver import Solver
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from compare.camera.film import Film
+    from solvers.solver import Solver
 
 
 def command(
@@ -83,6 +84,7 @@ def command(
     from compare.pipeline.shared_mesh import tolerance_reached
     from compare.pipeline.solving import second_process, worth_starting
     from compare.report.tables import body_table, marker_table
+    from compare.runtime.output_folder import RUN_FILE
     from compare.runtime.stages import Stages
     from pinnray.commands.launch import on_ranks
     from pinnray.options.cost import EXPERIMENT
@@ -156,7 +158,9 @@ def command(
     return 0 if done else NOT_CONVERGED
 
 
-def _optional_solvers(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:
+def _optional_solvers(
+    solvers: "Sequence[Solver]", options: SolverOptions, reference: str | None
+) -> list[str]:
     """Names of the solvers that no other option names."""
     asked = {text.partition(".")[0] for text in options.solver_set} | {reference}
     if options.preset is not None:
@@ -166,12 +170,14 @@ def _optional_solvers(solvers: Sequence[Solver], options: SolverOptions, referen
 
 def _truth(name: str | None, measurements: str | None) -> str:
     """The name of what is simulated; nothing is where there are measurements."""
+    from compare.evaluation.truths import SLIDING
+
     if name is not None and measurements is not None:
         raise UserError("--truth is for a simulated experiment; with --measurements leave it out")
     return SLIDING.name if name is None else name
 
 
-def _measurements(source: str | None, options: FilmOptions) -> Path | Film | None:
+def _measurements(source: str | None, options: FilmOptions) -> "Path | Film | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
         if source is None and options != FilmOptions():

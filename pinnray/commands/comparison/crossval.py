@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from compare.runtime.exits import NOT_CONVERGED, say
-from geometry.registration import Registration
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -18,12 +18,13 @@ from pinnray.options.shared import (
     read_formats,
     read_processes,
 )
-from solvers.problem import Material
 
-if TYPE_CHECKING:  # SciPy's statistics come with it, and `--help` has to be quick
+if TYPE_CHECKING:
     from compare.crossval.study import SolverVariant
+    from solvers.physics import Material
 
 
+@quietable
 def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
@@ -69,6 +70,7 @@ def command(
     from compare.crossval.study import ELEMENT_SIZE, CrossvalStudy
     from compare.crossval.tables import terminal_tables
     from compare.runtime.stages import Stages
+    from geometry.registration import Registration
     from pinnray.options.cost import EXPERIMENT
     from vision.measurements import read_measurements
 
@@ -113,7 +115,7 @@ def command(
     return 0 if converged and not result.failed else NOT_CONVERGED
 
 
-def read_variants(options: SolverOptions, names: str, material: Material) -> "list[SolverVariant]":
+def read_variants(options: SolverOptions, names: str, material: "Material") -> "list[SolverVariant]":
     """The solvers and their variants; a single one where --solver-set chooses the weight of the markers."""
     from compare.crossval.study import solver_variants
 

@@ -4,9 +4,11 @@ from pathlib import Path
 
 from compare.runtime.exits import shown
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OptionalOutputPath
 
 
+@quietable
 def command(*runs: Path, out: OptionalOutputPath = None) -> int:
     """Read one finished run, or several side by side.
 

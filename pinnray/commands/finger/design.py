@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, comma_list
 
 STEP = "finger"
@@ -11,6 +12,7 @@ CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dx
 PICTURE = "design.png"
 
 
+@quietable
 def command(
     finger: FingerOptions = FingerOptions(),
     *,

@@ -7,9 +7,11 @@ from typing import Literal
 from rich.console import Console
 
 from compare.runtime.exits import NOT_CONVERGED, say
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, Flag, OutputPath, PhysicsOptions
 
 
+@quietable
 def command(
     kind: Literal["mujoco", "sofa", "mesh"],
     finger: FingerOptions = FingerOptions(),

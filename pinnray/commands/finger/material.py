@@ -3,9 +3,11 @@
 from pathlib import Path
 
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OutputPath
 
 
+@quietable
 def command(
     test: Path | None = None,
     *,

@@ -4,9 +4,11 @@ from pathlib import Path
 
 from compare.runtime.exits import NOT_CONVERGED
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import Adapt, FingerOptions, OutputPath, PhysicsOptions
 
 
+@quietable
 def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),

@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from compare.runtime.exits import say
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
 
 
+@quietable
 def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
@@ -28,6 +28,8 @@ def command(
         young_error: Half of the 95 % interval of Young's modulus, over its value.
         out: CSV file of the derivatives; the picture is beside it.
     """
+    import numpy as np
+
     from compare.evaluation.deformed_body import DeformedBody
     from compare.evaluation.plausibility import problem_remarks
     from compare.pipeline.shared_mesh import shared_mesh

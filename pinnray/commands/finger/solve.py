@@ -5,6 +5,7 @@ from pathlib import Path
 
 from compare.runtime.exits import NOT_CONVERGED, say
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     Adapt,
     FingerOptions,
@@ -16,6 +17,7 @@ from pinnray.options.shared import (
 )
 
 
+@quietable
 def command(
     solver: str | None = None,
     finger: FingerOptions = FingerOptions(),

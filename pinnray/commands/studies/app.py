@@ -3,10 +3,12 @@
 from pathlib import Path
 
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 
 
+@quietable
 def command(sweep: Path, *, port: int = 8765, refit: bool = False) -> int:
-    """Serve the explorer of a sweep, with `fem-nonlinear` behind it for what the sweep does not know.
+    """Serve the explorer of a sweep, with fem-nonlinear behind it for what the sweep does not know.
 
     Only this machine is served, and only pages that it has served itself. Ctrl-C ends it.
 

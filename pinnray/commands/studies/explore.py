@@ -3,9 +3,11 @@
 from pathlib import Path
 
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OptionalOutputPath
 
 
+@quietable
 def command(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False) -> int:
     """Write a page that shows the deformed finger at any load of a sweep, while sliders move.
 

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from compare.runtime.exits import NOT_CONVERGED, say
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -26,6 +27,7 @@ SHORT = 2_000
 SEARCHED = {"learning_rate": "--learning-rates", "bc_weight": "--bc-weights"}
 
 
+@quietable
 def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),

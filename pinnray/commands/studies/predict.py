@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from geometry.errors import UserError
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OptionalOutputPath, Repeated, existing
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from studies.sweep.study import Value
 
 
+@quietable
 def command(
     sweep: Path,
     *,

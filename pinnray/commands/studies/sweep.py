@@ -5,9 +5,11 @@ from pathlib import Path
 from rich.console import Console
 
 from compare.runtime.exits import NOT_CONVERGED, say
+from pinnray.commands.quiet import quietable
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 
 
+@quietable
 def command(
     study: Path,
     options: StudyOptions = StudyOptions(),

@@ -2,14 +2,17 @@
 
 import re
 from dataclasses import fields
+from importlib import import_module
+from inspect import getdoc
 
 import pytest
 
 from pinnray.cli import main
-from pinnray.commands.app import pinnray
+from pinnray.commands.app import COMMANDS, pinnray
 from pinnray.options.shared import PhysicsOptions
 from solvers.problem import Physics
 
+HOMES = {command.rpartition(".")[2]: f"pinnray.commands.{command}" for command in COMMANDS}
 NAMES = [name for name in pinnray if not name.startswith("-")]
 
 NOTHING = {
@@ -67,6 +70,12 @@ def test_a_quiet_command_prints_nothing_and_writes_the_same(command, tmp_path, m
 def test_a_quiet_command_still_says_what_is_wrong(capsys):
     assert main(["mesh", "--mesh-size", "0", "--quiet"]) == 2
     assert capsys.readouterr().err.startswith("error: --mesh-size")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_help_of_every_command_is_its_docstring(name):
+    """It is read out of the source, without an import."""
+    assert pinnray[name].help == getdoc(import_module(HOMES[name]).command)
 
 
 @pytest.mark.parametrize("name", NAMES)
