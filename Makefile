@@ -4,7 +4,7 @@ BIN := .venv/bin
 # Without compiled modules each of the tests' many processes would compile what it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup setup-tests compare test test-all docs verification lint bench sbom clean
+.PHONY: help setup setup-tests compare test test-all coverage docs verification lint format bench sbom clean
 .DEFAULT_GOAL := help
 
 help: ## list these targets
@@ -37,11 +37,22 @@ docs: setup ## build the documentation site, build/docs/html
 verification: setup ## measure fem against known answers, write docs/verification.md
 	$(BIN)/python -m benchmarks.verification
 
+# Every tool runs, and the last line names those that fail.
 lint: setup ## check style, format, types and the order of the packages
-	$(BIN)/ruff check
-	$(BIN)/ruff format --check
-	$(BIN)/mypy
-	$(BIN)/lint-imports
+	@failed=; for tool in "ruff check" "ruff format --check" mypy lint-imports; do \
+	    echo "lint: $$tool"; $(BIN)/$$tool || failed="$$failed, $$tool"; \
+	done; [ -z "$$failed" ] || { echo "lint: failed: $${failed#, } (make format mends what ruff can)"; exit 1; }
+
+format: setup ## mend style and format as far as ruff can
+	$(BIN)/ruff check --fix --exit-zero
+	$(BIN)/ruff format
+
+coverage: setup-tests ## run all tests and report the branches that none takes: build/coverage
+	rm -rf build/coverage
+	OMP_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n $(or $(WORKERS),$(shell nproc)) --dist loadfile $(ARGS)
+	$(BIN)/coverage combine -q
+	$(BIN)/coverage html -q -d build/coverage/html
+	$(BIN)/coverage report --skip-covered | tail -40
 
 bench: setup ## speed and accuracy against peers
 	$(BIN)/python -m benchmarks $(ARGS)
