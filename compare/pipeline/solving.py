@@ -22,10 +22,10 @@ from compare.runtime.output_folder import SOLUTIONS, TRAINING, take_training
 from compare.runtime.provenance import cores, package_versions
 from compare.runtime.stages import Stages
 from geometry.atomic import write_text
+from geometry.cache import expected_triangles
 from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
-from geometry.mesh.element_size import estimated_triangles
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from geometry.processes import Pool, ProcessFailed, end_with_parent
@@ -88,9 +88,9 @@ def second_process() -> Pool:
     return Pool(1, threads=SHARE, modules=THERE)
 
 
-def worth_starting(finger: Finger, mesh: MeshSettings) -> bool:
+def worth_starting(finger: Finger, mesh: MeshSettings | None) -> bool:
     """Whether a finger's mesh will be so large that a second process can be started before it is made."""
-    return estimated_triangles(finger, mesh) >= 3 * LARGE  # nearly two for each node, of a rough estimate
+    return expected_triangles(finger, mesh) >= 3 * LARGE  # nearly two for each node, of a rough estimate
 
 
 def solve_all(

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.cache import mesh_sizes
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.machine_memory import free_memory_gb
@@ -68,18 +68,18 @@ class MeshCost:
         return self.seconds <= MAX_SECONDS and self.memory_gb <= USABLE * free_gb
 
 
-def check_mesh_cost(finger: Finger, settings: MeshSettings, parts: Collection[str]) -> None:
-    """Refuse a mesh that takes long or much memory.
+def check_mesh_cost(finger: Finger, settings: MeshSettings | None, parts: Collection[str]) -> None:
+    """Refuse a mesh that takes long or much memory, unless it is the one of the finger's file.
 
     Args:
         finger: The finger.
-        settings: Element sizes.
+        settings: Element sizes, as for `finger_mesh`.
         parts: Names of solvers, and `EXPERIMENT` if one is simulated.
 
     Raises:
         UserError: With the price and a size that costs less.
     """
-    if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
+    if (settings := mesh_sizes(finger, settings)) is None:
         return
     free, parts = free_memory_gb(), [MESH, *parts]
     cost = MeshCost(estimated_triangles(finger, settings), parts)

@@ -12,7 +12,7 @@ from cyclopts import Group, Parameter
 
 from compare.runtime.exits import errors_of_interruption, say
 from compare.runtime.provenance import cores
-from geometry.cache import drawn_finger
+from geometry.cache import drawn_finger, mesh_sizes
 from geometry.drawing.description import description_beside, load_description
 from geometry.errors import UserError
 from geometry.finger.design import Design
@@ -60,7 +60,8 @@ class FingerOptions:
             for --clamp.
         set: Change a parameter, such as rib_count=6 or N=6, or a line on the drawing, such as depth=12; may
             be repeated.
-        mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip.
+        mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip. A .msh
+            file that is a mesh of the section is taken as it is unless a size is given.
         yes: Go on although the mesh is so fine that a run takes more than five minutes or much memory.
     """
 
@@ -73,23 +74,28 @@ class FingerOptions:
     mesh_size: float | None = None
     yes: Flag = False
 
-    def read(self, preset: str | None = None) -> tuple[Finger, MeshSettings]:
-        """The finger and the mesh settings; a preset of the solvers may have its own mesh settings."""
-        settings = job_defaults(preset).mesh.model_dump()
+    def read(
+        self, preset: str | None = None, usual: MeshSettings | None = None
+    ) -> tuple[Finger, MeshSettings | None]:
+        """The finger and its element sizes: of the option, the preset of the solvers, or as usual.
+
+        The sizes are None for a finger whose file has a mesh, if neither option nor preset asks for any.
+        """
+        asked = job_defaults(preset).mesh
         if self.mesh_size is not None:
-            settings["size"] = self.mesh_size
-        try:
-            mesh = MeshSettings(**settings)
-        except UserError as error:
-            raise UserError(f"--mesh-{error}") from None
-        return (self._designed() if self.section is None else self._drawn(self.section)), mesh
+            try:
+                asked = MeshSettings(**{**(asked or MeshSettings()).model_dump(), "size": self.mesh_size})
+            except UserError as error:
+                raise UserError(f"--mesh-{error}") from None
+        finger = self._designed() if self.section is None else self._drawn(self.section)
+        return finger, mesh_sizes(finger, asked, usual)
 
     def files(self) -> list[Path]:
         """The files that describe the finger."""
         given = [Path(self.design), self.section, self.section and description_beside(self.section)]
         return [path for path in given if path is not None and path.is_file()]
 
-    def check_cost(self, finger: Finger, mesh: MeshSettings, parts: Sequence[str] = ()) -> None:
+    def check_cost(self, finger: Finger, mesh: MeshSettings | None, parts: Sequence[str] = ()) -> None:
         """Raise a `UserError` with the price of a fine mesh, unless --yes is given; see `check_mesh_cost`."""
         if not self.yes:
             from pinnray.options.cost import check_mesh_cost

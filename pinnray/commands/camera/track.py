@@ -62,9 +62,7 @@ def command(
 
     if publish is not None and not live:
         raise UserError("--publish is for --live")
-    design, settings = finger.read()
-    if finger.mesh_size is None:
-        settings = MESH
+    design, settings = finger.read(usual=MESH)
     film, material = options.film(source), force.read()
     if material:
         finger.check_cost(design, settings, ["fem-id"])
@@ -98,7 +96,7 @@ def command(
             provenance["force"] = {
                 "material": material.model_dump() | {"law": tracker.laws[0]},
                 "laws_not_excluded": tracker.laws,
-                "mesh": settings.model_dump(),
+                "mesh": settings and settings.model_dump(),
                 "frames": len(forces),
                 "live": pace and pace._asdict(),
             }

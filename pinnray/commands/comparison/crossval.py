@@ -66,15 +66,13 @@ def command(
     """
     from compare.crossval.cross_validation import cross_validate
     from compare.crossval.folds import LOAD
-    from compare.crossval.study import ELEMENT_SIZE, CrossvalStudy
+    from compare.crossval.study import SIZES, CrossvalStudy
     from compare.crossval.tables import terminal_tables
     from compare.runtime.stages import Stages
     from pinnray.options.cost import EXPERIMENT
     from vision.measurements import read_measurements
 
-    design, mesh = finger.read(options.preset)
-    if finger.mesh_size is None and options.preset is None:
-        mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
+    design, mesh = finger.read(options.preset, SIZES)
     material, load = physics.read(options.preset)
     file = existing_table(measurements)
     study = CrossvalStudy(

@@ -44,12 +44,10 @@ def command(
     from compare.runtime.stages import Stages
     from geometry.errors import UserError
     from solvers.problem import Problem
-    from studies.robots.export import ELEMENT_SIZE, ExportSettings, export_finger
+    from studies.robots.export import SIZES, ExportSettings, export_finger
     from studies.robots.score import score_table
 
-    chosen, mesh = finger.read()
-    if finger.mesh_size is None:
-        mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
+    chosen, mesh = finger.read(usual=SIZES)
     if score and kind != "mujoco":
         raise UserError(f"--score is of mujoco; no score is made for {kind}")
     settings = ExportSettings(

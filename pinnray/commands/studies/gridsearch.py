@@ -9,6 +9,7 @@ from rich.console import Console
 
 from compare.runtime.exits import NOT_CONVERGED, say
 from geometry.errors import UserError
+from geometry.mesh.settings import MeshSettings
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -56,7 +57,8 @@ def command(
     from studies.gridsearch.training_run import FAILED, best_of
     from studies.sweep.job import StudyJob
 
-    design, mesh = finger.read(options.preset)
+    design, sizes = finger.read(options.preset)
+    mesh = sizes or MeshSettings()  # a run is given the finger's section, without the mesh of its file
     finger.check_cost(design, mesh, ["fem"])
     physics.read(options.preset)  # or says what is wrong with it
     rates, weights = read_values("learning-rates", learning_rates), read_values("bc-weights", bc_weights)

@@ -5,13 +5,15 @@ import re
 import pytest
 
 from compare.runtime.exits import BAD_INPUT
-from geometry.cache import finger_mesh
+from geometry.cache import drawn_finger, finger_mesh
+from geometry.drawing.description import Description
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
 from geometry.mesh.element_size import estimated_triangles
 from geometry.mesh.settings import MeshSettings
 from pinnray.cli import main
 from pinnray.options.cost import EXPERIMENT, MeshCost, check_mesh_cost
+from tests.geometry.drawing.files import write_beam_mesh
 
 
 @pytest.mark.parametrize(("name", "size"), [("default", 0.25), ("csiro", 0.12), ("slender", 0.1)])
@@ -55,6 +57,14 @@ def test_the_size_that_is_advised_needs_no_consent():
     advised = float(str(refused.value).rpartition(" ")[2])
     assert 0.02 < advised < 0.25
     check_mesh_cost(finger, MeshSettings(size=advised), parts)
+
+
+def test_the_mesh_of_a_file_needs_no_consent_unless_a_size_is_asked_for(tmp_path, monkeypatch):
+    finger = drawn_finger(write_beam_mesh(tmp_path / "beam.msh"), Description())
+    monkeypatch.setattr("pinnray.options.cost.free_memory_gb", lambda: 0.1)
+    check_mesh_cost(finger, None, ["fem"])
+    with pytest.raises(UserError, match=r"--mesh-size 0\.25 gives about"):
+        check_mesh_cost(finger, MeshSettings(), ["fem"])
 
 
 def test_every_default_needs_no_consent():
