@@ -95,12 +95,19 @@ class FingerOptions:
         given = [Path(self.design), self.section, self.section and description_beside(self.section)]
         return [path for path in given if path is not None and path.is_file()]
 
-    def check_cost(self, finger: Finger, mesh: MeshSettings | None, parts: Sequence[str] = ()) -> None:
+    def check_cost(
+        self,
+        finger: Finger,
+        mesh: MeshSettings | None,
+        solvers: Sequence[Solver] = (),
+        *,
+        simulated: bool = False,
+    ) -> None:
         """Raise a `UserError` with the price of a fine mesh, unless --yes is given; see `check_mesh_cost`."""
         if not self.yes:
             from pinnray.options.cost import check_mesh_cost
 
-            check_mesh_cost(finger, mesh, parts)
+            check_mesh_cost(finger, mesh, solvers, simulated=simulated)
 
     def _designed(self) -> Design:
         for option in ("clamp", "contact", "markers"):

@@ -12,6 +12,7 @@ from compare.runtime.exits import say
 from geometry.errors import UserError
 from pinnray.options.camera import FilmOptions, ForceOptions
 from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
+from solvers.registry import make_solver
 
 
 def command(
@@ -65,7 +66,7 @@ def command(
     design, settings = finger.read(usual=MESH)
     film, material = options.film(source), force.read()
     if material:
-        finger.check_cost(design, settings, ["fem-id"])
+        finger.check_cost(design, settings, [make_solver("fem-id")])
     check_output(out)
     console = Console(stderr=True)
     forces, pace = [], None

@@ -69,7 +69,6 @@ def command(
     from compare.crossval.study import SIZES, CrossvalStudy
     from compare.crossval.tables import terminal_tables
     from compare.runtime.stages import Stages
-    from pinnray.options.cost import EXPERIMENT
     from vision.measurements import read_measurements
 
     design, mesh = finger.read(options.preset, SIZES)
@@ -94,7 +93,7 @@ def command(
     )
     made = [variant.make(0) for variant in study.variants]
     physics.check_law(made)
-    finger.check_cost(design, mesh, [EXPERIMENT, *(solver.name for solver in made)])
+    finger.check_cost(design, mesh, made, simulated=True)
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")
     with going_on_from(study.out), Stages() as stages:

@@ -8,6 +8,7 @@ from rich.console import Console
 
 from compare.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import FingerOptions, Flag, OutputPath, PhysicsOptions
+from solvers.registry import make_solver
 
 
 def command(
@@ -54,7 +55,7 @@ def command(
         hinges=hinges, loss_factor=loss_factor, across=across, layers=layers, places=places, score=score
     )
     material, load = replace(physics, load=physics.load or "cylinder").read()
-    finger.check_cost(chosen, mesh, ["fem-nonlinear"] if kind == "mujoco" else [])
+    finger.check_cost(chosen, mesh, [make_solver("fem-nonlinear")] if kind == "mujoco" else [])
     with Stages() as stages:
         triangles, _ = shared_mesh(chosen, mesh, stages)
         done = export_finger(kind, Problem(triangles, material, load, None, chosen), out, settings, stages)

@@ -19,6 +19,7 @@ from pinnray.options.shared import (
     read_formats,
     read_processes,
 )
+from solvers.registry import make_solver
 
 SOLVER = "pinn-std"
 SHORT = 2_000
@@ -59,7 +60,7 @@ def command(
 
     design, sizes = finger.read(options.preset)
     mesh = sizes or MeshSettings()  # a run is given the finger's section, without the mesh of its file
-    finger.check_cost(design, mesh, ["fem"])
+    finger.check_cost(design, mesh, [make_solver("fem")])
     physics.read(options.preset)  # or says what is wrong with it
     rates, weights = read_values("learning-rates", learning_rates), read_values("bc-weights", bc_weights)
     study = grid_study(
