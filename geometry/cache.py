@@ -42,11 +42,10 @@ def finger_mesh(
 ) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before.
 
-    A finger from a file with a mesh has that mesh, unless element sizes are asked for.
-
     Args:
         finger: The finger.
-        settings: Element sizes.
+        settings: Element sizes; None means the mesh of the finger's file if it has one, else the default
+            sizes.
         across: Least number of elements through a wall; None means that of the mesher, 3.
         cache_dir: Folder of the cache; by default `cache_folder()`.
         timeout_s: Time limit, s.
@@ -55,11 +54,11 @@ def finger_mesh(
     Raises:
         UserError: If meshing fails or takes too long.
     """
-    settings = settings or MeshSettings()
-    if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
-        return replace(finger.mesh, depth=finger.depth)
     if isinstance(finger, DrawnFinger):
+        if finger.mesh is not None and settings is None:
+            return replace(finger.mesh, depth=finger.depth)
         finger.check_materials()
+    settings = settings or MeshSettings()
     task: dict[str, object] = {
         "kind": "mesh",
         "what": f"meshing design {finger.name!r}",
@@ -69,6 +68,23 @@ def finger_mesh(
     }
     entry = _entry(task, finger.digest, ".npz", cache_dir)
     return _cached(entry, task, timeout_s, TriangleMesh.load, TriangleMesh.save if keep else None)
+
+
+def mesh_sizes(
+    finger: Finger, asked: MeshSettings | None = None, usual: MeshSettings | None = None
+) -> MeshSettings | None:
+    """Element sizes for `finger_mesh`: those asked for, None for the mesh of its file, or the usual ones."""
+    has_mesh = isinstance(finger, DrawnFinger) and finger.mesh is not None
+    return asked or (None if has_mesh else usual or MeshSettings())
+
+
+def expected_triangles(finger: Finger, settings: MeshSettings | None) -> int:
+    """Number of triangles that `finger_mesh` gives: of the mesh of the finger's file, else to a tenth."""
+    if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings is None:
+        return len(finger.mesh.triangles)
+    from geometry.mesh.element_size import estimated_triangles
+
+    return estimated_triangles(finger, settings or MeshSettings())
 
 
 def drawn_finger(

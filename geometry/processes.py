@@ -31,7 +31,7 @@ from collections.abc import (
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from ctypes import CDLL
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from importlib.machinery import PathFinder
@@ -43,6 +43,8 @@ from queue import SimpleQueue
 from threading import Event, Thread
 from time import monotonic
 from typing import IO, Any, Self, TypeVar
+
+from geometry.machine_memory import peak_memory_gb
 
 FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_", "MPIEXEC_")
 """Environment variables that would make a child a member of the parent's MPI run."""
@@ -61,6 +63,7 @@ class ProcessFailed:
 
     exit_code: int | None  # of its process, negative for the signal that ended it; None after the time limit
     reason: str = ""  # last line of a `captured` process, or a file that could not be read or written
+    peak_gb: float = field(default=0.0, compare=False)  # see `peak_memory_gb`
 
     @property
     def message(self) -> str:
@@ -237,12 +240,17 @@ class _Child:
             kind, content = self.connection.recv()
             return kind, content
         except (EOFError, OSError):
-            code, reason = self.process.wait(), ""
+            reason, peak_gb = "", 0.0
+            with suppress(ChildProcessError):  # where SIGCHLD is ignored, the system has taken it away
+                _, status, usage = os.wait4(self.process.pid, 0)
+                self.process.returncode = os.waitstatus_to_exitcode(status)
+                peak_gb = peak_memory_gb(usage)
+            code = self.process.wait()
             if self._written:
                 self._written.seek(0)
                 reason = (self._written.read().strip().splitlines() or ["it left no message"])[-1]
             self.end()
-            return "death", ProcessFailed(code, reason)
+            return "death", ProcessFailed(code, reason, peak_gb)
 
     def close(self) -> None:
         """Let a process end, and one with a task after it has saved its state; an unused one may import."""

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from geometry.errors import UserError
-from geometry.machine_memory import free_memory_gb, limit_memory
+from geometry.machine_memory import free_memory_gb, limit_memory, peak_memory_gb
 from geometry.processes import Pool, ProcessFailed
 
 
@@ -23,16 +23,18 @@ def run_task(task: Mapping[str, Any], timeout_s: float) -> Any:
         timeout_s: Time limit, s.
     """
     what, memory_gb = str(task["what"]), 0.9 * free_memory_gb()
-    limited = {what: {**task, "memory_gb": memory_gb}}
-    ((_, answer),) = _pool(os.getpid()).answers(perform, limited, timeout_s=timeout_s)
+    limited, peaks = {what: {**task, "memory_gb": memory_gb}}, [0.0]
+    ((_, answer),) = _pool(os.getpid()).answers(
+        perform, limited, timeout_s=timeout_s, report=lambda _, peak_gb: peaks.append(peak_gb)
+    )
     if isinstance(answer, UserError):
         raise answer
     if not isinstance(answer, ProcessFailed):
         return answer
     if answer.exit_code is None:
         raise UserError(f"{what} was ended after {timeout_s:g} s; use larger elements, or allow more time")
-    most_gb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 / 1e9
-    crowded = answer.exit_code < 0 and most_gb > 0.8 * memory_gb  # Gmsh crashes where it gets no more
+    # Gmsh crashes where it gets no more. An earlier task may have taken as much.
+    crowded = answer.exit_code < 0 and answer.peak_gb > max(0.8 * memory_gb, *peaks)
     last_words = ("bad_alloc", "MemoryError", "Cannot allocate memory", "out of memory")
     if crowded or any(words in answer.reason for words in last_words):
         raise _too_large(what, memory_gb)
@@ -48,10 +50,11 @@ def _pool(parent: int) -> Pool:
 
 
 def perform(task: Mapping[str, Any], report: Callable[..., None]) -> Any:
-    """Run a task in this process: its result, or why there is none."""
+    """Run a task in this process: its result, or why there is none; report the memory that it had before."""
     try:
         work = _work(str(task["kind"]))
         limit_memory(task["memory_gb"])
+        report(peak_memory_gb(resource.getrusage(resource.RUSAGE_SELF)))
         return work(task)
     except MemoryError:
         return _too_large(task["what"], task["memory_gb"])

@@ -182,7 +182,6 @@ def read_solvers(given: object, preset: str | None = None) -> list[Solver]:
     return [read_solver(each, preset if each in having else None) for each in several]
 
 
-def mesh_settings(size: float | None, otherwise: float | None = None) -> MeshSettings:
-    """Element sizes, by the size in walls and ribs, mm."""
-    chosen = otherwise if size is None else size
-    return MeshSettings() if chosen is None else MeshSettings(size=chosen)
+def mesh_settings(size: float | None) -> MeshSettings | None:
+    """Element sizes, by the size in walls and ribs, mm; None if none is given."""
+    return None if size is None else MeshSettings(size=size)

@@ -148,7 +148,7 @@ def film_forces(
     from compare.camera.force_estimate import MESH, force_rows, force_tracker, forces_of
     from compare.camera.track_film import track_film
     from compare.runtime.stages import shown_stages
-    from geometry.cache import finger_mesh
+    from geometry.cache import finger_mesh, mesh_sizes
 
     words: dict[str, Any] = {**given}
     film = _film(source, {name: words.pop(name) for name in FILM if name in words})
@@ -159,7 +159,7 @@ def film_forces(
         with TemporaryDirectory() as folder, stages.stage("track") as report:
             tracking, seen = track_film(film, finger, Path(folder), report, video=False)
         with stages.stage("mesh"):
-            mesh = finger_mesh(finger, settings=MESH)
+            mesh = finger_mesh(finger, settings=mesh_sizes(finger, usual=MESH))
         with stages.stage("force") as report:
             tracker = force_tracker(mesh, elastic, seen.points, finger.marker_radius)
             forces = forces_of(tracking, tracker, report)

@@ -55,7 +55,7 @@ def mesh(design: str | Path | Finger = "default", **given: Unpack[MeshKeywords])
     words: dict[str, Any] = {**given}
     settings = {name: words.pop(name) for name in MeshSettings.model_fields if name in words}
     finger, _, _ = read_job(design, None, None, words, besides=tuple(MeshSettings.model_fields), allowed=())
-    return finger_mesh(finger, settings=MeshSettings(**settings))
+    return finger_mesh(finger, settings=MeshSettings(**settings) if settings else None)
 
 
 def load_drawing(file: str | Path, **description: Any) -> DrawnFinger:
@@ -256,7 +256,7 @@ def crossval(
         UserError: If the study cannot be made, or the folder holds another one.
     """
     from compare.crossval.cross_validation import cross_validate
-    from compare.crossval.study import ELEMENT_SIZE, CrossvalStudy, solver_variants
+    from compare.crossval.study import CrossvalStudy, solver_variants
     from compare.runtime.stages import shown_stages
 
     own = [each.name for each in fields(CrossvalStudy)]
@@ -268,7 +268,7 @@ def crossval(
         design=finger,
         variants=solver_variants(read_solvers(solvers), elastic),
         out=as_path(out, "out"),
-        mesh=mesh_settings(size, ELEMENT_SIZE),
+        mesh=mesh_settings(size),
         material=elastic,
         load=moved,
         measurements=read_observations(measurements, finger),

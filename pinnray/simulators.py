@@ -57,9 +57,9 @@ def export(
         UserError: If MuJoCo is missing, a load is not possible, or the finger is of several materials.
     """
     from compare.runtime.stages import shown_stages
-    from geometry.cache import finger_mesh
+    from geometry.cache import finger_mesh, mesh_sizes
     from solvers.problem import Problem
-    from studies.robots.export import ELEMENT_SIZE, KINDS, ExportSettings, export_finger
+    from studies.robots.export import KINDS, SIZES, ExportSettings, export_finger
 
     if kind not in KINDS:
         raise UserError(f"there is no export {kind!r}; there are {', '.join(KINDS)}")
@@ -69,7 +69,7 @@ def export(
     finger, elastic, moved = read_job(design, material, load, given, besides=("size", "material", "load"))
     with shown_stages(progress) as stages:
         with stages.stage("mesh"):
-            triangles = finger_mesh(finger, settings=mesh_settings(size, ELEMENT_SIZE))
+            triangles = finger_mesh(finger, settings=mesh_sizes(finger, mesh_settings(size), SIZES))
         problem = Problem(triangles, elastic, moved, None, finger)
         done = export_finger(kind, problem, as_path(out, "out"), settings, stages)
     for remark in done.remarks:

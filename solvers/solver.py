@@ -5,7 +5,7 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from math import inf
+from math import inf, pow
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol, cast, runtime_checkable
 
@@ -121,6 +121,25 @@ class ElementSettings(FieldSettings):
 
 
 @dataclass(frozen=True)
+class Cost:
+    """Time of a solver on one core for the default finger and load, by default that of `fem`.
+
+    It need not be exact: by it solvers are shared out between two processes and fine meshes ask for consent.
+    """
+
+    per_triangle: float = 55.0  #: Time for each of the default mesh's triangles, µs
+    fixed: float = 0.0  #: Time that does not depend on the mesh, s
+
+    def of_mesh(self, triangles: int) -> float:
+        """The part of the time that depends on the mesh, s; factors take more of a fine mesh's triangles."""
+        return 1e-6 * self.per_triangle * triangles * pow(triangles / 18_000, 0.25)
+
+    def seconds(self, triangles: int) -> float:
+        """Time on a mesh, s."""
+        return self.fixed + self.of_mesh(triangles)
+
+
+@dataclass(frozen=True)
 class Traits:
     """Optional attributes of a solver, with their values for a solver that lacks them."""
 
@@ -129,6 +148,7 @@ class Traits:
     twin: str | None = None  #: Solver by finite elements that fits the markers in the same way, if any
     friction: bool = False  #: Whether its load `cylinder` may have friction
     parts: bool = False  #: Whether parts of the body may have materials of their own
+    cost: Cost = Cost()  #: Time that it takes
 
     @classmethod
     def of(cls, solver: Solver) -> "Traits":

@@ -12,6 +12,7 @@ from compare.evaluation.truths import SLIDING, TRUTHS, Truth, check_truths
 from compare.runtime.output_folder import job_definition
 from compare.runtime.provenance import cores
 from geometry.arrays import FloatArray
+from geometry.cache import mesh_sizes
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.finger import Finger
@@ -22,8 +23,8 @@ from solvers.assimilation.misfit import MarkerSettings
 from solvers.problem import Load, Material
 from solvers.solver import Solver, check_load, check_name, with_law
 
-ELEMENT_SIZE = 0.5
-"""Usual element size, mm: `fem` is off by 0.01 mm at the markers, a hundredth of its model error."""
+SIZES = MeshSettings(size=0.5)
+"""Usual element sizes: `fem` is off by 0.01 mm at the markers, a hundredth of its model error."""
 FEWEST_MARKERS = 3
 """Some to hold out and some to give."""
 EVERY_TRUTH = "all"
@@ -101,7 +102,8 @@ class CrossvalStudy:
         design: The finger.
         variants: The solvers, as `solver_variants` gives them.
         out: Output folder; folds that an earlier study with equal settings finished there are reused.
-        mesh: Element sizes of the mesh that solvers share.
+        mesh: Element sizes of the mesh that solvers share; None means the mesh of the finger's file if it
+            has one, else `SIZES`.
         material: The elastic constants; each solver takes its own law.
         load: The prescribed displacement of the contact.
         truths: Keys of `TRUTHS`, or `EVERY_TRUTH` alone.
@@ -119,7 +121,7 @@ class CrossvalStudy:
     design: Finger
     variants: Sequence[SolverVariant]
     out: Path
-    mesh: MeshSettings = field(default_factory=lambda: MeshSettings(size=ELEMENT_SIZE))
+    mesh: MeshSettings | None = None
     material: Material = field(default_factory=Material)
     load: Load = field(default_factory=Load)
     truths: Sequence[str] = (SLIDING.name,)
@@ -131,6 +133,9 @@ class CrossvalStudy:
     measurements: Observations | None = None
     processes: int = field(default_factory=cores)
     picture_formats: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mesh", mesh_sizes(self.design, self.mesh, SIZES))
 
     @property
     def mesh_file(self) -> Path:

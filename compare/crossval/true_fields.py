@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from compare.crossval.folds import LoadCase
-from compare.crossval.study import CrossvalStudy
+from compare.crossval.study import SIZES, CrossvalStudy
 from compare.evaluation.evaluation import field_difference
 from compare.evaluation.truths import Truth, simulate
 from compare.runtime.provenance import package_versions
@@ -212,7 +212,7 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
     markers = study.markers
     parts = [
         design.digest,
-        study.mesh.model_dump(),
+        study.mesh and study.mesh.model_dump(),
         shared.digest,
         truth.material(study.material).model_dump(),
         truth.load(stroke).model_dump(),
@@ -234,7 +234,8 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
     if not missing:
         progress(1.0, "from the cache")
         return files
-    finer = study.mesh.model_copy(update={"size": truth.finer * study.mesh.size})
+    sizes = study.mesh or SIZES
+    finer = sizes.model_copy(update={"size": truth.finer * sizes.size})
     mesh = finger_mesh(design, settings=finer)
     problem = Problem(mesh, study.material, Load(displacement=(0.0, -stroke)))
     solution = simulate(problem, progress, truth)

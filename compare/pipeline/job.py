@@ -8,6 +8,7 @@ from compare.camera.film import Film
 from compare.evaluation.comparison import supported_solvers
 from compare.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
 from compare.figures import check_formats
+from geometry.cache import mesh_sizes
 from geometry.content_hash import has_source
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
@@ -26,7 +27,8 @@ class Job:
     design: Finger
     solvers: Sequence[Solver]  #: In the order of tables and pictures.
     spare: Collection[str] = ()  #: Names of solvers to leave out if they do not support the problem.
-    mesh: MeshSettings = field(default_factory=MeshSettings)  #: Element sizes.
+    #: Element sizes; None for the mesh of the finger's file if it has one, else the default sizes.
+    mesh: MeshSettings | None = None
     adapt: float | None = None  #: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
     material: Material = field(default_factory=Material)  #: Elastic constants; each solver has its own law.
     load: Load = field(default_factory=Load)  #: Motion of the indenter.
@@ -38,6 +40,9 @@ class Job:
     resume: bool = False  #: Whether to take over the finished solutions of an earlier run.
     picture_formats: Sequence[str] = ()  #: Formats of the pictures besides PNG, of `FORMATS`.
     options: Mapping[str, object] = field(default_factory=dict)  #: Of the command line, for `run.json`.
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mesh", mesh_sizes(self.design, self.mesh))
 
     @property
     def names(self) -> list[str]:

@@ -216,7 +216,7 @@ def _provenance(folder: Path, job: Job, comparison: Results, stages: Stages) -> 
         "design_sha256": job.design.digest,
         "mesh_sha256": comparison.mesh.digest,
         "problem_sha256": Problem(comparison.mesh, job.material, job.load).digest,
-        "mesh": job.mesh.model_dump(),
+        "mesh": job.mesh and job.mesh.model_dump(),
         "adapt": adaptation and {"tolerance_mm": adaptation.tolerance, "end": adaptation.message},
         "material": job.material.model_dump(),
         "load": job.load.model_dump(),

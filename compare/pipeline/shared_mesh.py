@@ -18,7 +18,7 @@ from solvers.solver import Solver
 
 def shared_mesh(
     design: Finger,
-    settings: MeshSettings,
+    settings: MeshSettings | None,
     stages: Stages,
     *,
     tolerance: float | None = None,
@@ -31,7 +31,7 @@ def shared_mesh(
 
     Args:
         design: The finger.
-        settings: Element sizes of the first mesh.
+        settings: Element sizes of the first mesh, as for `finger_mesh`.
         stages: Shows the progress.
         tolerance: Largest estimated error of u or v at a marker, mm.
         material: Elastic constants; the law is the linear one.

@@ -1,12 +1,9 @@
-"""The solvers of a comparison: one after another, and on a large mesh in two processes.
-
-Networks and finite elements of the linear law, which share work, are solved in the process that was asked;
-the others where less is to be done.
-"""
+"""The solvers of a comparison: one after another, and on a large mesh in two processes."""
 
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -22,14 +19,15 @@ from compare.runtime.output_folder import SOLUTIONS, TRAINING, take_training
 from compare.runtime.provenance import cores, package_versions
 from compare.runtime.stages import Stages
 from geometry.atomic import write_text
+from geometry.cache import expected_triangles
 from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
-from geometry.mesh.element_size import estimated_triangles
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from geometry.processes import Pool, ProcessFailed, end_with_parent
 from solvers.problem import Material, Problem
+from solvers.registry import solver_modules
 from solvers.shared_work import SharedWork
 from solvers.solver import (
     NoSolutionError,
@@ -53,20 +51,6 @@ LARGE = 5000
 SHARE = max(1, cores() // 2)
 """Threads of the linear algebra in each of two processes."""
 
-SECONDS = {
-    "pinn-id": 17.0,
-    "pinn-std": 6.0,
-    "fem-id": 5.0,
-    "fem-nonlinear": 2.5,
-    "pinn-asm": 1.7,
-    "statfem": 1.2,
-    "gp": 0.7,
-}
-"""On the default finger, beside another process; of any other solver one."""
-
-THERE = ("solvers.pinn.identification.solver", "solvers.statistics.statistical_fem", __name__)
-"""Modules of what the second process solves, which it imports as it starts."""
-
 PICTURES = "compare.report.html_report"
 """Module that imports the libraries of pictures, which both processes draw next."""
 
@@ -83,14 +67,18 @@ class Outcome:
     failed: dict[str, str] = field(default_factory=dict)  #: Reasons of those that have no result.
 
 
-def second_process() -> Pool:
-    """The pool of a second process, with half of the cores; started early, it is ready when it is needed."""
-    return Pool(1, threads=SHARE, modules=THERE)
+def second_process(names: Iterable[str] = ()) -> Pool:
+    """The pool of a second process, with half of the cores, to start early: it imports what solvers need.
+
+    Args:
+        names: Names of the solvers.
+    """
+    return Pool(1, threads=SHARE, modules=[*solver_modules(names), __name__])
 
 
-def worth_starting(finger: Finger, mesh: MeshSettings) -> bool:
+def worth_starting(finger: Finger, mesh: MeshSettings | None) -> bool:
     """Whether a finger's mesh will be so large that a second process can be started before it is made."""
-    return estimated_triangles(finger, mesh) >= 3 * LARGE  # nearly two for each node, of a rough estimate
+    return expected_triangles(finger, mesh) >= 3 * LARGE  # nearly two for each node, of a rough estimate
 
 
 def solve_all(
@@ -110,18 +98,14 @@ def solve_all(
     Raises:
         UserError: If a solver refuses, the reference fails, or all fail.
     """
-    here, there = shares(solvers, job.material)
+    here, there = shares(solvers, job.material, len(problem.mesh.triangles))
     # A class of the calling script is unknown to other processes.
     elsewhere = all(type(each).__module__ != "__main__" for each in solvers)
-    work = SharedWork()
+    work, whole = SharedWork(), _Part(job, solvers, problem, observations, folder)
     if pool and elsewhere and here and there and len(problem.mesh.points) >= LARGE:
-        # Without the solvers of the other part, which would be imported there.
-        own, other = (
-            _Part(replace(job, solvers=part), part, problem, observations, folder) for part in (here, there)
-        )
-        outcome = _beside_each_other(own, other, work, stages, pool)
+        outcome = _in_two_processes(whole.of(here), whole.of(there), work, stages, pool)
     else:
-        outcome = _Part(job, solvers, problem, observations, folder).outcome(stages.stage, work)
+        outcome = whole.outcome(stages.stage, work)
     found = outcome.evaluations
     if any(each.law == "linear" for each in found.values()):
         with stages.stage("certificate"), work.used():
@@ -132,74 +116,63 @@ def solve_all(
     return Outcome(*({name: each[name] for name in names if name in each} for each in vars(outcome).values()))
 
 
-def shares(solvers: Sequence[Solver], material: Material) -> tuple[list[Solver], list[Solver]]:
-    """The solvers of the process that was asked, and of another one, both in their order."""
-    here = [each for each in solvers if _shares_work(each, material)]
+def shares(
+    solvers: Sequence[Solver], material: Material, triangles: int
+) -> tuple[list[Solver], list[Solver]]:
+    """The solvers of the process that was asked, and of another one, both in their order, at like cost.
+
+    Solvers of the linear law, but for statistics, share factors and networks, and stay in this process.
+    """
+    seconds = {each.name: Traits.of(each).cost.seconds(triangles) for each in solvers}
+    here = [
+        each
+        for each in solvers
+        if with_law(material, each).law == "linear" and Traits.of(each).family != "statistics"
+    ]
     there: list[Solver] = []
     rest = [each for each in solvers if each not in here]
-    for solver in sorted(rest, key=_seconds, reverse=True):
-        parts = sorted((there, here), key=lambda part: sum(map(_seconds, part)))
-        parts[0].append(solver)
+    for solver in sorted(rest, key=lambda each: -seconds[each.name]):
+        min(there, here, key=lambda part: sum(seconds[each.name] for each in part)).append(solver)
     return sorted(here, key=solvers.index), sorted(there, key=solvers.index)
 
 
-def _shares_work(solver: Solver, material: Material) -> bool:
-    """Whether a solver is of the linear law, and no statistics: these share factors and networks."""
-    return with_law(material, solver).law == "linear" and Traits.of(solver).family != "statistics"
-
-
-def _seconds(solver: Solver) -> float:
-    return SECONDS.get(solver.name, 1.0)
-
-
-def _beside_each_other(own: "_Part", other: "_Part", work: SharedWork, stages: Stages, pool: Pool) -> Outcome:
+def _in_two_processes(own: "_Part", other: "_Part", work: SharedWork, stages: Stages, pool: Pool) -> Outcome:
     """Solve a part in this process, which has imported its libraries, and another one in a second process."""
-    shown, last = dict[str, Progress](), ExitStack()
-
-    def told(stage: str, fraction: float, note: str) -> None:
-        if stage not in shown:
-            last.close()
-            shown[stage] = last.enter_context(stages.stage(stage))
-        shown[stage](fraction, note)
-
-    def theirs() -> Outcome:
-        found = answer.result()
-        if isinstance(found, ProcessFailed):
-            raise UserError(
-                f"{', '.join(each.name for each in other.solvers)}: {found.message}; "
-                "a resumed run goes on from what was finished"
-            )
-        if isinstance(found, UserError):
-            raise found
-        return found
-
-    @contextmanager
-    def stage(name: str) -> Iterator[Progress]:
-        with stages.stage(name) as progress:
-
-            def checked(fraction: float, note: str) -> None:
-                progress(fraction, note)
-                if answer.done():
-                    theirs()
-
-            yield checked
-
-    with threadpool_limits(SHARE), pool.beside(_answered, other, report=told) as answer:
-        answer.add_done_callback(lambda _: last.close())
-        outcome = own.outcome(stage, work)
+    with threadpool_limits(SHARE), pool.beside(_answered, other, report=stages.told) as answer:
+        outcome = own.outcome(partial(_watching, stages, other, answer), work)
         import_module(PICTURES)  # while the other part goes on: this process draws next
-        for ours, more in zip(vars(outcome).values(), vars(theirs()).values(), strict=True):
-            ours.update(more)
+        theirs = other.outcome_in(answer)
+    for ours, more in zip(vars(outcome).values(), vars(theirs).values(), strict=True):
+        ours.update(more)
     return outcome
 
 
+@contextmanager
+def _watching(
+    stages: Stages, other: "_Part", answer: Future[Outcome | UserError | ProcessFailed], name: str
+) -> Iterator[Progress]:
+    """A stage of this process, which ends with the error of the second process if that has ended by one."""
+    with stages.stage(name) as progress:
+
+        def report(fraction: float, note: str) -> None:
+            progress(fraction, note)
+            if answer.done():
+                other.outcome_in(answer)
+
+        yield report
+
+
 def _answered(part: "_Part", report: Callable[..., None]) -> Outcome | UserError:
-    """The work of a process: its outcome, or the refusal as an error that another process can raise."""
+    """Solve a part in the second process: its outcome, or the refusal as an error that can be pickled."""
     end_with_parent()
 
-    def stage(name: str) -> AbstractContextManager[Progress]:
+    @contextmanager
+    def stage(name: str) -> Iterator[Progress]:
         report(name, 0.0, "")
-        return nullcontext(partial(report, name))
+        try:
+            yield partial(report, name)
+        finally:
+            report(name)
 
     try:
         outcome = part.outcome(stage, SharedWork())
@@ -218,6 +191,20 @@ class _Part:
     problem: Problem
     observations: Observations
     folder: Path
+
+    def of(self, solvers: Sequence[Solver]) -> "_Part":
+        """A part with some of the solvers, whose process need not import those of the others."""
+        return replace(self, job=replace(self.job, solvers=solvers), solvers=solvers)
+
+    def outcome_in(self, answer: Future[Outcome | UserError | ProcessFailed]) -> Outcome:
+        """The outcome in the answer of a second process, or the `UserError` that tells why there is none."""
+        found = answer.result()
+        if isinstance(found, ProcessFailed):
+            names = ", ".join(each.name for each in self.solvers)
+            found = UserError(f"{names}: {found.message}; a resumed run goes on from what was finished")
+        if isinstance(found, UserError):
+            raise found
+        return found
 
     def outcome(self, stage: Stage, work: SharedWork) -> Outcome:
         """Solve with one solver after another, in this process."""

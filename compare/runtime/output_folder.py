@@ -249,13 +249,13 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def job_definition(
-    design: Finger, mesh: MeshSettings, material: Material, load: Load, module: str
+    design: Finger, mesh: MeshSettings | None, material: Material, load: Load, module: str
 ) -> dict[str, Any]:
     """Everything that the result of a job on a finger depends on, if the module of this name makes it."""
     return {
         "schema": 1,
         "design": design.definition(),
-        "mesh": mesh.model_dump(),
+        "mesh": mesh and mesh.model_dump(),
         "material": material.model_dump(),
         "load": load.model_dump(mode="json"),
         "versions": package_versions(),

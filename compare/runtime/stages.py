@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
 from types import TracebackType
@@ -81,6 +81,7 @@ class Stages:
         self._started = datetime.now(UTC)
         self._console = console
         self._line = NotebookLine() if console.is_jupyter and not quiet else None
+        self._told: dict[str, Stage] = {}
         self._log = not (quiet or console.is_terminal or console.is_jupyter)
         self._progress = Progress(
             TextColumn("{task.description}"),
@@ -123,29 +124,48 @@ class Stages:
     @contextmanager
     def stage(self, name: str) -> Iterator[Report]:
         """Run a stage; it yields a function that takes the fraction done and a short note."""
-        started = time.perf_counter()
-        if self._line is not None:
-            self._line.show(name)
-        task = self._progress.add_task(name, total=1.0, note="")
-        last = ""
-
-        def report(fraction: float, note: str) -> None:
-            nonlocal last
-            last = note
-            self._progress.update(task, completed=fraction, note=note)
-            if self._line is not None:
-                self._line.show(f"{name}: {fraction:.0%} {note}")
-
+        stage = Stage(self, name)
         try:
-            yield report
+            yield stage.report
         except UnsupportedProblemError:
-            self._progress.remove_task(task)
+            self._progress.remove_task(stage.task)
             raise
-        self._progress.update(task, completed=1.0)
-        self.seconds[name] = time.perf_counter() - started
-        if self._log:
-            line = f"{name}: {self.seconds[name]:.1f} s{last and ', '}{last}"
-            self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+        stage.end()
+
+    def told(self, name: str, *said: Any) -> None:
+        """Show a stage of another process: it begins with its first report, and ends with an empty one."""
+        stage = self._told.get(name) or self._told.setdefault(name, Stage(self, name))
+        if said:
+            stage.report(*said)
+        else:
+            self._told.pop(name).end()
+
+
+class Stage:
+    """A stage that has begun, and its line."""
+
+    def __init__(self, stages: Stages, name: str) -> None:
+        self._stages, self._name = stages, name
+        self._started, self._note = time.perf_counter(), ""
+        if stages._line is not None:
+            stages._line.show(name)
+        self.task = stages._progress.add_task(name, total=1.0, note="")
+
+    def report(self, fraction: float, note: str) -> None:
+        """Show the fraction done and a short note."""
+        self._note = note
+        self._stages._progress.update(self.task, completed=fraction, note=note)
+        if self._stages._line is not None:
+            self._stages._line.show(f"{self._name}: {fraction:.0%} {note}")
+
+    def end(self) -> None:
+        """Note how long it took."""
+        stages, note = self._stages, self._note
+        stages._progress.update(self.task, completed=1.0)
+        stages.seconds[self._name] = seconds = time.perf_counter() - self._started
+        if stages._log:
+            line = f"{self._name}: {seconds:.1f} s{note and ', '}{note}"
+            stages._console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def in_stages(
@@ -167,21 +187,13 @@ def in_stages(
         kind: Name of the stage for all, such as "runs".
         note: Turns a task's name and its answer into a short text.
     """
-    lines: dict[str, tuple[ExitStack, Report]] = {}
-
-    def report(name: str, fraction: float, text: str) -> None:
-        if name not in lines:
-            stack = ExitStack()
-            lines[name] = stack, stack.enter_context(stages.stage(name))
-        lines[name][1](fraction, text)
-
     with (
         stages.stage(kind) as overall,
         Pool(processes, threads=max(1, cores() // max(1, min(processes, len(tasks))))) as pool,
-        closing(pool.answers(work, tasks, report=report)) as answers,
+        closing(pool.answers(work, tasks, report=stages.told)) as answers,
     ):
         for done, (name, answer) in enumerate(answers, start=1):
             yield name, answer
-            report(name, 1.0, note(name, answer))
-            lines[name][0].close()
+            stages.told(name, 1.0, note(name, answer))
+            stages.told(name)
             overall(done / len(tasks), f"{done} of {len(tasks)} {kind}")

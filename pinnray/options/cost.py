@@ -1,31 +1,18 @@
 """Time and memory that a fine mesh takes, told before it is made."""
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.cache import mesh_sizes
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.machine_memory import free_memory_gb
 from geometry.mesh.element_size import estimated_triangles
 from geometry.mesh.settings import MeshSettings
+from solvers.solver import Cost, Solver, Traits
 
-MESH, EXPERIMENT = "mesh", "virtual experiment"
-
-MICROSECONDS = {
-    MESH: 40,
-    EXPERIMENT: 380,
-    "fem": 180,
-    "fem-nonlinear": 690,
-    "fem-asm": 110,
-    "fem-id": 1650,
-    "gp": 70,
-    "statfem": 140,
-}
-"""Time per triangle of the default finger on one core, with 42,000 triangles; `fem` with 354,000.
-
-The time of networks hardly depends on the mesh, and `fem-3d` estimates its own.
-"""
+MESH, EXPERIMENT = Cost(per_triangle=40), Cost(per_triangle=300)
+"""Time of making the mesh, and of a virtual experiment on it."""
 
 KILOBYTES = 30
 """Largest memory of a run per triangle, from the same run; factors and error estimates take most of it."""
@@ -46,49 +33,58 @@ class MeshCost:
 
     Attributes:
         triangles: Number of triangles.
-        parts: Keys of `MICROSECONDS`: what is done with it.
+        solvers: What it is made for.
+        simulated: Whether it is for a virtual experiment as well.
     """
 
     triangles: int
-    parts: Collection[str]
+    solvers: Sequence[Solver] = ()
+    simulated: bool = False
 
     @property
     def seconds(self) -> float:
-        """Time, s."""
-        return 1e-6 * self.triangles * sum(MICROSECONDS.get(part, 0) for part in self.parts)
+        """Time, s, as far as a coarser mesh takes less."""
+        costs = [MESH, *[EXPERIMENT] * self.simulated, *(Traits.of(each).cost for each in self.solvers)]
+        return sum(cost.of_mesh(self.triangles) for cost in costs)
 
     @property
     def memory_gb(self) -> float:
         """Memory, GB, of the solvers."""
-        solves = any(part != MESH for part in self.parts)
-        return 1e-6 * self.triangles * KILOBYTES if solves else 0.0
+        return 1e-6 * self.triangles * KILOBYTES if self.solvers or self.simulated else 0.0
 
     def fits(self, free_gb: float) -> bool:
         """Whether it needs no consent."""
         return self.seconds <= MAX_SECONDS and self.memory_gb <= USABLE * free_gb
 
 
-def check_mesh_cost(finger: Finger, settings: MeshSettings, parts: Collection[str]) -> None:
-    """Refuse a mesh that takes long or much memory.
+def check_mesh_cost(
+    finger: Finger,
+    settings: MeshSettings | None,
+    solvers: Sequence[Solver] = (),
+    *,
+    simulated: bool = False,
+) -> None:
+    """Refuse a mesh that takes long or much memory, unless it is the one of the finger's file.
 
     Args:
         finger: The finger.
-        settings: Element sizes.
-        parts: Names of solvers, and `EXPERIMENT` if one is simulated.
+        settings: Element sizes, as for `finger_mesh`.
+        solvers: What the mesh is made for.
+        simulated: Whether it is for a virtual experiment as well.
 
     Raises:
         UserError: With the price and a size that costs less.
     """
-    if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
+    if (settings := mesh_sizes(finger, settings)) is None:
         return
-    free, parts = free_memory_gb(), [MESH, *parts]
-    cost = MeshCost(estimated_triangles(finger, settings), parts)
+    free, size = free_memory_gb(), settings.size
+    cost = coarser = MeshCost(estimated_triangles(finger, settings), solvers, simulated)
     if cost.fits(free):
         return
-    size, coarser = settings.size, cost
     while not coarser.fits(free) and coarser.triangles > 1000:
         size = float(f"{COARSER * size:.2g}")
-        coarser = MeshCost(estimated_triangles(finger, settings.model_copy(update={"size": size})), parts)
+        triangles = estimated_triangles(finger, settings.model_copy(update={"size": size}))
+        coarser = replace(cost, triangles=triangles)
     raise UserError(
         f"--mesh-size {settings.size:g} gives about {cost.triangles:,} triangles, which take about "
         f"{cost.seconds / 60:.0f} min and {cost.memory_gb:.1f} GB ({free:.1f} GB are free); "

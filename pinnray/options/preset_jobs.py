@@ -6,9 +6,9 @@ from geometry.mesh.settings import MeshSettings
 
 
 class JobDefaults(NamedTuple):
-    """Default element sizes, kind of load and solvers."""
+    """Element sizes if the preset has its own, and the default kind of load and solvers."""
 
-    mesh: MeshSettings = MeshSettings()
+    mesh: MeshSettings | None = None
     load: Literal["mean", "point", "patch"] = "mean"
     solvers: str = "fem,fem-nonlinear,pinn-std,pinn-asm,fem-asm,fem-id,pinn-id,gp,statfem"
 

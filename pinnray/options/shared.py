@@ -54,7 +54,8 @@ class FingerOptions:
             for --clamp.
         set: Change a parameter, such as rib_count=6 or N=6, or a line on the drawing, such as depth=12; may
             be repeated.
-        mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip.
+        mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip. A .msh
+            file that is a mesh of the section is taken as it is unless a size is given.
         yes: Go on although the mesh is so fine that a run takes more than five minutes or much memory.
     """
 
@@ -67,19 +68,25 @@ class FingerOptions:
     mesh_size: float | None = None
     yes: Flag = False
 
-    def read(self, preset: str | None = None) -> "tuple[Finger, MeshSettings]":
-        """The finger and the mesh settings; a preset of the solvers may have its own mesh settings."""
+    def read(
+        self, preset: str | None = None, usual: "MeshSettings | None" = None
+    ) -> "tuple[Finger, MeshSettings | None]":
+        """The finger and its element sizes: of the option, the preset of the solvers, or as usual.
+
+        The sizes are None for a finger whose file has a mesh, if neither option nor preset asks for any.
+        """
+        from geometry.cache import mesh_sizes
         from geometry.mesh.settings import MeshSettings
         from pinnray.options.preset_jobs import job_defaults
 
-        settings = job_defaults(preset).mesh.model_dump()
+        asked = job_defaults(preset).mesh
         if self.mesh_size is not None:
-            settings["size"] = self.mesh_size
-        try:
-            mesh = MeshSettings(**settings)
-        except UserError as error:
-            raise UserError(f"--mesh-{error}") from None
-        return (self._designed() if self.section is None else self._drawn(self.section)), mesh
+            try:
+                asked = MeshSettings(**{**(asked or MeshSettings()).model_dump(), "size": self.mesh_size})
+            except UserError as error:
+                raise UserError(f"--mesh-{error}") from None
+        finger = self._designed() if self.section is None else self._drawn(self.section)
+        return finger, mesh_sizes(finger, asked, usual)
 
     def files(self) -> list[Path]:
         """The files that describe the finger."""
@@ -88,12 +95,19 @@ class FingerOptions:
         given = [Path(self.design), self.section, self.section and description_beside(self.section)]
         return [path for path in given if path is not None and path.is_file()]
 
-    def check_cost(self, finger: "Finger", mesh: "MeshSettings", parts: Sequence[str] = ()) -> None:
+    def check_cost(
+        self,
+        finger: "Finger",
+        mesh: "MeshSettings | None",
+        solvers: "Sequence[Solver]" = (),
+        *,
+        simulated: bool = False,
+    ) -> None:
         """Raise a `UserError` with the price of a fine mesh, unless --yes is given; see `check_mesh_cost`."""
         if not self.yes:
             from pinnray.options.cost import check_mesh_cost
 
-            check_mesh_cost(finger, mesh, parts)
+            check_mesh_cost(finger, mesh, solvers, simulated=simulated)
 
     def _designed(self) -> "Design":
         from geometry.finger.design import Design

@@ -30,7 +30,7 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import ElementSettings, Progress, check_problem, silent
+from solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +70,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
     family = "finite elements"
     laws = FemSolver.laws + FemNonlinearSolver.laws
     loads = FemSolver.loads
+    cost = Cost(per_triangle=55)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -37,7 +37,7 @@ from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Cost, Family, Progress, check_problem, silent
 
 
 class FemBody:
@@ -197,6 +197,7 @@ class FemIdSolver(IdentifyingSolver):
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
     loads: ClassVar[tuple[str, ...]] = FemNonlinearSolver.loads  # only the drawn contact is taken from it
     friction: ClassVar[bool] = True
+    cost: ClassVar[Cost] = Cost(per_triangle=275)
 
     def __post_init__(self) -> None:
         if self.model == "fem":

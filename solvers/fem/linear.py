@@ -13,7 +13,7 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import ErrorEstimate, Solution, Status
-from solvers.solver import ElementSettings, Progress, check_problem, silent
+from solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class FemSolver(ElementSettings):
     laws = ("linear",)
     loads = ("mean", "point", "patch")
     parts = True
+    cost = Cost(per_triangle=55)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -22,7 +22,7 @@ from solvers.fem.linear_solvers import LinearSolver
 from solvers.fem.ranks import communicator, on_all_ranks
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import FieldSettings, Progress, check_problem, silent
+from solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
 
 Face = Literal["side", "middle"]
 
@@ -69,7 +69,7 @@ class FaceField:
         return np.stack([dx @ self.values, dy @ self.values, dz], axis=-1)
 
 
-class Cost(NamedTuple):
+class SolvingCost(NamedTuple):
     """The linear solver and its price."""
 
     iterative: bool  # Whether multigrid solves, not factors
@@ -77,7 +77,7 @@ class Cost(NamedTuple):
     words: str  # Unknowns, method, memory and time of a Newton step on one core
 
 
-def _cost(unknowns: int, levels: int, iterative: bool) -> Cost:
+def _cost(unknowns: int, levels: int, iterative: bool) -> SolvingCost:
     """The price of nodes on so many levels, fitted to the default finger with 235,000 to 812,000 unknowns.
 
     Other bodies may differ by a factor of two.
@@ -90,10 +90,10 @@ def _cost(unknowns: int, levels: int, iterative: bool) -> Cost:
         how, seconds = "direct", 2e-5 * unknowns + 1.3e-10 * entries**2 / unknowns
     step = f"{max(1.0, seconds):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
     words = f"{unknowns:,} unknowns, {how}: about {memory:.1f} GB, {step} a Newton step"
-    return Cost(iterative, memory, words)
+    return SolvingCost(iterative, memory, words)
 
 
-def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) -> Cost:
+def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) -> SolvingCost:
     """The linear solver that is asked for or, if "auto", direct where memory allows it.
 
     A `UserError` says that the memory that is free does not suffice; a solution may take 70 % of it.
@@ -162,6 +162,7 @@ class Fem3dSolver(FieldSettings):
     laws = ("linear", "neo-hookean", "st-venant-kirchhoff")
     loads = ("mean", "patch", "cylinder")
     friction = True
+    cost = Cost(per_triangle=4300)
 
     def __post_init__(self) -> None:
         if self.layers < 1:
@@ -250,7 +251,7 @@ class Fem3dSolver(FieldSettings):
         )
 
     def _status(
-        self, path: LoadPath, cost: Cost, region: ContactRegion | None, unstable: int | None
+        self, path: LoadPath, cost: SolvingCost, region: ContactRegion | None, unstable: int | None
     ) -> Status:
         """Success at the full load, or advice; `unstable` is None where multigrid cannot tell."""
         if path.points[-1].fraction < 1:

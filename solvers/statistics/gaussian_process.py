@@ -24,7 +24,14 @@ from solvers.assimilation.pictures import FramedData, FreePictures
 from solvers.energy_and_force import energy_and_force
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import FieldSettings, Progress, UnsupportedProblemError, check_problem, silent
+from solvers.solver import (
+    Cost,
+    FieldSettings,
+    Progress,
+    UnsupportedProblemError,
+    check_problem,
+    silent,
+)
 from solvers.statistics.kernel_field import (
     Kernel,
     MarkerPrediction,
@@ -64,6 +71,7 @@ class GaussianProcessSolver(FieldSettings):
     loads = ("mean", "point", "patch", "cylinder")  # it only needs to know where, for its force
     friction = True
     assimilates = True
+    cost = Cost(per_triangle=38)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Fit the processes to the problem's observations, and again without each marker; see `Solver`."""

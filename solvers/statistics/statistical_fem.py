@@ -38,7 +38,7 @@ from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import ElementSettings, NoSolutionError, Progress, check_problem, silent
+from solvers.solver import Cost, ElementSettings, NoSolutionError, Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel, MarkerPrediction, with_markers_left_out
 from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField, predicted
 
@@ -58,6 +58,7 @@ class StatFemSolver(ElementSettings):
     loads = FemNonlinearSolver.loads
     friction = True
     assimilates = True
+    cost = Cost(per_triangle=66)
 
     def __post_init__(self) -> None:
         super().__post_init__()

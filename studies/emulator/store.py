@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from compare.runtime.provenance import package_versions
 from compare.runtime.stages import Stages
 from geometry.content_hash import content_hash, sources_digest
 from geometry.text_files import read_json
@@ -45,6 +46,7 @@ def digest_of(sweep: Sweep, inputs: Inputs) -> str:
             "study": sweep.study.model_dump(mode="json", exclude={"samples"}),
             "base": inputs.base,
             "samples": [(sweep.samples[each.number], each.values) for each in sweep.good],
+            "versions": package_versions(),
             "program": sources_digest(__name__),
         }
     )

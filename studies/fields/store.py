@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from compare.runtime.provenance import package_versions
 from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.content_hash import content_hash, sources_digest
@@ -36,7 +37,9 @@ def fields_of(folder: Path, *, refit: bool = False, stages: Stages | None = None
         {
             "study": known.study.model_dump(mode="json", exclude={"samples"}),
             "base": known.inputs.base,
-            "samples": known.results,
+            "samples": [known.samples, known.results],
+            "lost": [known.lost, known.reasons],
+            "versions": package_versions(),
             "program": sources_digest(__name__),
         }
     )

@@ -30,8 +30,8 @@ from studies.robots.springs import Springs, fitted_springs
 
 Kind = Literal["mujoco", "sofa", "mesh"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-ELEMENT_SIZE = 1.0
-"""Size of the elements of `fem-nonlinear`, mm, unless another is asked for."""
+SIZES = MeshSettings(size=1.0)
+"""Sizes of the elements of `fem-nonlinear`, unless others are asked for."""
 FASTEST = 1500.0
 """Largest angular frequency of the chain, rad/s: with it a time step of 1 ms is stable."""
 COARSE = 45

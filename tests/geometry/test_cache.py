@@ -1,7 +1,9 @@
 """Cache and worker: quick hits, damaged entries, time limits, one-line failures."""
 
 import os
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import zipfile
@@ -133,6 +135,35 @@ def test_a_task_that_needs_more_memory_than_is_free_is_one_line() -> None:
 def fill_memory(task: dict[str, Any], report: Callable[..., None]) -> object:
     worker._work = lambda kind: lambda task: len(bytearray(task["bytes"]))
     return perform({**task, "kind": "mesh", "memory_gb": 0.5}, report)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is limited on Linux only")
+@pytest.mark.parametrize(
+    ("crowded", "end"), [(False, r"failed \(exit code -11\)"), (True, r"needs more than 0\.45 GB")]
+)
+def test_a_crash_counts_as_lack_of_memory_only_if_that_task_took_it(crowded, end, monkeypatch):
+    """After another child that took more than is free, from a process that has taken as much itself."""
+    monkeypatch.setattr(worker, "free_memory_gb", lambda: 0.5)
+    monkeypatch.setattr(worker, "perform", crash)
+    fill = "len(b'x' * 6 * 10**8)"
+    subprocess.run([sys.executable, "-c", fill], check=True)
+    exec(fill)
+    with pytest.raises(UserError, match=f"^reading {end}"):
+        run_task({"what": "reading", "crowded": crowded}, 60)
+
+
+def crash(task: dict[str, Any], report: Callable[..., None]) -> object:
+    """End by a signal, if asked after taking more memory than the process ever had."""
+
+    def work(task: dict[str, Any]) -> None:
+        resource.setrlimit(resource.RLIMIT_DATA, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        taken = b"x" * (peak + 10**8 if task["crowded"] else 10**7)
+        os.kill(os.getpid(), signal.SIGSEGV)
+        raise AssertionError(len(taken))
+
+    worker._work = lambda kind: work
+    return perform({**task, "kind": "mesh"}, report)
 
 
 def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_path: Path) -> None:

@@ -48,7 +48,6 @@ def command(
     from compare.pipeline.shared_mesh import shared_mesh
     from compare.runtime.output_folder import check_output
     from compare.runtime.stages import Stages
-    from pinnray.options.cost import EXPERIMENT
     from vision.rig.occluders import cables, check_covers
     from vision.rig.recording import Recording
     from vision.rig.recording_files import check_codec
@@ -65,7 +64,7 @@ def command(
     if len(solvers) > 1:
         raise UserError("the rig films one finger; name one --solver")
     filmed = solvers[0] if solvers else None
-    finger.check_cost(design, mesh_settings, [filmed.name if filmed else EXPERIMENT])
+    finger.check_cost(design, mesh_settings, solvers, simulated=filmed is None)
     with Stages() as stages:
         mesh, _ = shared_mesh(design, mesh_settings, stages)
         bench = scene.bench(mesh, design, workspace)

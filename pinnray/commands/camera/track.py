@@ -13,6 +13,7 @@ from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
 from pinnray.options.camera import FilmOptions, ForceOptions
 from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
+from solvers.registry import make_solver
 
 
 @quietable
@@ -64,12 +65,10 @@ def command(
 
     if publish is not None and not live:
         raise UserError("--publish is for --live")
-    design, settings = finger.read()
-    if finger.mesh_size is None:
-        settings = MESH
+    design, settings = finger.read(usual=MESH)
     film, material = options.film(source), force.read()
     if material:
-        finger.check_cost(design, settings, ["fem-id"])
+        finger.check_cost(design, settings, [make_solver("fem-id")])
     check_output(out)
     console = Console(stderr=True)
     forces, pace = [], None
@@ -100,7 +99,7 @@ def command(
             provenance["force"] = {
                 "material": material.model_dump() | {"law": tracker.laws[0]},
                 "laws_not_excluded": tracker.laws,
-                "mesh": settings.model_dump(),
+                "mesh": settings and settings.model_dump(),
                 "frames": len(forces),
                 "live": pace and pace._asdict(),
             }

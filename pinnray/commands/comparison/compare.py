@@ -87,7 +87,6 @@ def command(
     from compare.runtime.output_folder import RUN_FILE
     from compare.runtime.stages import Stages
     from pinnray.commands.launch import on_ranks
-    from pinnray.options.cost import EXPERIMENT
     from pinnray.options.preset_jobs import job_defaults
 
     earlier = read_options_file(from_) if from_ else None
@@ -95,14 +94,13 @@ def command(
         note_versions(from_, earlier)
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
-    with nullcontext() if on_ranks() or cores() < 2 else second_process() as pool:
+    names = job_defaults(options.preset).solvers if solvers is None else solvers
+    with nullcontext() if on_ranks() or cores() < 2 else second_process(comma_list(names)) as pool:
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
-        made = options.read(job_defaults(options.preset).solvers if solvers is None else solvers)
+        made = options.read(names)
         physics.check_law(made)
-        finger.check_cost(
-            design, mesh, [solver.name for solver in made] + [EXPERIMENT] * (measurements is None)
-        )
+        finger.check_cost(design, mesh, made, simulated=measurements is None)
         job = Job(
             design=design,
             solvers=made,

@@ -67,16 +67,13 @@ def command(
     """
     from compare.crossval.cross_validation import cross_validate
     from compare.crossval.folds import LOAD
-    from compare.crossval.study import ELEMENT_SIZE, CrossvalStudy
+    from compare.crossval.study import SIZES, CrossvalStudy
     from compare.crossval.tables import terminal_tables
     from compare.runtime.stages import Stages
     from geometry.registration import Registration
-    from pinnray.options.cost import EXPERIMENT
     from vision.measurements import read_measurements
 
-    design, mesh = finger.read(options.preset)
-    if finger.mesh_size is None and options.preset is None:
-        mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
+    design, mesh = finger.read(options.preset, SIZES)
     material, load = physics.read(options.preset)
     file = existing_table(measurements)
     study = CrossvalStudy(
@@ -98,7 +95,7 @@ def command(
     )
     made = [variant.make(0) for variant in study.variants]
     physics.check_law(made)
-    finger.check_cost(design, mesh, [EXPERIMENT, *(solver.name for solver in made)])
+    finger.check_cost(design, mesh, made, simulated=True)
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")
     with going_on_from(study.out), Stages() as stages:

@@ -9,6 +9,7 @@ from rich.console import Console
 from compare.runtime.exits import NOT_CONVERGED, say
 from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, Flag, OutputPath, PhysicsOptions
+from solvers.registry import make_solver
 
 
 @quietable
@@ -46,19 +47,17 @@ def command(
     from compare.runtime.stages import Stages
     from geometry.errors import UserError
     from solvers.problem import Problem
-    from studies.robots.export import ELEMENT_SIZE, ExportSettings, export_finger
+    from studies.robots.export import SIZES, ExportSettings, export_finger
     from studies.robots.score import score_table
 
-    chosen, mesh = finger.read()
-    if finger.mesh_size is None:
-        mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
+    chosen, mesh = finger.read(usual=SIZES)
     if score and kind != "mujoco":
         raise UserError(f"--score is of mujoco; no score is made for {kind}")
     settings = ExportSettings(
         hinges=hinges, loss_factor=loss_factor, across=across, layers=layers, places=places, score=score
     )
     material, load = replace(physics, load=physics.load or "cylinder").read()
-    finger.check_cost(chosen, mesh, ["fem-nonlinear"] if kind == "mujoco" else [])
+    finger.check_cost(chosen, mesh, [make_solver("fem-nonlinear")] if kind == "mujoco" else [])
     with Stages() as stages:
         triangles, _ = shared_mesh(chosen, mesh, stages)
         done = export_finger(kind, Problem(triangles, material, load, None, chosen), out, settings, stages)

@@ -6,6 +6,7 @@ from compare.runtime.exits import say
 from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
+from solvers.registry import make_solver
 
 
 @quietable
@@ -48,7 +49,7 @@ def command(
         raise UserError(f"--out {out}: the derivatives are a CSV file; give a name that ends in .csv")
     chosen, settings = finger.read()
     material, load = physics.read()
-    finger.check_cost(chosen, settings, ["fem-nonlinear"])
+    finger.check_cost(chosen, settings, [make_solver("fem-nonlinear")])
     with Stages() as stages:
         triangles, _ = shared_mesh(chosen, settings, stages)
         problem = Problem(triangles, material, load, None, chosen)

@@ -67,7 +67,7 @@ def command(
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
     physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
-    finger.check_cost(chosen, settings, [made.name])
+    finger.check_cost(chosen, settings, [made])
     given = None
     if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)

@@ -54,12 +54,15 @@ def command(
         out: Output folder; default out/gridsearch-DESIGN.
     """
     from compare.runtime.stages import Stages
+    from geometry.mesh.settings import MeshSettings
+    from solvers.registry import make_solver
     from studies.gridsearch.search import grid_study, runs_table, search_grid
     from studies.gridsearch.training_run import FAILED, best_of
     from studies.sweep.job import StudyJob
 
-    design, mesh = finger.read(options.preset)
-    finger.check_cost(design, mesh, ["fem"])
+    design, sizes = finger.read(options.preset)
+    mesh = sizes or MeshSettings()  # a run is given the finger's section, without the mesh of its file
+    finger.check_cost(design, mesh, [make_solver("fem")])
     physics.read(options.preset)  # or says what is wrong with it
     rates, weights = read_values("learning-rates", learning_rates), read_values("bc-weights", bc_weights)
     study = grid_study(

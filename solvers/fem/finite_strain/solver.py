@@ -18,7 +18,7 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
-from solvers.solver import ElementSettings, Progress, check_problem, silent
+from solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
 
 MOST = 2 / 3
 """Coarse elements over the given ones up to which the load is followed on them."""
@@ -45,6 +45,7 @@ class FemNonlinearSolver(ElementSettings):
     loads = ("mean", "point", "patch", "cylinder")
     friction = True
     parts = True
+    cost = Cost(per_triangle=140)
 
     def __post_init__(self) -> None:
         super().__post_init__()

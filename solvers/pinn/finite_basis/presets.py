@@ -20,7 +20,7 @@ from solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
 from solvers.problem import Problem
 from solvers.shared_work import SharedWork
 from solvers.solution import Solution
-from solvers.solver import Progress
+from solvers.solver import Cost, Progress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +91,7 @@ class TrainedPinnSolver(PinnLocalSolver):
     name: ClassVar[str] = "pinn-std"
     preset: ClassVar[str] = "trained"
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+    cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=120)
 
     def equilibrium(
         self, network: ConstrainedNetwork, coarse: FiniteBasisField | None, progress: Progress
@@ -119,6 +120,7 @@ class PinnAsmSolver(MarkerSettings, PinnStdSolver):
     """The network of `PinnStdSolver` with the markers' misfit."""
 
     name: ClassVar[str] = "pinn-asm"
+    cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=1.7)  # beside pinn-std, whose work it shares
     twin: ClassVar[str] = "fem-asm"
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     refitter = _refitter

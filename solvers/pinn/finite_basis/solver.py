@@ -32,7 +32,7 @@ from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.shared_work import shared
 from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Cost, Progress, check_problem, silent
 
 Train = Callable[[float, FiniteBasisField | None, Progress], tuple[ConstrainedNetwork, LoadStep]]
 """Trains one refinement level, of a scale of the spacings, starting from the coarser level's field."""
@@ -83,6 +83,7 @@ class FiniteBasisSolver(NetworkSolver):
     seed: int = 0
     laws: ClassVar[tuple[str, ...]] = LAWS
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
+    cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=6)
 
     def __post_init__(self) -> None:
         self.check_positive(*(name for name in self._of_network if name not in ("seed", "growth")))

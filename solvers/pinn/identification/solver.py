@@ -24,7 +24,7 @@ from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Cost, Family, Progress, check_problem, silent
 
 WINDOWS = PinnLocalSolver(wall_spacing=0.65, corner_spacing=0.026, growth=0.65, cell=0.42)
 """On the default finger with elements of 0.25 and 0.5 mm the von Mises stress is 4.5 and 5.2 % from the truth
@@ -60,6 +60,7 @@ class PinnIdSolver(IdentifyingSolver):
     laws: ClassVar[tuple[str, ...]] = LAWS
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
     friction: ClassVar[bool] = True
+    cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=17)
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.spacing) and self.spacing > 0):

@@ -33,7 +33,7 @@ from solvers.pinn.paper.training import (
 from solvers.pinn.threading import pool, torch_threads
 from solvers.problem import Problem, contact_functional
 from solvers.solution import Solution
-from solvers.solver import Progress, TrainingContext, check_problem, silent
+from solvers.solver import Cost, Progress, TrainingContext, check_problem, silent
 
 PRECISIONS = {"single": torch.float32, "double": torch.float64}
 
@@ -85,6 +85,7 @@ class PaperPinnSolver(NetworkSolver):
     _context: TrainingContext = field(default=TrainingContext(), init=False, repr=False, compare=False)
     name: ClassVar[str] = "pinn-std"
     preset: ClassVar[str] = "paper"
+    cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=16_600)
 
     def __post_init__(self) -> None:
         self.check_positive("epochs", "learning_rate", "bc_weight", "width", "layers")

@@ -62,8 +62,12 @@ class Said:
     def stage(self, name: str) -> "Said":
         return self
 
+    def told(self, name: str, fraction: float = 1.0, note: str = "") -> None:
+        if note.isdigit():
+            print(note, flush=True)
+
     def __enter__(self) -> Progress:
-        return lambda fraction, note: print(note, flush=True) if note.isdigit() else None
+        return lambda fraction, note: self.told("", fraction, note)
 
     def __exit__(self, *_: object) -> None:
         pass

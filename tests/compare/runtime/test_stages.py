@@ -33,6 +33,17 @@ def test_a_log_has_a_line_a_stage_with_its_last_note():
     assert shown(log) == "mesh: 0.0 s\nfem: 0.0 s, all [of] the load\n"
 
 
+def test_stages_of_other_processes_overlap_and_end_when_they_say_so():
+    log = console(terminal=False)
+    with Stages(log) as stages, stages.stage("fem"):
+        stages.told("gp", 0.0, "")
+        stages.told("statfem", 0.5, "half")
+        stages.told("gp", 0.9, "nearly")
+        stages.told("gp")
+    assert shown(log) == "gp: 0.0 s, nearly\nfem: 0.0 s\n"
+    assert set(stages.seconds) == {"gp", "fem"}
+
+
 def test_a_long_note_stays_one_line_in_a_log():
     log = console(terminal=False)
     with Stages(log) as stages, stages.stage("fem") as progress:

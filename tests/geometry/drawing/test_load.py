@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from geometry import Design, MeshSettings, UserError
+from geometry.cache import expected_triangles, finger_mesh
 from geometry.drawing.checks import least_thickness
 from geometry.drawing.description import Description, load_description
 from geometry.drawing.drawn_finger import DrawnFinger, description_lines
@@ -214,6 +215,15 @@ def test_mesh_with_groups_is_taken_as_it_is(tmp_path):
     assert pickle.loads(pickle.dumps(finger)).digest == finger.digest
     assert finger.definition()["mesh"] == mesh.digest
     assert finger.at_contact(30).mesh is None
+
+
+def test_the_mesh_of_the_file_is_left_when_sizes_are_given_even_the_default_ones(tmp_path):
+    finger = finger_from_file(write_beam_mesh(tmp_path / "beam.msh"))
+    own, default = finger_mesh(finger), finger_mesh(finger, settings=MeshSettings())
+    assert own.digest == finger.mesh.digest
+    assert len(default.triangles) > 4 * len(own.triangles)
+    assert expected_triangles(finger, None) == len(own.triangles)
+    assert expected_triangles(finger, MeshSettings()) == pytest.approx(len(default.triangles), rel=0.15)
 
 
 @pytest.mark.parametrize("path", FILES, ids=IDS)

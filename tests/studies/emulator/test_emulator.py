@@ -15,12 +15,14 @@ from pinnray.cli import main
 from solvers.finger_figures import QUANTITIES, Quantity
 from solvers.finger_figures.measures import narrowest_gap, thinnest_wall
 from studies.emulator import emulator as module
+from studies.emulator import store
 from studies.emulator.emulator import Emulator
+from studies.emulator.inputs import Inputs
 from studies.emulator.store import FILE, emulator_of
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
 from studies.sweep.study import Study, Value
-from studies.sweep.sweep import JOURNAL
+from studies.sweep.sweep import JOURNAL, load_sweep
 from tests.studies.emulator.sweeps import DATA, solved_sweep, synthetic_sweep
 
 TRAINED = 200
@@ -202,6 +204,14 @@ def test_more_samples_fit_it_again(tmp_path: Path) -> None:
             journal.add(each)
     after = emulator_of(folder)
     assert (before.count, after.count) == (30, 40)
+
+
+def test_another_version_of_a_library_fits_it_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sweep = load_sweep(folder)
+    inputs = Inputs(sweep.study, {})
+    before = store.digest_of(sweep, inputs)
+    monkeypatch.setattr(store, "package_versions", lambda: {"scipy": "9"})
+    assert store.digest_of(sweep, inputs) != before
 
 
 def test_too_few_samples_are_told(tmp_path: Path) -> None:

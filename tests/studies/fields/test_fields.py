@@ -16,7 +16,7 @@ from solvers.lagrange import LagrangeField
 from solvers.problem import Load, Material, Problem
 from studies.fields.emulator import FieldEmulator, fitted_fields, places
 from studies.fields.reader import FieldReader
-from studies.fields.store import _assembled, _parts
+from studies.fields.store import _assembled, _parts, fields_of
 from studies.sweep.field_path import FieldPath, MovedMesh
 from studies.sweep.job import StudyJob
 from studies.sweep.sampling import samples
@@ -79,6 +79,33 @@ def test_an_emulator_is_kept_whole(emulator):
     first, second = (each.predict(sample, 7.0) for each in (emulator, again))
     assert np.array_equal(first.nodal, second.nodal)
     assert (first.figures, first.intervals, first.error) == (second.figures, second.intervals, second.error)
+
+
+CHANGED = {
+    "nothing": lambda patch, now: now,
+    "another sample is lost": lambda patch, now: replace(now, lost=[{**now.lost[0], "radius": 15.0}]),
+    "a sample was lost for another reason": lambda patch, now: replace(now, reasons=["refused"]),
+    "samples of other values": lambda patch, now: replace(now, samples=now.samples[::-1]),
+    "another version of a library": lambda patch, now: (
+        patch.setattr("studies.fields.store.package_versions", lambda: {"scipy": "9"}),
+        now,
+    )[1],
+}
+
+
+@pytest.mark.parametrize("what", CHANGED)
+def test_an_emulator_is_kept_for_what_it_was_fitted_to(what, emulator, tmp_path, monkeypatch):
+    now = known(study(), [{"contact_position": 59.0, "radius": 4.5}])
+    fitted = []
+    monkeypatch.setattr("studies.fields.store.KnownSamples.of", lambda folder: now)
+    monkeypatch.setattr("studies.fields.store.Snapshots.load", lambda known: known)
+    monkeypatch.setattr(
+        "studies.fields.store.fitted_fields", lambda known, stages: fitted.append(known) or emulator
+    )
+    fields_of(tmp_path)
+    now = CHANGED[what](monkeypatch, now)
+    fields_of(tmp_path)
+    assert len(fitted) == (1 if what == "nothing" else 2)
 
 
 def test_the_reader_reads_what_the_figures_of_a_solution_say():

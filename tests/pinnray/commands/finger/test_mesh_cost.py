@@ -5,13 +5,19 @@ import re
 import pytest
 
 from compare.runtime.exits import BAD_INPUT
-from geometry.cache import finger_mesh
+from geometry.cache import drawn_finger, finger_mesh
+from geometry.drawing.description import Description
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
 from geometry.mesh.element_size import estimated_triangles
 from geometry.mesh.settings import MeshSettings
 from pinnray.cli import main
-from pinnray.options.cost import EXPERIMENT, MeshCost, check_mesh_cost
+from pinnray.options.cost import MeshCost, check_mesh_cost
+from pinnray.options.preset_jobs import job_defaults
+from solvers.registry import PRESETS, make_solver
+from solvers.solver import Cost, Traits
+from tests.compare.pipeline.endings import Ending
+from tests.geometry.drawing.files import write_beam_mesh
 
 
 @pytest.mark.parametrize(("name", "size"), [("default", 0.25), ("csiro", 0.12), ("slender", 0.1)])
@@ -49,15 +55,34 @@ def test_consent_goes_on(tmp_path, monkeypatch):
 
 
 def test_the_size_that_is_advised_needs_no_consent():
-    finger, parts = load_design("default"), [EXPERIMENT, "fem-nonlinear"]
+    finger, solvers = load_design("default"), [make_solver("fem-nonlinear")]
     with pytest.raises(UserError) as refused:
-        check_mesh_cost(finger, MeshSettings(size=0.02), parts)
+        check_mesh_cost(finger, MeshSettings(size=0.02), solvers, simulated=True)
     advised = float(str(refused.value).rpartition(" ")[2])
     assert 0.02 < advised < 0.25
-    check_mesh_cost(finger, MeshSettings(size=advised), parts)
+    check_mesh_cost(finger, MeshSettings(size=advised), solvers, simulated=True)
+
+
+def test_the_mesh_of_a_file_needs_no_consent_unless_a_size_is_asked_for(tmp_path, monkeypatch):
+    finger = drawn_finger(write_beam_mesh(tmp_path / "beam.msh"), Description())
+    monkeypatch.setattr("pinnray.options.cost.free_memory_gb", lambda: 0.1)
+    check_mesh_cost(finger, None, [make_solver("fem")])
+    with pytest.raises(UserError, match=r"--mesh-size 0\.25 gives about"):
+        check_mesh_cost(finger, MeshSettings(), [make_solver("fem")])
 
 
 def test_every_default_needs_no_consent():
     """On a machine with 4 GB, the mesh of the paper's preset included."""
-    assert MeshCost(182_000, ["mesh", EXPERIMENT, "fem", "pinn-std", "pinn-asm"]).seconds < 300
-    assert MeshCost(18_193, [EXPERIMENT, "fem", "fem-nonlinear", "fem-asm", "fem-id", "statfem"]).fits(4.0)
+    paper, default = (job_defaults(preset).solvers.split(",") for preset in ("paper", None))
+    of_paper = [make_solver(name, **({"preset": "paper"} if name in PRESETS else {})) for name in paper]
+    assert MeshCost(182_000, of_paper, simulated=True).seconds < 300
+    assert MeshCost(18_193, [make_solver(name) for name in default], simulated=True).fits(4.0)
+
+
+def test_a_solver_says_what_it_costs_and_one_that_says_nothing_counts_as_fem():
+    class Slow(Ending):
+        cost = Cost(per_triangle=1000.0, fixed=60.0)
+
+    assert MeshCost(18_000, [Slow("slow")]).seconds - MeshCost(18_000).seconds == pytest.approx(18)
+    assert Traits.of(Slow("slow")).cost.seconds(18_000) == pytest.approx(78)
+    assert Traits.of(Ending("silent")).cost == Traits.of(make_solver("fem")).cost

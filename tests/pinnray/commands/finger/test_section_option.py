@@ -4,9 +4,15 @@ from pathlib import Path
 
 import pytest
 
+from compare.crossval.study import CrossvalStudy
+from compare.pipeline.job import Job
+from geometry.cache import drawn_finger
+from geometry.drawing.description import Description
 from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.mesh.settings import MeshSettings
 from pinnray.cli import main
 from pinnray.options.shared import FingerOptions
+from tests.geometry.drawing.files import write_beam_mesh
 
 BEAM = "M 0 0 L 0 -10 L 60 -10 L 60 0 Z"
 
@@ -53,6 +59,38 @@ def test_solve_works_on_a_drawing(tmp_path: Path, capsys: pytest.CaptureFixture[
     options = ["--solver", "fem", "--mesh-size", "1", "--out", str(tmp_path / "u.vtu")]
     assert main(["solve", "--section", str(drawing(tmp_path)), *options]) == 0
     assert "energy" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("line", "own"),
+    [
+        ("", True),  # taken as it is
+        ("--mesh-size 0.25", False),  # the default of other fingers, asked for
+    ],
+)
+def test_the_mesh_of_a_file_is_left_only_for_a_size_that_is_asked_for(line, own, tmp_path, capsys):
+    file = write_beam_mesh(tmp_path / "beam.msh")
+    assert main(["mesh", "--section", str(file), *line.split(), "--out", str(tmp_path / "out")]) == 0
+    kept = drawn_finger(file, Description()).mesh
+    assert kept is not None
+    assert (f", {len(kept.triangles)} triangles" in capsys.readouterr().out) == own
+
+
+def test_no_command_takes_its_usual_size_for_one_that_is_asked_for(tmp_path: Path) -> None:
+    options, usual = FingerOptions(section=write_beam_mesh(tmp_path / "beam.msh")), MeshSettings(size=0.5)
+    finger, sizes = options.read("fast", usual)
+    assert sizes is None
+    assert (Job(finger, []).mesh, CrossvalStudy(design=finger, variants=[], out=tmp_path).mesh) == (
+        None,
+        None,
+    )
+    assert FingerOptions().read("fast", usual)[1] == usual
+    assert FingerOptions(mesh_size=0.25).read("fast", usual)[1] == MeshSettings()
+    design = FingerOptions().read()[0]
+    assert Job(design, []).mesh == MeshSettings()
+    assert CrossvalStudy(design=design, variants=[], out=tmp_path).mesh == usual
+    asked = MeshSettings()
+    assert Job(finger, [], mesh=asked).mesh == asked
 
 
 @pytest.mark.parametrize(
