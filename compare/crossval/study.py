@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from compare.crossval.folds import ALL, SCHEMES
-from compare.evaluation.truths import SLIDING, TRUTHS, Truth, check_truths
+from compare.evaluation.truths import EVERY_TRUTH, SLIDING, TRUTHS, Truth, check_truths
 from compare.runtime.output_folder import job_definition
 from compare.runtime.provenance import cores
 from geometry.arrays import FloatArray
@@ -26,8 +26,6 @@ ELEMENT_SIZE = 0.5
 """Usual element size, mm: `fem` is off by 0.01 mm at the markers, a hundredth of its model error."""
 FEWEST_MARKERS = 3
 """Some to hold out and some to give."""
-EVERY_TRUTH = "all"
-"""Name that stands for every truth."""
 
 
 @dataclass(frozen=True)

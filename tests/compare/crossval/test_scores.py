@@ -23,9 +23,9 @@ from compare.crossval.folds import (
 from compare.crossval.output_files import draw_fields, draw_held_out, draw_weight_sweeps
 from compare.crossval.result import Case, CaseResult, CrossvalResult
 from compare.crossval.scores import Difference, ScoreInterval, differences, of_scheme, score
-from compare.crossval.study import EVERY_TRUTH, CrossvalStudy, solver_variants
+from compare.crossval.study import CrossvalStudy, solver_variants
 from compare.crossval.tables import truth_tables, verdict_sentences
-from compare.evaluation.truths import TRUTHS
+from compare.evaluation.truths import EVERY_TRUTH, TRUTHS
 from compare.runtime.tables import terminal_table
 from geometry.finger.design import Design
 from solvers.problem import Material, Problem
