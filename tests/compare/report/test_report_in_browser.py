@@ -3,8 +3,6 @@
 import csv
 import io
 import re
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,40 +11,11 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from compare.evaluation.evaluation import Evaluation
-from compare.figures import Picture
-from compare.figures.gallery import draw
-from compare.report.html_report import write_report
 from compare.runtime.html import write_html
 from compare.runtime.tables import TextTable
 from geometry.mesh.triangle_mesh import TriangleMesh
-from tests.compare.report.browser import SOFTWARE_WEBGL, TIMEOUT, Opened, chromium, opened
-
-TITLES = {"marker_errors": "Errors at the markers", "von_mises": "Von Mises stress"}
-"""Beginnings of the alternative texts of the pictures."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium(*SOFTWARE_WEBGL) as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def written(estimated, pinn, failed, evaluate, compared, tmp_path_factory) -> Path:
-    """A report with four solvers, one of which followed the load, a truth and two pictures."""
-    folder = tmp_path_factory.mktemp("report")
-    given = replace(evaluate("pinn-asm", 1.02), in_sample=True, left_out=estimated.marker_displacement)
-    end, fractions = failed.node_displacement, np.array([0.0, 0.5, 1.0])
-    path = np.stack([0 * end, 0.1 * end, end])  # far from linear
-    followed = replace(failed, path=path, history={"load_fraction": fractions})
-    comparison = compared(estimated, pinn, followed, given, truth=evaluate("fem-nonlinear", 1.05))
-    pictures = []
-    for name in TITLES:
-        drawing = draw(comparison, name)
-        picture = drawing.figure.save(folder / f"{name}.png")
-        pictures.append(Picture(picture, drawing.title, drawing.caption, drawing.alt))
-    write_report(folder / "report.html", comparison, pictures, {"seed": 17})
-    return folder / "report.html"
+from tests.compare.report.browser import TIMEOUT, Opened, opened
+from tests.compare.report.conftest import TITLES
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """Several finished runs side by side: `pinnray report`."""
 
-import csv
 import json
 import re
 from collections.abc import Callable
@@ -14,6 +13,7 @@ from compare.report.output_files import metrics
 from compare.report.runs import differing_settings, read_runs
 from geometry.atomic import write_json
 from pinnray.cli import main
+from tests.compare.tables import rows_of
 
 Save = Callable[..., Path]
 
@@ -48,8 +48,7 @@ def test_one_run_gives_its_answers(save: Save, capsys: pytest.CaptureFixture[str
 def test_several_runs_are_one_page_and_one_table(save: Save, tmp_path: Path) -> None:
     runs = [save("first"), save("second", 1.1, seed=7)]
     assert main(["report", *map(str, runs), "--out", str(tmp_path / "both")]) == 0
-    with (tmp_path / "both" / "runs.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(tmp_path / "both" / "runs.csv")
     assert [(row["run"], row["solver"]) for row in rows] == [
         (run, solver) for run in ("first", "second") for solver in ("fem", "pinn-std", "fem-asm")
     ]
@@ -81,32 +80,6 @@ def test_runs_of_one_name_are_told_apart_by_their_paths(save: Save) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ([], "no run was given"),
-        (["nowhere"], "there is no folder nowhere"),
-        (["empty"], "empty has no metrics.json"),
-        (["damaged"], "metrics.json is damaged"),
-        (["foreign"], "is not of `compare`"),
-        (["first", "first"], "a run is given twice"),
-        (["first", "--out", "elsewhere"], "--out is for several runs"),
-        (["first", "second", "--out", "first/run.json"], "is a file"),
-    ],
-)
-def test_a_wrong_folder_is_refused_in_a_line(save, tmp_path, monkeypatch, capsys, arguments, words):
-    save("first"), save("second")
-    for name, text in (("damaged", "{"), ("foreign", json.dumps({"schema": 99}))):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "metrics.json").write_text(text, encoding="utf-8")
-        (tmp_path / name / "run.json").write_text("{}", encoding="utf-8")
-    (tmp_path / "empty").mkdir()
-    monkeypatch.chdir(tmp_path)
-    assert main(["report", *arguments]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert words in line
-
-
-@pytest.mark.parametrize(
     ("solver", "key", "value"),
     [("pinn-std", "to_reference", None), ("pinn-std", "energy", "1.1"), ("fem-asm", "markers", [])],
 )
@@ -116,6 +89,4 @@ def test_a_run_that_lacks_a_number_is_one_line(save, capsys, solver, key, value)
     content["solvers"][solver][key] = value
     write_json(folder / "metrics.json", content)
     assert main(["report", str(folder)]) == 2
-    assert capsys.readouterr().err.endswith(
-        "metrics.json is damaged: a number is missing; make the run again\n"
-    )
+    assert "metrics.json is damaged: a number is missing" in capsys.readouterr().err
