@@ -22,10 +22,6 @@ def test_it_is_the_difference_of_the_improved_solution(estimated):
     assert own.mae_markers == pytest.approx(estimated.marker_uncertainty.sum(axis=1).mean())
 
 
-def test_a_solver_without_an_estimate_has_none(fem):
-    assert (fem.uncertainty, fem.marker_uncertainty) == (None, None)
-
-
 @pytest.mark.parametrize("name", ["estimated", "fem"])
 def test_it_comes_back_from_disk(name, request, tmp_path):
     before: Evaluation = request.getfixturevalue(name)
