@@ -219,23 +219,6 @@ def test_simulated_markers_of_a_file_are_called_simulated_everywhere(
     assert "measured" not in printed.out + printed.err
 
 
-@pytest.mark.filterwarnings("default:cannot write to the cache folder")
-def test_a_cache_that_cannot_be_written_is_a_warning_and_the_study_keeps_its_truths(
-    tmp_path, capsys, monkeypatch, in_line
-):
-    (tmp_path / "cache").touch()  # a file, not a folder
-    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
-    line, out = "--solvers gp --schemes one-out --seeds 1", tmp_path / "out"
-    assert run(line, out) == 0
-    said = r"warning: cannot write to the cache folder .*cache \(File exists\), so that the virtual exp"
-    assert re.search(said, capsys.readouterr().err)
-    (kept,) = (out / "truths").iterdir()
-    before = kept.stat().st_mtime_ns
-    assert run(line, out) == 0
-    assert kept.stat().st_mtime_ns == before
-    assert "virtual experiment" not in capsys.readouterr().err
-
-
 def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, observations):
     study = CrossvalStudy(
         design=Design(),
@@ -261,29 +244,6 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
     pulled = replace(study, measurements=None, truths=["mixed"], load=Load(displacement=(1.0, 0.0)))
     with pytest.raises(UserError, match="truth mixed: a cylinder presses on the finger: prescribe a v"):
         cross_validate(pulled)
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("--seeds 0", "seeds 0: give a whole number from 1"),
-        ("--noise -1", "noise -1: give a standard deviation of zero or more"),
-        ("--schemes tip", "there is no scheme 'tip'; there are one-out, tip-out, random, load-out"),
-        ("--load patch --solvers fem,gp", "load-out presses elsewhere on the same mesh"),
-        ("--solvers fem,fem", "a solver is named twice: fem, fem"),
-        ("--measurements nowhere.csv", "there is no file nowhere.csv"),
-        ("--layouts front,back", "marker_layout = 'back': input should be 'front' or 'joints'"),
-        ("--truth tip", "there is no truth 'tip'; there are all, sliding, stvk, gent, print, base, cylinder"),
-        ("--truth base,base", "truth: name at least one of sliding, stvk, gent, print, base, cylinder"),
-        ("--layouts front,front", "layouts: a layout is named twice: front, front"),
-        ("--layouts joints --set rib_count=0 --set name=plain", "needs 3 markers, not the 1 of the layout"),
-    ],
-)
-def test_bad_input_is_one_line(tmp_path, capsys, line, said):
-    assert run(line, tmp_path / "out") == 2
-    (error,) = [text for text in capsys.readouterr().err.splitlines() if text.startswith("error")]
-    assert said in error
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():

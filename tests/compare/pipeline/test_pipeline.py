@@ -26,7 +26,7 @@ from geometry.registration import FIXED, HAND_HELD
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
-from solvers.solver import NoSolutionError, Progress, silent
+from solvers.solver import Progress, silent
 from tests.compare.pipeline.runs import compare
 from tests.compare.tables import rows_of
 from vision.measurements import read_measurements
@@ -241,24 +241,6 @@ def test_other_measurements_are_assimilated_again(job, tmp_path):
 
 # Stopped halfway
 
-STOPS = [
-    pytest.param(OSError("a fault of the system"), id="error"),
-    pytest.param(UserError("a problem that it cannot solve"), id="refusal"),
-    pytest.param(KeyboardInterrupt(), id="Ctrl-C"),
-]
-
-
-@pytest.mark.parametrize("stop", STOPS)
-def test_a_run_that_is_stopped_leaves_the_last_result_and_what_it_finished(job, stop):
-    complete = job(Scripted("old"))
-    compare(complete)
-    before = files(complete.out)
-    with pytest.raises(type(stop)):
-        compare(job(Scripted("first"), Scripted("second", stop)))
-    assert files(complete.out) == before
-    kept = complete.out.with_name("run.partial")
-    assert [path.name for path in (kept / "solutions").iterdir()] == ["first.npz"]
-
 
 def test_a_run_goes_on_without_a_solver_that_raises(job):
     """The line names solver, exception and place; the traceback is kept, and so is the rest."""
@@ -277,14 +259,6 @@ def test_a_run_goes_on_without_a_solver_that_raises(job):
     compare(job(Scripted("first"), Scripted("third"), resume=True))  # its file is one of the run's own
 
 
-def test_a_run_goes_on_without_a_solver_that_finds_no_solution(job):
-    """Nobody needs a traceback of that."""
-    found = compare(job(Scripted("first"), Scripted("second", NoSolutionError("no equilibrium near rest"))))
-    assert [evaluation.solver for evaluation in found.evaluations] == ["first"]
-    assert found.failed == {"second": "second found no solution: no equilibrium near rest"}
-    assert not (job().out / "errors").exists()
-
-
 @pytest.mark.parametrize("reference", [None, "second"], ids=["nothing is left", "it is the reference"])
 def test_a_run_without_the_solver_that_it_needs_ends_in_one_line(job, reference):
     solvers = [Scripted("first")] * (reference is not None) + [Scripted("second", KeyError("x"))]
@@ -300,13 +274,6 @@ def test_several_equilibria_are_told(job, monkeypatch):
     assert said in compare(job(Scripted("first"))).remarks
 
 
-@pytest.mark.parametrize("stop", STOPS)
-def test_a_run_that_is_stopped_before_it_finished_anything_leaves_nothing(job, tmp_path, stop):
-    with pytest.raises(type(stop)):
-        compare(job(Scripted("first", stop)))
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_resumed_run_does_not_solve_again_and_gives_the_same(job, tmp_path):
     whole = compare(job(Scripted("first"), Scripted("second"), out=tmp_path / "whole"))
     first, second = Scripted("first"), Scripted("second", KeyboardInterrupt())
@@ -319,32 +286,6 @@ def test_a_resumed_run_does_not_solve_again_and_gives_the_same(job, tmp_path):
     assert sorted(files(tmp_path / "out" / "run")) == sorted(files(tmp_path / "whole"))
     for name in ("markers.csv", "observations.csv", "fields/first.vtu"):
         assert (tmp_path / "out" / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
-
-
-def test_a_resumed_run_adds_a_solver_to_a_finished_one_and_drops_another(job):
-    """Both hand their work to `fem`, and keep their own names."""
-    first, second = Scripted("first"), Scripted("second")
-    compare(job(first))
-    outcome = compare(job(first, second, resume=True))
-    assert (first.calls, second.calls) == (1, 1)
-    assert list(metrics(outcome)["solvers"]) == ["first", "second"]
-    compare(job(second, resume=True))
-    assert second.calls == 1
-    assert [path.name for path in (job().out / "solutions").iterdir()] == ["second.npz"]
-
-
-@pytest.mark.parametrize(
-    "spoil", [lambda whole: whole[: len(whole) // 2], lambda whole: b"", lambda whole: b"x"]
-)
-def test_a_damaged_solution_is_solved_again(job, spoil):
-    first = Scripted("first")
-    whole = compare(job(first))
-    (file,) = (job(first).out / "solutions").iterdir()
-    file.write_bytes(spoil(file.read_bytes()))
-    with pytest.warns(RuntimeWarning, match=r"first\.npz is damaged .* and is made again"):
-        resumed = compare(job(first, resume=True))
-    assert first.calls == 2
-    assert without_times(metrics(resumed)) == without_times(metrics(whole))
 
 
 @pytest.mark.parametrize(

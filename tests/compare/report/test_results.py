@@ -115,8 +115,6 @@ def test_the_numbers_are_those_of_the_metrics(numbers, fem, pinn, observations):
     assert told["markers"]["ae_u"] == errors.ae_u.tolist()
     assert told["markers"]["ae_v"] == errors.ae_v.tolist()
     assert [told["markers"][name] for name in ERRORS] == [getattr(errors, name) for name in ERRORS]
-        each: getattr(errors, each) for each in ERRORS
-    }
     to = told["to_reference"]
     assert to["rel_l2_displacement"] == differences.displacement.rel_l2 == pytest.approx(0.1)
     assert to["rel_l2_von_mises"] == differences.von_mises.rel_l2 == pytest.approx(0.1)

@@ -115,12 +115,6 @@ def test_a_quantity_of_which_the_frame_says_nothing_is_learnt_too(tmp_path, monk
     assert emulator_of(folder).predict([finger]).column("new") == pytest.approx(1.6**2, rel=1e-3)
 
 
-def test_some_quantities_alone_are_the_same(emulator: Emulator) -> None:
-    some, every = emulator.predict([FINGER], ["von_mises", "force_50"]), emulator.predict([FINGER])
-    assert some.names == ("force_50", "von_mises")
-    assert [some.column(name) for name in some.names] == [every.column(name) for name in some.names]
-
-
 def test_it_is_kept_to_the_bit(folder: Path, emulator: Emulator, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "fitted_emulator", None)  # a second fit would fail
     first, again = emulator.predict([FINGER]), emulator_of(folder).predict([FINGER])
@@ -186,11 +180,6 @@ def test_what_it_cannot_predict_is_told(emulator: Emulator, change: dict[str, Va
     assert words in str(emulator.inputs.fault({**FINGER, **change}))
 
 
-def test_a_missing_parameter_is_told(emulator: Emulator) -> None:
-    finger = {name: value for name, value in FINGER.items() if name != "tip_length"}
-    assert emulator.inputs.fault(finger) == "tip_length is missing; give 14 to 26 mm"
-
-
 def test_more_samples_fit_it_again(tmp_path: Path) -> None:
     folder = solved_sweep(tmp_path / "s", count=30, left_out=("wrap", "tip_v", "von_mises"))
     before = emulator_of(folder)
@@ -202,11 +191,6 @@ def test_more_samples_fit_it_again(tmp_path: Path) -> None:
             journal.add(each)
     after = emulator_of(folder)
     assert (before.count, after.count) == (30, 40)
-
-
-def test_too_few_samples_are_told(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="has 19 converged samples, and an emulator needs at least 20"):
-        emulator_of(solved_sweep(tmp_path / "s", count=19))
 
 
 @pytest.fixture
@@ -265,13 +249,3 @@ def test_the_command_refuses_in_one_line(folder, emulator, arguments, words, cap
     told = capsys.readouterr().err
     assert words in told
     assert told.count("\n") == 1
-
-
-def test_a_sweep_of_drawings_is_refused(tmp_path: Path) -> None:
-    from studies.emulator.inputs import Inputs
-
-    study = Study(
-        name="drawn", samples=4, fixed={"section": "a.dxf"}, varied={"stroke": {"from": 1, "to": 5}}
-    )
-    with pytest.raises(UserError, match="the sweep drawn is of drawings"):
-        Inputs(study, {})

@@ -1,7 +1,6 @@
 """The search on a law with a known front, its repetition, and the command on real fingers."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from json import loads
 from pathlib import Path
 
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 
 from compare.evaluation.deformed_body import THROUGH_ITSELF
-from compare.runtime.stages import Stages
 from geometry.cache import finger_mesh
 from geometry.drawing.drawn_finger import finger_from
 from geometry.errors import UserError
@@ -18,14 +16,14 @@ from pinnray.cli import main
 from solvers.finger_figures import QUANTITIES
 from solvers.problem import Problem
 from studies.optimum.designs import write_designs
-from studies.optimum.page import ends_sentence, front_grid, front_sentences, page_tables, spread, tip_sentence
+from studies.optimum.page import front_grid, front_sentences, page_tables, spread
 from studies.optimum.pictures import cylinder_at_end
 from studies.optimum.question import Limit, Question
 from studies.optimum.search import Optimum, search_front
 from studies.sweep.job import StudyJob, Task
 from studies.sweep.measurement import Measurement, measured
 from studies.sweep.store import Journal
-from studies.sweep.study import Range, physics_of
+from studies.sweep.study import physics_of
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 
@@ -149,13 +147,6 @@ def test_constraints_that_nothing_obeys_are_told(tmp_path: Path, monkeypatch: py
         search_front(StudyJob(asked, Path(), tmp_path / "out", 1))
 
 
-def test_ranges_in_which_no_finger_can_be_made_are_told(tmp_path: Path) -> None:
-    thick = {"rib_thickness": Range(**{"from": 25.0, "to": 30.0})}
-    asked = QUESTION.model_copy(update={"varied": thick})
-    with pytest.raises(UserError, match=r"only 0 of 896 fingers in these ranges can be made \(ribs overlap"):
-        search_front(StudyJob(asked, Path(), tmp_path / "out", 1), Stages(quiet=True))
-
-
 def test_the_command_writes_the_front(tmp_path, capsys, monkeypatch):
     """The tutorial of the page for designers has the same on fingers that are solved."""
     monkeypatch.setattr("studies.optimum.search.finish", judge)
@@ -239,19 +230,6 @@ def test_the_tables_of_the_page_are_narrow_and_complete(found: Optimum) -> None:
     }
     letters = [sum(max(map(len, heading.split("\n"))) + 2 for heading in table.headings) for table in tables]
     assert max(letters) < 130  # of the 140 that 62 rem hold
-
-
-def test_parameters_at_the_ends_of_their_ranges_are_told(found: Optimum) -> None:
-    fingers = [{**each, "front_thickness": 2.5} for each in found.fingers]
-    (sentence,) = ends_sentence(replace(found, fingers=fingers))
-    count = len(found.front)
-    assert f"front_thickness ({count} at 2.5 mm)" in sentence
-    assert "rib_thickness" not in sentence
-
-
-def test_sharp_tips_are_told() -> None:
-    assert "tip_radius = 0 mm" in tip_sentence(0.0)[0]
-    assert tip_sentence(0.5) == []
 
 
 def test_the_cylinder_is_drawn_where_it_ends(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ import sqlite3
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -66,15 +65,6 @@ def test_a_sample_is_kept_once(tmp_path: Path) -> None:
         assert journal.measurements() == [Measurement(3, "done", "fine", 0.1, {"force": 1.5})]
         with pytest.raises(sqlite3.IntegrityError):
             journal.add(Measurement(3, "done", "again", 0.1))
-
-
-def test_a_damaged_journal_is_told_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / JOURNAL).write_bytes(b"no database at all, but longer than a header" * 9)
-    with (
-        pytest.raises(UserError, match=r"cannot use .*journal.sqlite: file is not a database"),
-        opened(tmp_path / JOURNAL),
-    ):
-        pass
 
 
 def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
@@ -280,34 +270,6 @@ def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(monk
     ):
         found = {each.number: each.state for each in workers.answers(tasks)}
     assert found == {0: "done", 1: "failed", 2: "done"}
-
-
-REFUSED: dict[str, tuple[Callable[[Path], list[str]], str]] = {
-    "no file": (lambda folder: [str(folder / "none.toml")], "cannot read the study"),
-    "no scheduler": (
-        lambda folder: [str(study_file(folder, 2)), "--scheduler", "tcp://127.0.0.1:9"],
-        "scheduler tcp://127.0.0.1:9: no Dask scheduler answers there",
-    ),
-    "no address": (
-        lambda folder: [str(study_file(folder, 2)), "--scheduler", "nowhere"],
-        "scheduler nowhere: no Dask scheduler answers there",
-    ),
-    "no workers": (lambda folder: [str(study_file(folder, 2)), "--processes", "0"], "--processes 0"),
-}
-
-
-@pytest.mark.parametrize(("arguments", "message"), REFUSED.values(), ids=REFUSED)
-def test_the_command_refuses_in_one_line(tmp_path, capsys, monkeypatch, arguments, message):
-    monkeypatch.setattr("studies.sweep.workers.WAIT_S", 1)
-    assert main(["sweep", *arguments(tmp_path), "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
-
-
-def test_an_empty_folder_is_no_sweep(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"holds no sweep; make one by `pinnray sweep STUDY.toml`"):
-        load_sweep(tmp_path)
 
 
 def test_a_journal_of_others_removes_no_file(tmp_path: Path) -> None:
