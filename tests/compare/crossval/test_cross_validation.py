@@ -49,8 +49,6 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     line = "--solvers fem,gp,fem-asm --schemes tip-out --solver-set fem-asm.choose=given"
     assert run(f"{line} --seeds 1 --pictures pdf", tmp_path) == 0
     assert {path.name for path in tmp_path.glob("*.pdf")} == {"fields.pdf", "l_curve.pdf"}
-    said = " ".join(capsys.readouterr().out.split())
-    assert "the third of the markers nearest the tip held out together; simulated markers, mm" in said
     joints = layouts_of(tmp_path)["joints"]
     assert list(joints["solvers"]) == ["fem", "gp", "fem-asm"]
     assert joints["solvers"]["fem"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["low"] is None
@@ -80,12 +78,10 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     assert "holds a cross-validation with other settings (noise_mm)" in capsys.readouterr().err
 
 
-def test_layouts_sample_one_truth_and_stay_apart(tmp_path, capsys, in_line):
+def test_layouts_sample_one_truth_and_stay_apart(tmp_path, in_line):
     """`fem` has one field, so its distance from the truth is the same; its errors at markers are not."""
     line = "--solvers fem,gp --schemes one-out --seeds 1"
     assert run(f"{line} --layouts front,joints", tmp_path) == 0
-    said = capsys.readouterr().out
-    assert all(f"markers: {layout}" in said for layout in ("front", "joints"))
     rows = rows_of(tmp_path / "held_out.csv", "layout", "solver", "scheme")
     assert list(rows)[::4] == [("front", "fem", "all"), ("joints", "fem", "all")]
     layouts = layouts_of(tmp_path)
@@ -95,8 +91,6 @@ def test_layouts_sample_one_truth_and_stay_apart(tmp_path, capsys, in_line):
     )
     assert fields[0] == pytest.approx(fields[1], rel=1e-9)
     assert errors == pytest.approx([0.43, 0.53], abs=0.02)  # where the front wall alone is seen, and all
-    assert "Do these verdicts depend on the layout of the markers?" in (tmp_path / "report.html").read_text()
-
     # One layout alone reuses its folds, and has what it had beside the other.
     kept = tmp_path / "runs" / "sliding" / "front" / "gp" / "seed-0.json"
     before = kept.stat().st_mtime_ns
@@ -111,10 +105,6 @@ def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
     assert run(line, tmp_path) == 0
     said = capsys.readouterr().out
     assert all(len(each) <= 80 for each in said.splitlines() if not each.startswith(str(tmp_path)))
-    words = " ".join(said.split())
-    assert "solver cylinder base" in words
-    assert "fem against gp: worse with every truth in held-out error; better with every truth in" in words
-    assert "base: other law, walls and load than every solver" in words
     rows = rows_of(tmp_path / "truths.csv", "truth", "solver")
     assert list(rows) == [(truth, name) for truth in ("cylinder", "base") for name in ("fem", "gp")]
     assert rows["cylinder", "fem"]["mae_sum_against_gp"] == "worse"
@@ -131,9 +121,6 @@ def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
     assert abs(forces[0] - forces[1]) > 0.05
     names = [f"{name}-{truth}.png" for name in ("fields", "held_out") for truth in ("base", "cylinder")]
     assert sorted(path.name for path in tmp_path.glob("*.png")) == names
-    report = (tmp_path / "report.html").read_text()
-    assert "Truth: cylinder" in report
-    assert "With which truths is a solver better" in report
 
     assert run(line.replace("cylinder,base", "base"), tmp_path) == 0
     assert layouts_of(tmp_path, "base") == content["truths"]["base"]["layouts"]
@@ -251,12 +238,8 @@ def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
     from pinnray.options.shared import SolverOptions
 
     variants = read_variants(SolverOptions(), "fem,fem-asm", Material())
-    assert [variant.label for variant in variants] == [
-        "fem",
-        "fem-asm",
-        "fem-asm left-out",
-        "fem-asm evidence",
-    ]
+    labels = ["fem", "fem-asm", "fem-asm left-out", "fem-asm evidence"]
+    assert [variant.label for variant in variants] == labels
     assert [variant.settings.get("choose") for variant in variants] == [None, "given", "left-out", "evidence"]
     fixed = SolverOptions(solver_set=("fem-asm.choose=left-out",))
     assert [variant.label for variant in read_variants(fixed, "fem-asm", Material())] == ["fem-asm"]
@@ -264,6 +247,7 @@ def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
     assert [variant.label for variant in read_variants(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]
 
 
+@pytest.mark.slow
 def test_turned_pictures_are_told_and_cost_statfem_little(tmp_path, in_line):
     """Its held-out error is that of straight pictures within a half; `fem` knows of no picture."""
     frame, errors = '--frame "turn 3 deg, shift 0.3 mm, scale 1 %"', {}

@@ -181,10 +181,6 @@ def test_a_circle_shows_a_training_error_that_vanishes(fem, pinn, observations, 
     np.testing.assert_array_equal(circles.get_ydata(), figure.axes[2].get_ylim()[0])
 
 
-def test_a_difference_has_its_scale_beside_its_name(pages: dict[str, Page]) -> None:
-    assert re.search(r"minus fem, ±[\d.e-]+ MPa", pages["von_mises"].text)
-
-
 def test_a_marker_that_was_not_seen_has_no_bar(pages: dict[str, Page]) -> None:
     for axes in pages["marker_errors"].figure.axes:
         middles = {round(bar.get_x() + bar.get_width() / 2) for bar in axes.patches}
@@ -253,14 +249,6 @@ def test_ticks_of_six_characters_leave_room_for_the_labels(fem, pinn, compared):
     assert page_of(draw(compared(near, replace(pinn, history=history)), "convergence").figure).cut_off() == []
     follower = replace(pinn, history=followed, reaction=np.array([0.0, -0.0021]))
     assert page_of(draw(compared(follower), "force_displacement").figure).cut_off() == []
-
-
-def test_the_field_of_the_truth_is_drawn_where_it_is_known(fem, pinn, compared):
-    with_truth, without = (
-        page_of(draw(compared(fem, **known), "von_mises").figure).text for known in ({"truth": pinn}, {})
-    )
-    assert "truth" in with_truth
-    assert "truth" not in without
 
 
 def test_errors_of_solvers_that_are_far_apart_are_all_seen(fem, pinn, compared, observations):

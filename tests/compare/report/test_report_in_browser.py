@@ -15,7 +15,6 @@ from compare.runtime.html import write_html
 from compare.runtime.tables import TextTable
 from geometry.mesh.triangle_mesh import TriangleMesh
 from tests.compare.report.browser import TIMEOUT, Opened, opened
-from tests.compare.report.conftest import TITLES
 
 
 @pytest.fixture(scope="module")
@@ -175,22 +174,6 @@ def test_a_table_is_copied_as_csv_and_latex(desk: Opened) -> None:
     assert r", \%" in latex
 
 
-def test_the_button_puts_the_table_on_the_clipboard(desk: Opened) -> None:
-    page = desk.page
-    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    page.get_by_role("button", name="Copy as CSV: Mean absolute error").click()
-    page.get_by_text("copied as CSV").wait_for()
-    assert page.evaluate("navigator.clipboard.readText()").startswith("Solver,")
-
-
-def test_paper_has_every_part_unfolded(desk: Opened) -> None:
-    page = desk.page
-    page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = false))")
-    page.emulate_media(media="print")
-    assert page.locator("#viewer").is_hidden()
-    assert page.locator("#design table").bounding_box()["height"] > 20
-
-
 def height(page: Page) -> int:
     return int(page.evaluate("document.documentElement.scrollHeight"))
 
@@ -212,15 +195,6 @@ def test_a_table_that_goes_on_says_so_and_no_name_breaks(desk: Opened) -> None:
     ] * 3  # the names with hyphens
     page.set_viewport_size({"width": 1400, "height": 900})
     page.wait_for_function("!document.querySelector('#table-one').parentElement.matches('.cut')")
-
-
-def test_a_picture_grows_on_a_click(desk: Opened) -> None:
-    image = desk.page.get_by_alt_text(re.compile(TITLES["marker_errors"]))
-    before = image.bounding_box()["width"]
-    image.click()
-    assert image.bounding_box()["width"] > 1.4 * before
-    image.click()
-    assert image.bounding_box()["width"] == before
 
 
 def test_a_whole_report_is_short_and_prints_on_few_pages(browser: Browser, finished: Path) -> None:

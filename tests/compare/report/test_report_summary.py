@@ -48,10 +48,6 @@ def test_a_network_that_did_not_converge_is_not_trusted(compared, fem, evaluate)
     assert "pinn-std (not converged): it moves on." in found[CONVERGED].sentences
 
 
-def test_without_a_network_nobody_asks_for_it(compared, fem, failed):
-    assert TRUST not in asked(compared(fem, failed))
-
-
 def test_the_error_of_the_model_is_not_laid_on_the_network(compared, fem, evaluate):
     network, blame = evaluate("pinn-std", 1.001), "That is the error of the model and its load"
     far = asked(compared(fem, network, truth=evaluate("fem-nonlinear", 1.5)))[TRUST]
@@ -75,13 +71,6 @@ def test_stress_and_force_are_answered_where_they_are_known(compared, fem, given
     answer = asked(compared(fem, stronger, truth=evaluate("fem-nonlinear", 1.5)))[MARKERS]
     assert answer.verdict.endswith("in displacement fem-asm, in von Mises stress fem-asm, in force none.")
     assert "simulated body" in answer.verdict
-
-
-def test_measured_markers_are_never_called_simulated(compared, fem, given, observe):
-    seen = observe(fem.marker_displacement + np.array([0.3, -0.4]), simulated=False, hidden=(1,))
-    found = asked(compared(fem, given, observations=seen))
-    assert "measured" in found[MARKERS].verdict
-    assert "simulated" not in str(found)
 
 
 @pytest.mark.parametrize(("low", "word"), [(0.4, "inside"), (0.6, "outside")])
