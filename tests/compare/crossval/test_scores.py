@@ -67,12 +67,10 @@ def outcome_of(scheme: str, held: tuple[int, ...], errors: object, **more: objec
 def test_scores_by_hand():
     seeds = [
         [
-            outcome_of(
-                ONE, (marker,), errors, deviations=spread, fields={"displacement": off, "von_mises": 0.2}
-            )
+            outcome_of(ONE, (marker,), errors, deviations=spread, fields=off | {"von_mises": 0.2})
             for marker, errors, spread, off in (
-                (0, [[a, -2.0], [0.1, 0.3]], [[2.0, 0.5], [1.0, 1.0]], a / 10),
-                (1, [[0.2, -0.1], [0.5, 4.0]], [[1.0, 1.0], [1.0, 1.0]], 0.3),
+                (0, [[a, -2.0], [0.1, 0.3]], [[2.0, 0.5], [1.0, 1.0]], {"displacement": a / 10}),
+                (1, [[0.2, -0.1], [0.5, 4.0]], [[1.0, 1.0], [1.0, 1.0]], {"displacement": 0.3}),
             )
         ]
         for a in (1.0, 2.0)

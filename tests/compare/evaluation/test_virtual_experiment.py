@@ -154,14 +154,6 @@ def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache
     assert not cache.exists()
 
 
-def test_another_truth_has_its_law_and_load(problem, solutions):
-    observations, _ = virtual_experiment(problem, 0.8, truth=TRUTHS["gent"])
-    assert solutions[0].problem.material.law == "gent"
-    assert "Gent, which stiffens" in observations.source
-    virtual_experiment(problem, 0.8)
-    assert len(solutions) == 2  # the cache tells them apart
-
-
 def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, monkeypatch):
     """It is sampled on the shared mesh, and differs from plane strain as the depth makes it differ."""
     monkeypatch.setattr("compare.evaluation.truths.SOLID_SIZE", 2.5)

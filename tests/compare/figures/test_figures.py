@@ -262,15 +262,6 @@ def test_errors_of_solvers_that_are_far_apart_are_all_seen(fem, pinn, compared, 
     assert min(heights) > 0.1
 
 
-def test_energy_and_convergence_are_two_pictures_with_letters(pages: dict[str, Page]) -> None:
-    assert "share of the load" in pages["energy"].text
-    assert "hidden units of the network" not in pages["energy"].text
-    assert "share of the load" not in pages["convergence"].text
-    words = [word for word, _ in pages["convergence"].words]
-    assert {"(a)", "(b)"} <= {*words}
-    assert "(a)" not in [word for word, _ in pages["energy"].words]  # one panel needs none
-
-
 def test_differences_are_from_the_truth_where_it_is_known(fem, pinn, evaluate, compared):
     known = compared(fem, pinn, truth=evaluate("fem-nonlinear", 1.05))
     text = page_of(draw(known, "von_mises").figure).text
@@ -300,14 +291,3 @@ def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, c
     ):
         with pytest.raises(UserError, match=said):
             draw(comparison, name, solvers)
-
-
-def test_all_pictures_are_pages_of_one_file_with_their_captions(comparison, tmp_path, monkeypatch):
-    chosen = {name: GALLERY[name] for name in ("marker_errors", "mesh")}
-    monkeypatch.setattr("compare.figures.gallery.GALLERY", chosen)
-    draw_all(tmp_path, comparison, formats=["pdf"])
-    boxes = re.findall(rb"/MediaBox \[([^\]]*)\]", (tmp_path / "all.pdf").read_bytes())
-    sizes = [[float(number) / 72 for number in box.split()] for box in boxes]
-    assert [size[2] for size in sizes] == pytest.approx([WIDTH] * 2)
-    for name, size in zip(chosen, sizes, strict=True):
-        assert size[3] > draw(comparison, name).figure.get_figheight() + 0.3  # its caption

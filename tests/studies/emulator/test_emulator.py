@@ -89,12 +89,6 @@ def test_intervals_hold_for_most_fingers_that_it_has_not_seen(emulator, unseen):
     assert 0.9 <= np.mean(held) <= 0.995  # of 300, whose standard deviation is 0.013
 
 
-def test_quantities_in_constant_ratio_stay_so(emulator: Emulator) -> None:
-    found = emulator.predict([FINGER])
-    assert emulator.ratios.keys() == {"force_50"}
-    assert found.column("force_50") == pytest.approx(found.column("force") / 2, rel=1e-12)
-
-
 def test_quantities_of_the_section_are_exact(emulator: Emulator) -> None:
     design = Design(**FINGER, marker_diameter=0.4)
     found = emulator.predict([FINGER])
@@ -120,17 +114,6 @@ def test_it_is_kept_to_the_bit(folder: Path, emulator: Emulator, monkeypatch: py
     first, again = emulator.predict([FINGER]), emulator_of(folder).predict([FINGER])
     for one, other in zip(first.__dict__.values(), again.__dict__.values(), strict=True):
         assert np.array_equal(one, other)
-
-
-def test_a_fit_is_repeatable(tmp_path: Path) -> None:
-    made = [
-        emulator_of(synthetic_sweep(tmp_path / name, small_study(40), smooth)).predict(
-            [{"rib_thickness": 1.3, "front_thickness": 1.1}], ["force", "tip_v"]
-        )
-        for name in "ab"
-    ]
-    assert np.array_equal(made[0].values, made[1].values)
-    assert np.array_equal(made[0].high, made[1].high)
 
 
 def test_a_function_in_closed_form_is_learnt(tmp_path: Path) -> None:
@@ -233,19 +216,18 @@ def test_the_command_predicts_a_table(folder: Path, emulator: Emulator, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("line", "named"),
     [
-        ([], "give one finger by --set PARAMETER=VALUE for every varied parameter, or many by --csv"),
-        (["--set", "height=200"], "base_width is missing; give 24 to 40 mm"),
-        (["--set", "height"], "cannot read 'height'; write parameter=value"),
-        (["--set", "height=tall"], "height = 'tall' is no number; give 80 to 110 mm"),
-        (["--set", "N=4", "--set", "rib_count=4"], "rib_count is set twice"),
-        (["--csv", "none.csv"], "there is no file none.csv"),
-        (["--set", "N=4", "--out", "x.csv"], "--out is for the predictions of --csv"),
+        ("", "--set"),
+        ("--set height=200", "base_width"),
+        ("--set height", "height"),
+        ("--set height=tall", "tall"),
+        ("--set N=4 --set rib_count=4", "rib_count"),
+        ("--csv none.csv", "none.csv"),
+        ("--set N=4 --out x.csv", "--out"),
     ],
 )
-def test_the_command_refuses_in_one_line(folder, emulator, arguments, words, capsys):
-    assert main(["predict", str(folder), *arguments]) == 2
-    told = capsys.readouterr().err
-    assert words in told
-    assert told.count("\n") == 1
+def test_the_command_refuses_in_one_line(folder, emulator, line, named, capsys):
+    assert main(["predict", str(folder), *line.split()]) == 2
+    (told,) = capsys.readouterr().err.splitlines()
+    assert named in told

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compare.runtime.exits import INTERRUPTED, NOT_CONVERGED
+from compare.runtime.exits import NOT_CONVERGED
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
@@ -224,15 +224,6 @@ def test_another_search_in_the_same_folder_is_refused(wanted, scripted, changes,
 def run_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> int:
     monkeypatch.chdir(tmp_path)
     return main(shlex.split("gridsearch --learning-rates 1e-3 --bc-weights 1,10 --mesh-size 1 --epochs 2"))
-
-
-def test_an_interrupted_search_says_how_to_go_on(tmp_path, capsys, monkeypatch, scripted):
-    def interrupted(point: GridPoint) -> float:
-        raise KeyboardInterrupt
-
-    scripted(interrupted)
-    assert run_on_the_command_line(tmp_path, monkeypatch) == INTERRUPTED
-    assert "goes on from what out/gridsearch-default keeps" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_a_run_that_failed_is_named(tmp_path, capsys, monkeypatch, scripted):
