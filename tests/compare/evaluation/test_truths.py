@@ -103,6 +103,7 @@ def test_walls_that_a_design_cannot_have_are_refused_with_the_name_of_the_truth(
         TRUTHS["base"].finger(tight)
 
 
+@pytest.mark.usefixtures("few_elements")
 def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, coarse_mesh):
     """By hand, as before there were other truths; force and contact are those of the solution."""
     found = true_field(study, SLIDING)

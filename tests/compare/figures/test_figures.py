@@ -56,7 +56,7 @@ def pages(drawings: dict[str, Illustration]) -> dict[str, Page]:
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
     """In letters, not in pixels; and the same file every time."""
-    monkeypatch.setattr("compare.figures.gallery.GALLERY", {"marker_errors": GALLERY["marker_errors"]})
+    monkeypatch.setattr("compare.figures.gallery.GALLERY", {"energy": GALLERY["energy"]})
     first, second = (
         [path.read_bytes() for path in sorted(folder.glob(f"*.{kind}"))]
         for folder in (tmp_path / "first", tmp_path / "second")

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from compare.evaluation.evaluation import Evaluation
@@ -28,30 +27,6 @@ def viewer(desk: Opened) -> Page:
     desk.page.evaluate("document.getElementById('viewer').scrollIntoView()")
     desk.page.locator("#viewer[data-ready]").wait_for()
     return desk.page
-
-
-def painted(page: Page) -> set[tuple[int, int, int]]:
-    """The colours on the canvas of the field viewer."""
-    shot = Image.open(io.BytesIO(page.locator("#viewer-canvas").screenshot())).convert("RGB")
-    return {colour for _, colour in shot.getcolors(shot.width * shot.height)}
-
-
-def test_the_field_is_drawn_switched_and_zoomed(viewer: Page) -> None:
-    first = painted(viewer)
-    assert len(first) > 50
-    viewer.select_option("#viewer-solver", label="pinn-std")
-    viewer.select_option("#viewer-quantity", label="Von Mises stress")
-    viewer.select_option("#viewer-show", label="minus fem")
-    assert viewer.inner_text("#viewer-title") == "Von Mises stress, MPa: pinn-std minus fem"
-    assert "a scale of its own" in viewer.inner_text("#viewer-note")
-    viewer.wait_for_timeout(300)
-    second = painted(viewer)
-    assert len(second - first) > 20
-    before = viewer.locator("#viewer-canvas").screenshot()
-    viewer.locator("#viewer-canvas").focus()
-    viewer.keyboard.press("+")
-    viewer.wait_for_timeout(300)
-    assert viewer.locator("#viewer-canvas").screenshot() != before
 
 
 def test_the_middle_is_read_by_the_keyboard(viewer: Page, pinn: Evaluation, mesh: TriangleMesh) -> None:

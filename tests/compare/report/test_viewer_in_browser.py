@@ -130,6 +130,7 @@ def test_a_field_is_shown_minus_the_truth(viewer: Page, pinn: Evaluation, truth:
     viewer.select_option("#viewer-quantity", label="Von Mises stress")
     viewer.select_option("#viewer-show", label="minus truth")
     assert viewer.inner_text("#viewer-title") == "Von Mises stress, MPa: pinn-std minus truth"
+    assert "a scale of its own" in viewer.inner_text("#viewer-note")
     expected = pinn.per_triangle(pinn.von_mises - truth.von_mises)
     found = fields(viewer, 1, 1, 1.0, "'truth'")
     np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(expected).max())

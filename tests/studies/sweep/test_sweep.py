@@ -13,20 +13,16 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from compare.figures.style import axes_at
 from geometry.cache import cad_files
 from geometry.errors import UserError
-from geometry.figure import figure
 from geometry.finger.design import Design
 from pinnray.cli import main
 from solvers.solution import Solution
 from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement, measured
-from studies.sweep.pictures import draw_medians
 from studies.sweep.quantities import quantities
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
@@ -212,15 +208,6 @@ def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     longer = study.model_copy(update={"time_limit": 4.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
-
-
-def test_medians_are_drawn_of_enough_samples_alone() -> None:
-    with figure(2.0) as drawn:
-        axes = axes_at(drawn, (1, 1, 1, 1))
-        for count, lines in ((16, 0), (64, 1)):
-            places = np.linspace(0, 1, count)
-            draw_medians(axes, places, places)
-            assert len(axes.lines) == lines
 
 
 def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
