@@ -1,12 +1,16 @@
 """Names of the refused expressions of `compare`."""
 
+# ruff: noqa: F401, because the expressions of approved.txt use the names
+
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
 
-from compare.evaluation.truths import Truth
+from compare.crossval.folds import load_cases_of
+from compare.evaluation.plausibility import check_positions, displacement_remarks
+from compare.evaluation.truths import TRUTHS, Truth, virtual_experiment
 from geometry.arrays import FloatArray
 from geometry.finger.design import Design
 from geometry.mesh.mesher import build_mesh

@@ -1,12 +1,18 @@
 """Names of the refused expressions of `studies`."""
 
+# ruff: noqa: F401, because the expressions of approved.txt use the names
+
 from pathlib import Path
 
+from studies.emulator.inputs import Inputs
 from studies.emulator.store import emulator_of
 from studies.optimum.question import Question, load_question
+from studies.optimum.search import search_front
 from studies.sweep.job import StudyJob
 from studies.sweep.sampling import samples
+from studies.sweep.store import opened
 from studies.sweep.study import Study, load_study
+from studies.sweep.sweep import load_sweep
 from tests.studies.emulator.sweeps import solved_sweep
 
 RIBS = "[varied]\nrib_thickness = {from = 1, to = 2}\n"

@@ -43,6 +43,11 @@ def test_a_solver_that_was_asked_for_is_not():
         supported_solvers(SOLVERS, ("a", "b"), Material(), PATCH)
 
 
+def test_a_job_that_no_solver_can_do_is_refused():
+    with pytest.raises(UnsupportedProblemError):
+        supported_solvers([SOLVERS[0], SOLVERS[2]], ("a", "c"), Material(), PATCH)
+
+
 def test_solvers_with_the_same_reason_share_a_line():
     assert unsupported_remarks({"a": "no load", "b": "too few markers", "c": "no load"}) == [
         "left out: a, c (no load)",

@@ -25,7 +25,7 @@ from geometry.registration import FIXED, HAND_HELD
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, silent
+from solvers.solver import NoSolutionError, Progress, silent
 from tests.compare.pipeline.runs import compare
 from tests.compare.tables import rows_of
 from vision.measurements import read_measurements
@@ -256,6 +256,13 @@ def test_a_run_goes_on_without_a_solver_that_raises(job):
     assert "RuntimeError: a fault" in trace
     assert json.loads((out / "run.json").read_text())["failed"] == {"second": line}
     compare(job(Scripted("first"), Scripted("third"), resume=True))  # its file is one of the run's own
+
+
+def test_a_run_goes_on_without_a_solver_that_finds_no_solution(job):
+    """Nobody needs a traceback of that."""
+    found = compare(job(Scripted("first"), Scripted("second", NoSolutionError("no equilibrium near rest"))))
+    assert found.failed == {"second": "second found no solution: no equilibrium near rest"}
+    assert not (job().out / "errors").exists()
 
 
 @pytest.mark.parametrize("reference", [None, "second"], ids=["nothing is left", "it is the reference"])

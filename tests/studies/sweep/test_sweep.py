@@ -13,16 +13,21 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from compare.figures.style import axes_at
 from geometry.cache import cad_files
 from geometry.errors import UserError
+from geometry.figure import figure
 from geometry.finger.design import Design
 from pinnray.cli import main
 from solvers.solution import Solution
 from studies.sweep.job import StudyJob
 from studies.sweep.measurement import Measurement, measured
+from studies.sweep.page import slow_sentence
+from studies.sweep.pictures import draw_medians
 from studies.sweep.quantities import quantities
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
@@ -208,6 +213,20 @@ def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     longer = study.model_copy(update={"time_limit": 4.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
+
+
+def test_a_finger_that_takes_much_longer_than_the_others_is_told(tmp_path: Path) -> None:
+    found = [Measurement(number, "done", "", 64.0 if number == 2 else 0.6) for number in range(3)]
+    (sentence,) = slow_sentence(Sweep(load_study(study_file(tmp_path, 3)), [{}] * 3, found))
+    assert sentence.startswith("Number 2 took 64 s")
+
+
+def test_medians_are_drawn_of_enough_samples_alone() -> None:
+    with figure(2.0) as drawn:
+        axes = axes_at(drawn, (1, 1, 1, 1))
+        for count, lines in ((16, 0), (64, 1)):
+            draw_medians(axes, np.linspace(0, 1, count), np.linspace(0, 1, count))
+            assert len(axes.lines) == lines
 
 
 def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
