@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -46,5 +47,5 @@ def moved(change: Callable[[FloatArray], FloatArray]) -> Observations:
     return replace(markers(), displacements=change(markers().displacements))
 
 
-def pressed(**load: object) -> Problem:
+def pressed(**load: Any) -> Problem:
     return replace(PROBLEM, load=Load(**load))
