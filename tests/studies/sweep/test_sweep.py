@@ -191,26 +191,26 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("ending", "state", "said"),
+    ("ending", "limit", "state", "said"),
     [
-        (hang_at_one, "not converged", "stopped at the time limit"),
-        (die_at_one, "failed", "its worker process died"),
+        (hang_at_one, 8.0, "not converged", "stopped at the time limit"),
+        (die_at_one, 500.0, "failed", "its worker process died"),
     ],
 )
 def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
-    tmp_path, monkeypatch, request, ending, state, said
+    tmp_path, monkeypatch, request, ending, limit, state, said
 ):
     monkeypatch.setattr("studies.sweep.workers._measured", ending)
     monkeypatch.setattr("studies.sweep.workers.GRACE_S", 1.0)
     monkeypatch.setattr("studies.sweep.workers.DEATHS", 2)
-    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": 3.0})
+    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
     sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", state, "done"]
     assert [(row[0], row[2]) for row in failure_grid(sweep).rows] == [(state, said)]
     assert list(sample_table(sweep)["state"]) == ["done", state, "done"]
     monkeypatch.setattr("studies.sweep.workers._measured", answered)
     request.getfixturevalue("in_line")
-    longer = study.model_copy(update={"time_limit": 4.0})
+    longer = study.model_copy(update={"time_limit": 600.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
 
