@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from compare.crossval.folds import ALL, SCHEMES
-from compare.evaluation.truths import SLIDING, TRUTHS, Truth, check_truths
+from compare.evaluation.truths import EVERY_TRUTH, SLIDING, TRUTHS, Truth, check_truths
 from compare.runtime.output_folder import job_definition
 from compare.runtime.provenance import cores
 from geometry.arrays import FloatArray
@@ -27,8 +27,6 @@ SIZES = MeshSettings(size=0.5)
 """Usual element sizes: `fem` is off by 0.01 mm at the markers, a hundredth of its model error."""
 FEWEST_MARKERS = 3
 """Some to hold out and some to give."""
-EVERY_TRUTH = "all"
-"""Name that stands for every truth."""
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,10 @@ walls, laws and loads. The distance of those models from it is of the size and p
 between simulation and experiment.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import radians, tan
+from math import isfinite, radians, tan
 
 import numpy as np
 
@@ -22,10 +23,22 @@ from geometry.finger.section import rib_feet, rib_pitch, rib_slope
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from solvers.elasticity import LawName
-from solvers.problem import Load, Material, Problem
+from solvers.problem import Load, LoadKind, Material, Problem
 from solvers.registry import MissingLibraryError, make_solver
 from solvers.solution import Solution
 from solvers.solver import Progress, Solver, silent
+
+EVERY_TRUTH = "all"
+"""The name that stands for every truth."""
+
+LAWS: Mapping[str, tuple[LawName, ...]] = {
+    "fem-nonlinear": ("neo-hookean", "st-venant-kirchhoff", "gent"),
+    "fem-3d": ("neo-hookean", "st-venant-kirchhoff"),
+}
+"""Laws of finite strain of the solvers that simulate; here too, since the solvers need DOLFINx."""
+
+WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
+"""Walls that can be thicker or thinner than drawn: those of `WallMotion`."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +57,10 @@ class Truth:
         slope: Displacement of the indenter along the front over the stroke; None lets a patch slide.
         solid: Whether the finger has its depth, with side faces free of traction, of which one is seen; else
             it is in plane strain.
+
+    Raises:
+        UserError: If no solver has the law, a wall does not exist or keeps no thickness, a constant of the
+            material or the load cannot be, or the name or the description cannot be shown.
     """
 
     name: str
@@ -56,6 +73,33 @@ class Truth:
     friction: float = 0.0
     slope: float | None = None
     solid: bool = False
+
+    def __post_init__(self) -> None:
+        try:
+            self._check()
+        except UserError as error:
+            raise UserError(f"truth {self.name}: {error}") from None
+
+    def _check(self) -> None:
+        if not re.fullmatch(r"[a-z0-9][a-z0-9-]*", self.name) or self.name == EVERY_TRUTH:
+            raise UserError(f"a name has small letters, digits and '-', and {EVERY_TRUTH} is taken")
+        try:
+            self.description.format(1.0)
+        except (LookupError, ValueError, AttributeError):
+            raise UserError(
+                "in its description, write {:.4g} once for the stroke and no other braces"
+            ) from None
+        if self.law not in LAWS[self.solver]:
+            raise UserError(f"{self.solver} has no law {self.law!r}; it has {', '.join(LAWS[self.solver])}")
+        for name, value in (*self.scaled.items(), *self.thicker.items()):
+            if name not in WALLS:
+                raise UserError(f"there is no wall {name!r}; there are {', '.join(WALLS)}")
+            if not isfinite(value) or (name in self.scaled and self.scaled[name] <= 0):
+                raise UserError(f"{name}: {value:g}: give a factor above 0, or an addition in mm")
+        if self.radius is not None and self.slope is None:
+            raise UserError("a cylinder does not slide freely; give its slope, such as 0, and its friction")
+        self.material(Material())
+        self.load(1.0)
 
     @property
     def solver(self) -> str:
@@ -116,16 +160,14 @@ class Truth:
 
     def material(self, material: Material) -> Material:
         """The material with its law and Poisson's ratio."""
-        own = {} if self.poisson is None else {"poisson": self.poisson}
-        return material.model_copy(update={"law": self.law, "plane": "strain", **own})
+        poisson = material.poisson if self.poisson is None else self.poisson
+        return Material(young=material.young, poisson=poisson, law=self.law).made_of(material.substance)
 
     def load(self, stroke: float) -> Load:
         """Its load for a stroke into the finger, mm."""
         along = None if self.slope is None else self.slope * stroke
-        if self.radius is None:
-            return Load(kind="patch", displacement=(along, -stroke))
-        moved = (along, -stroke)
-        return Load(kind="cylinder", displacement=moved, radius=self.radius, friction=self.friction)
+        kind: LoadKind = "patch" if self.radius is None else "cylinder"
+        return Load(kind, displacement=(along, -stroke), radius=self.radius, friction=self.friction)
 
 
 _PRINTED = {"front_thickness": 1.05, "back_thickness": 0.95, "rib_thickness": 1.05}
@@ -189,6 +231,8 @@ _TRUTHS = (
 )
 TRUTHS: Mapping[str, Truth] = {truth.name: truth for truth in _TRUTHS}
 """Every truth by name."""
+if len(TRUTHS) < len(_TRUTHS):
+    raise UserError(f"two truths have one name: {', '.join(truth.name for truth in _TRUTHS)}")
 
 
 def check_truths(names: Sequence[str], drawn: Finger) -> None:

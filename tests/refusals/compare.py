@@ -1,1 +1,51 @@
 """Names of the refused expressions of `compare`."""
+
+# ruff: noqa: F401, because the expressions of approved.txt use the names
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+
+from compare.crossval.folds import load_cases_of
+from compare.evaluation.plausibility import check_positions, displacement_remarks
+from compare.evaluation.truths import TRUTHS, Truth, virtual_experiment
+from geometry.arrays import FloatArray
+from geometry.finger.design import Design
+from geometry.mesh.mesher import build_mesh
+from geometry.mesh.settings import MeshSettings
+from geometry.observations import Observations
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Problem
+
+FILES = {
+    "empty/notes.txt": "mine",
+    "damaged/metrics.json": "{",
+    "damaged/run.json": "{}",
+    "foreign/metrics.json": '{"schema": 99}',
+    "foreign/run.json": "{}",
+}
+truth = partial(Truth, name="mine", description="pressed in by {:.4g} mm")
+MESH = build_mesh(Design(), MeshSettings(size=2.0), across=1)
+PROBLEM = Problem(MESH)
+
+
+@cache
+def markers() -> Observations:
+    """The markers of the finger, moved as `fem` says."""
+    found = FemSolver(degree=1, estimate=False).solve(PROBLEM).displacement(MESH.markers)
+    return Observations(MESH.markers, found, np.zeros_like(found), np.full(9, True), "a test", True, 0.8)
+
+
+def turned(change: Callable[[FloatArray], FloatArray]) -> Observations:
+    return replace(markers(), points=change(MESH.markers))
+
+
+def moved(change: Callable[[FloatArray], FloatArray]) -> Observations:
+    return replace(markers(), displacements=change(markers().displacements))
+
+
+def pressed(**load: Any) -> Problem:
+    return replace(PROBLEM, load=Load(**load))

@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from compare.camera.force_estimate import FrameForce, LiveForce, LiveRate, force_line, force_rows, force_table
+from compare.camera.force_estimate import FrameForce, LiveForce, force_rows
 from compare.camera.publication import FrameLine, PublishedForce, Publisher
-from compare.runtime.exits import BAD_INPUT
 from geometry.errors import UserError
 from pinnray.cli import main
 from solvers.identification.tracker import ForceReading
@@ -60,23 +59,6 @@ def test_the_file_has_forces_for_the_depth_and_empty_cells_where_nothing_is_know
     assert second["force_low_N"] == 0
     assert second["remark"].startswith("2 of 9 markers")
     assert first.keys() == second.keys()
-
-
-def test_the_line_has_force_interval_place_and_delay():
-    assert force_line(FORCES[0], DEPTH) == (
-        "    0.00 s  force 2.00 N (1.80 to 2.20), 0.1 N/mm, at x = 34.0 mm (33.0 to 35.0); after 60 ms"
-    )
-    assert force_line(FORCES[1], DEPTH) == (
-        "    0.10 s  no force; after 10 ms; 2 of 9 markers are seen, too few for a force"
-    )
-
-
-def test_the_table_counts_what_has_no_force_and_what_was_passed_over():
-    table = force_table(FORCES, DEPTH, LiveRate(passed_over=3, rate=12.0))
-    assert "1 of 2 frames have a force" in table.caption
-    assert "live: 12 a second, 3 frames passed over; delay 35 ms, at most 60 ms" in table.caption
-    assert table.row_count == 2
-    assert force_table(FORCES[1:], DEPTH).row_count == 0
 
 
 class Recorder:
@@ -208,25 +190,6 @@ def test_a_reader_that_has_gone_is_told_in_one_line():
         with pytest.raises(UserError, match=r"the reader of \S+ has gone"):
             see(frame, seen(REST))
     os.close(writing_end)
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--young", "5"], "--young is for --force"),
-        (["--law", "neo-hookean"], "--law is for --force"),
-        (["--force", "--young", "-1"], "young (E) = -1.0: input should be greater than 0"),
-        (["--force", "--poisson", "0.5"], "poisson (nu) = 0.5: input should be less than 0.5"),
-        (["--force", "--design", "nowhere"], "nowhere"),
-        (["--publish", "-"], "--publish is for --live"),
-    ],
-)
-def test_options_that_make_no_sense_are_one_line(options, said, tmp_path, capsys):
-    assert main(["track", "film.mkv", *options, "--out", str(tmp_path / "out")]) == BAD_INPUT
-    errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error")]
-    assert len(errors) == 1
-    assert said in errors[0]
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.fixture(scope="module")

@@ -43,6 +43,7 @@ def drawn(tmp_path, monkeypatch, without_pictures):
     return figures[0], film
 
 
+@pytest.mark.slow
 def test_the_outline_of_the_right_solver_is_the_edge_of_the_finger(drawn):
     """Where the finger ends the image is half as light as beside; a body off by two pixels fails."""
     figure, film = drawn

@@ -51,8 +51,6 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     line = "--solvers fem,gp,fem-asm --schemes tip-out --solver-set fem-asm.choose=given"
     assert run(f"{line} --seeds 1 --pictures pdf", tmp_path) == 0
     assert {path.name for path in tmp_path.glob("*.pdf")} == {"fields.pdf", "l_curve.pdf"}
-    said = " ".join(capsys.readouterr().out.split())
-    assert "the third of the markers nearest the tip held out together; simulated markers, mm" in said
     joints = layouts_of(tmp_path)["joints"]
     assert list(joints["solvers"]) == ["fem", "gp", "fem-asm"]
     assert joints["solvers"]["fem"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["low"] is None
@@ -82,12 +80,10 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     assert "holds a cross-validation with other settings (noise_mm)" in capsys.readouterr().err
 
 
-def test_layouts_sample_one_truth_and_stay_apart(tmp_path, capsys, in_line):
+def test_layouts_sample_one_truth_and_stay_apart(tmp_path, in_line):
     """`fem` has one field, so its distance from the truth is the same; its errors at markers are not."""
     line = "--solvers fem,gp --schemes one-out --seeds 1"
     assert run(f"{line} --layouts front,joints", tmp_path) == 0
-    said = capsys.readouterr().out
-    assert all(f"markers: {layout}" in said for layout in ("front", "joints"))
     rows = rows_of(tmp_path / "held_out.csv", "layout", "solver", "scheme")
     assert list(rows)[::4] == [("front", "fem", "all"), ("joints", "fem", "all")]
     layouts = layouts_of(tmp_path)
@@ -97,8 +93,6 @@ def test_layouts_sample_one_truth_and_stay_apart(tmp_path, capsys, in_line):
     )
     assert fields[0] == pytest.approx(fields[1], rel=1e-9)
     assert errors == pytest.approx([0.43, 0.53], abs=0.02)  # where the front wall alone is seen, and all
-    assert "Do these verdicts depend on the layout of the markers?" in (tmp_path / "report.html").read_text()
-
     # One layout alone reuses its folds, and has what it had beside the other.
     kept = tmp_path / "runs" / "sliding" / "front" / "gp" / "seed-0.json"
     before = kept.stat().st_mtime_ns
@@ -113,10 +107,6 @@ def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
     assert run(line, tmp_path) == 0
     said = capsys.readouterr().out
     assert all(len(each) <= 80 for each in said.splitlines() if not each.startswith(str(tmp_path)))
-    words = " ".join(said.split())
-    assert "solver cylinder base" in words
-    assert "fem against gp: worse with every truth in held-out error; better with every truth in" in words
-    assert "base: other law, walls and load than every solver" in words
     rows = rows_of(tmp_path / "truths.csv", "truth", "solver")
     assert list(rows) == [(truth, name) for truth in ("cylinder", "base") for name in ("fem", "gp")]
     assert rows["cylinder", "fem"]["mae_sum_against_gp"] == "worse"
@@ -133,9 +123,6 @@ def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
     assert abs(forces[0] - forces[1]) > 0.05
     names = [f"{name}-{truth}.png" for name in ("fields", "held_out") for truth in ("base", "cylinder")]
     assert sorted(path.name for path in tmp_path.glob("*.png")) == names
-    report = (tmp_path / "report.html").read_text()
-    assert "Truth: cylinder" in report
-    assert "With which truths is a solver better" in report
 
     assert run(line.replace("cylinder,base", "base"), tmp_path) == 0
     assert layouts_of(tmp_path, "base") == content["truths"]["base"]["layouts"]
@@ -197,20 +184,11 @@ def test_what_speaks_against_a_result_is_said_everywhere(tmp_path, capsys, monke
     assert len(layouts_of(out, "measured")["measured"]["remarks"]) == 2
 
 
-def test_simulated_markers_of_a_file_are_called_simulated_everywhere(
-    tmp_path, capsys, monkeypatch, in_line, observations
-):
-    headings = []
-    monkeypatch.setattr(
-        "compare.crossval.output_files.write_heading", lambda _, *texts: headings.extend(texts)
-    )
+def test_simulated_markers_of_a_file_are_called_simulated_everywhere(tmp_path, capsys, in_line, observations):
     file, out = tmp_path / "markers.csv", tmp_path / "out"
     write_measurements(file, replace(observations, simulated=True, source="made up"))
     assert run(f"--measurements {file} --solvers fem,gp --schemes one-out --seeds 1", out) == 0
     printed = capsys.readouterr()
-    assert "simulated markers, mm" in " ".join(printed.out.split())
-    assert "against simulated displacements" in " ".join(headings)
-    assert "displacements are simulated: made up." in (out / "report.html").read_text()
     written = [path for path in out.rglob("*") if path.suffix in (".json", ".csv", ".html")]
     assert len(written) > 5
     for path in written:
@@ -219,23 +197,6 @@ def test_simulated_markers_of_a_file_are_called_simulated_everywhere(
     for name in ("held_out.csv", "folds.csv"):
         assert set(rows_of(out / name, "truth", "layout")) == {("simulated", "simulated")}, name
     assert "measured" not in printed.out + printed.err
-
-
-@pytest.mark.filterwarnings("default:cannot write to the cache folder")
-def test_a_cache_that_cannot_be_written_is_a_warning_and_the_study_keeps_its_truths(
-    tmp_path, capsys, monkeypatch, in_line
-):
-    (tmp_path / "cache").touch()  # a file, not a folder
-    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
-    line, out = "--solvers gp --schemes one-out --seeds 1", tmp_path / "out"
-    assert run(line, out) == 0
-    said = r"warning: cannot write to the cache folder .*cache \(File exists\), so that the virtual exp"
-    assert re.search(said, capsys.readouterr().err)
-    (kept,) = (out / "truths").iterdir()
-    before = kept.stat().st_mtime_ns
-    assert run(line, out) == 0
-    assert kept.stat().st_mtime_ns == before
-    assert "virtual experiment" not in capsys.readouterr().err
 
 
 def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, observations):
@@ -293,40 +254,13 @@ def test_a_class_of_the_calling_script_is_judged_beside_solvers_in_processes(tmp
     assert list(layouts_of(tmp_path / "out", "measured")["measured"]["solvers"]) == ["gp", name]
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("--seeds 0", "seeds 0: give a whole number from 1"),
-        ("--noise -1", "noise -1: give a standard deviation of zero or more"),
-        ("--schemes tip", "there is no scheme 'tip'; there are one-out, tip-out, random, load-out"),
-        ("--load patch --solvers fem,gp", "load-out presses elsewhere on the same mesh"),
-        ("--solvers fem,fem", "a solver is named twice: fem, fem"),
-        ("--measurements nowhere.csv", "there is no file nowhere.csv"),
-        ("--layouts front,back", "marker_layout = 'back': input should be 'front' or 'joints'"),
-        ("--truth tip", "there is no truth 'tip'; there are all, sliding, stvk, gent, print, base, cylinder"),
-        ("--truth base,base", "truth: name at least one of sliding, stvk, gent, print, base, cylinder"),
-        ("--layouts front,front", "layouts: a layout is named twice: front, front"),
-        ("--layouts joints --set rib_count=0 --set name=plain", "needs 3 markers, not the 1 of the layout"),
-    ],
-)
-def test_bad_input_is_one_line(tmp_path, capsys, line, said):
-    assert run(line, tmp_path / "out") == 2
-    (error,) = [text for text in capsys.readouterr().err.splitlines() if text.startswith("error")]
-    assert said in error
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
     from pinnray.commands.comparison.crossval import read_variants
     from pinnray.options.shared import SolverOptions
 
     variants = read_variants(SolverOptions(), "fem,fem-asm", Material())
-    assert [variant.label for variant in variants] == [
-        "fem",
-        "fem-asm",
-        "fem-asm left-out",
-        "fem-asm evidence",
-    ]
+    labels = ["fem", "fem-asm", "fem-asm left-out", "fem-asm evidence"]
+    assert [variant.label for variant in variants] == labels
     assert [variant.settings.get("choose") for variant in variants] == [None, "given", "left-out", "evidence"]
     fixed = SolverOptions(solver_set=("fem-asm.choose=left-out",))
     assert [variant.label for variant in read_variants(fixed, "fem-asm", Material())] == ["fem-asm"]
@@ -334,6 +268,7 @@ def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
     assert [variant.label for variant in read_variants(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]
 
 
+@pytest.mark.slow
 def test_turned_pictures_are_told_and_cost_statfem_little(tmp_path, in_line):
     """Its held-out error is that of straight pictures within a half; `fem` knows of no picture."""
     frame, errors = '--frame "turn 3 deg, shift 0.3 mm, scale 1 %"', {}

@@ -142,7 +142,7 @@ def test_a_class_that_cannot_be_made_from_its_settings_is_refused_in_one_line():
         SolverVariant("drawing", Fixed()).make(1)
 
 
-@pytest.mark.parametrize("name", ["gp", "fem-asm", "fem-id", "statfem"])
+@pytest.mark.parametrize("name", ["gp", "fem-asm", pytest.param("fem-id", marks=pytest.mark.slow), "statfem"])
 def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name):
     """A marker that is held out is moved by 5 mm: so is its error, and no prediction changes."""
     fold = Fold(ONE, "marker 4", (3,))
@@ -206,6 +206,7 @@ def test_what_was_learnt_is_carried_to_half_the_load(task, name):
     assert outcomes[2].fields["displacement"] == pytest.approx(outcomes[0].fields["displacement"], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_an_identified_finger_is_carried_to_half_the_load(task, coarse_mesh, observations):
     """By the solver's own `transferred`."""
     solver = make_solver("fem-id", **SETTINGS["fem-id"])

@@ -44,7 +44,7 @@ def test_a_solver_that_was_asked_for_is_not():
 
 
 def test_a_job_that_no_solver_can_do_is_refused():
-    with pytest.raises(UnsupportedProblemError, match="c takes the loads mean, not 'patch'"):
+    with pytest.raises(UnsupportedProblemError):
         supported_solvers([SOLVERS[0], SOLVERS[2]], ("a", "c"), Material(), PATCH)
 
 

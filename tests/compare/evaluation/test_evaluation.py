@@ -5,8 +5,8 @@ import pytest
 
 from compare.evaluation.evaluation import Evaluation
 from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem
-from solvers.solution import Solution, Status, Uncertainty
+from solvers.solution import Uncertainty
+from tests.compare.conftest import closed_form
 from tests.meshes import permuted
 
 
@@ -52,18 +52,7 @@ def test_deviations_are_those_that_the_solver_estimates(mesh, stress, tmp_path):
     known = Uncertainty(
         lambda where: 0.1 * where.points, (lambda where: where.points[:, 0]) if stress else None
     )
-    problem = Problem(mesh)
-    solution = Solution(
-        "a",
-        problem,
-        field,
-        energy=0.0,
-        reaction=np.zeros(2),
-        status=Status(True, "b"),
-        stats={},
-        uncertainty=known,
-    )
-    found = Evaluation.of(solution, mesh)
+    found = Evaluation.of(closed_form(mesh, field, uncertainty=known), mesh)
     np.testing.assert_allclose(found.node_deviation, 0.1 * mesh.points, atol=1e-12)
     if stress:
         np.testing.assert_allclose(found.von_mises_deviation, mesh.points[mesh.triangles, 0].mean(axis=1))
@@ -78,24 +67,13 @@ def test_deviations_are_those_that_the_solver_estimates(mesh, stress, tmp_path):
 def test_another_key_is_another_result(pinn, tmp_path):
     pinn.save(tmp_path / "pinn.npz", "digest")
     assert Evaluation.load(tmp_path / "pinn.npz", "another digest") is None
-
-
-def test_a_missing_file_is_no_result(tmp_path):
     assert Evaluation.load(tmp_path / "none.npz", "digest") is None
 
 
 def test_a_solution_found_on_another_mesh_is_sampled_at_the_same_places(mesh):
     """Where an element has another number there, the values must still be those of the place."""
     own, other = (
-        Solution(
-            solver="linear",
-            problem=Problem(shared),
-            field=LagrangeField(LagrangeSpace(shared, 1), shared.points * [0.1, -0.2] + [0.0, 0.3]),
-            energy=1.0,
-            reaction=np.zeros(2),
-            status=Status(True, "a closed form"),
-            stats={},
-        )
+        closed_form(shared, LagrangeField(LagrangeSpace(shared, 1), shared.points * [0.1, -0.2] + [0.0, 0.3]))
         for shared in (mesh, permuted(mesh, 3))
     )
     expected, sampled = (Evaluation.of(solution, mesh) for solution in (own, other))

@@ -1,6 +1,5 @@
 """Force over displacement: the curve, its file and its picture."""
 
-import csv
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,6 +13,7 @@ from geometry.figure import MEASURED
 from solvers.problem import Load
 from solvers.solution import Estimated, IdentifiedForce
 from tests.compare.figures.drawn_pages import page_of
+from tests.compare.tables import rows_of
 
 STEPS = np.array([0.0, 0.5, 1.0])
 
@@ -58,8 +58,7 @@ def test_file_has_the_force_per_depth_and_for_the_depth(followed, tmp_path):
     load = Load(kind="patch", displacement=(None, -4.0))
     path = tmp_path / "force_displacement.csv"
     write_force_displacement(path, force_curves([followed], load), load, depth=20.0)
-    with path.open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(path)
     assert list(rows[-1].values()) == [
         *("fem-nonlinear", "neo-hookean", "1", "1.0", "", "-4.0", "4.0", "0.2", "-3.0", "3.0", "60.0")
     ]

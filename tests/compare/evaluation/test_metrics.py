@@ -35,13 +35,8 @@ def test_errors_at_the_markers_by_hand(fem, observe):
     errors = marker_errors(moved, observe(np.zeros((3, 2)), hidden=(1,)))
     np.testing.assert_array_equal(errors.ae_u, [1, np.nan, 5])
     np.testing.assert_array_equal(errors.ae_v, [2, np.nan, 6])
-    assert errors[2:] == (3.0, 4.0, 7.0, 5.0)
-
-
-def test_without_a_visible_marker_there_is_no_mean_error(fem, observe):
-    errors = marker_errors(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2)))
-    assert np.isnan([*errors.ae_u, *errors.ae_v, *errors[2:]]).all()
-    assert errors._fields[2:] == MEANS == ("mae_u", "mae_v", "mae_sum", "mae_rss")
+    assert dict(zip(MEANS, errors[2:], strict=True)) == {"mae_u": 3, "mae_v": 4, "mae_sum": 7, "mae_rss": 5}
+    assert np.isnan(marker_errors(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2)))[2:]).all()
 
 
 def test_held_out_errors_are_of_what_the_solver_was_not_given(fem, observe):
@@ -55,12 +50,6 @@ def test_held_out_errors_are_of_what_the_solver_was_not_given(fem, observe):
     told = held_out_errors(replace(given, left_out=fem.marker_displacement + 3.0), seen)
     assert told is not None
     assert (told.mae_u, told.mae_v) == pytest.approx((2, 2))
-
-
-def test_both_displacement_errors_of_the_paper(fem, observe):
-    errors = marker_errors(fem, observe(fem.marker_displacement + np.array([1.41, -0.39])))
-    assert errors.mae_rss == pytest.approx(1.463, abs=5e-4)  # Table I, row disp
-    assert errors.mae_sum == pytest.approx(1.80)  # what the text defines
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import pytest
 
 from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
 from compare.evaluation.truths import virtual_experiment
-from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load, Material, Problem
@@ -28,11 +27,7 @@ def measured(problem: Problem) -> Observations:
 @pytest.mark.parametrize(
     ("load", "young", "said"),
     [
-        (
-            {"displacement": (0.0, -0.01)},
-            11.4,
-            "the stroke of 0.01 mm is .*; this looks like metres",
-        ),
+        ({"displacement": (0.0, -0.01)}, 11.4, "the stroke of 0.01 mm is .*; this looks like metres"),
         ({"kind": "cylinder", "radius": 0.005}, 11.4, "the radius of 0.005 mm is .*; this looks like metres"),
         ({}, 1e6, "modulus of 1e[+]06 MPa .*; this looks like pascals, give MPa"),  # a silicone of 1 MPa
         ({}, 0.0114, "modulus of 0.0114 MPa .*; this looks like gigapascals, give MPa"),
@@ -55,51 +50,11 @@ def test_a_usual_load_and_material_are_not_warned_of(load, young, coarse_mesh):
     assert problem_remarks(Problem(coarse_mesh, Material(young=young), Load(**load))) == []
 
 
-def test_a_finger_at_finite_strain_is_plausible(measured, problem):
-    check_positions(measured, problem.mesh)
-    assert displacement_remarks(measured, problem) == []
-
-
-@pytest.mark.parametrize("scale", [0.5, 2.0])  # another stiffness of walls, another place of the contact
+@pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])  # another stiffness of walls, another place of the contact
 def test_what_may_be_a_real_finger_is_not_warned_of(measured, problem, scale):
+    check_positions(measured, problem.mesh)
     other = replace(measured, displacements=scale * measured.displacements)
     assert displacement_remarks(other, problem) == []
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda points: points / 1000, "these look like metres"),
-        (lambda points: points / 10, "these look like centimetres"),
-        (lambda points: points / 25.4, "these look like inches"),
-        (lambda points: points * 1000, "these look like micrometres"),
-        (lambda points: points[:, ::-1], "x and y look swapped"),
-        (lambda points: points * [1, -1], "y looks reversed"),
-    ],
-)
-def test_positions_are_refused_with_what_they_look_like(measured, problem, change, said):
-    with pytest.raises(UserError, match=f"not of this finger: .*{said}"):
-        check_positions(replace(measured, points=change(measured.points)), problem.mesh)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (
-            lambda moved: moved / 1000,
-            "fem for a stroke of 10 mm; these look like metres; give mm",
-        ),
-        (lambda moved: moved * 1000, "impossible: marker . moved by .* mm, and the finger is 90 mm long"),
-        (lambda moved: np.vstack([[1000, 0], moved[1:]]), "marker 1 moved by 1000 mm"),  # one cell
-        (lambda moved: -moved, "signs look reversed .u and v are final minus initial"),
-        (lambda moved: moved * [1, -1], "the sign of v looks reversed"),  # the paper's convention
-        (lambda moved: moved[:, ::-1], "u and v look swapped; "),
-        (lambda moved: -moved[:, ::-1], "u and v look swapped and their signs reversed"),
-    ],
-)
-def test_impossible_displacements_are_refused(measured, problem, change, said):
-    with pytest.raises(UserError, match=said):
-        displacement_remarks(replace(measured, displacements=change(measured.displacements)), problem)
 
 
 @pytest.mark.parametrize(
@@ -117,14 +72,6 @@ def test_unlikely_displacements_are_warned_of(measured, problem, change, said):
         replace(measured, displacements=change(measured.displacements)), problem
     )
     assert said in remark
-
-
-def test_markers_that_cannot_be_are_refused(measured, problem):
-    with pytest.raises(UserError, match="none of the markers is visible"):
-        check_positions(replace(measured, visible=np.zeros(9, dtype=bool)), problem.mesh)
-    twice = measured.points[[0, 1, 2, 3, 4, 5, 6, 7, 4]]
-    with pytest.raises(UserError, match="the markers 5 and 9 are at one place; keep one"):
-        check_positions(replace(measured, points=twice), problem.mesh)
 
 
 @pytest.mark.parametrize(

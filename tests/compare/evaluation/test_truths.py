@@ -8,14 +8,16 @@ import pytest
 from compare.crossval.folds import LoadCase
 from compare.crossval.study import CrossvalStudy
 from compare.crossval.true_fields import FieldSampler, TrueField, TruthTask, simulate_truth
-from compare.evaluation.truths import SLIDING, TRUTHS, Truth, experiment_source, simulate
+from compare.evaluation.truths import LAWS, SLIDING, TRUTHS, WALLS, Truth, experiment_source, simulate
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.section import rib_axes
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
+from geometry.mesh.wall_motion import WallMotion
 from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
 from tests.fingers import beam
 
 FULL = LoadCase("full", Load(), 1.0, 35.0)
@@ -59,8 +61,7 @@ def test_laws_and_loads_are_those_of_the_names():
         "gent": ("gent", 0.45),
         "mixed": ("st-venant-kirchhoff", 0.42),
     }
-    named = ("sliding", "print", "base", "cylinder", "oblique", "friction", "rubbing", "3d", "sticking")
-    assert laws.items() >= (dict.fromkeys(named, ("neo-hookean", 0.45)) | expected).items()
+    assert {name: laws[name] for name in expected} == expected
     sliding = {"kind": "patch", "displacement": (None, -10.0)}
     cylinder = {"kind": "cylinder", "radius": 10.0}
     loads = {
@@ -75,6 +76,12 @@ def test_laws_and_loads_are_those_of_the_names():
     assert {name: problems[name][1] for name in loads} == loads
 
 
+def test_permitted_laws_and_walls_are_those_of_the_solvers_and_the_mesh(coarse_mesh):
+    for name, laws in LAWS.items():
+        assert {*laws} == {*make_solver(name).laws} - {"linear"}
+    assert {*WALLS} == {*WallMotion.of(coarse_mesh).names}
+
+
 def test_the_source_names_law_and_load(mesh):
     problem = Problem(mesh, load=Load(displacement=(0.0, -0.5)))
     said = experiment_source(problem, TRUTHS["cylinder"])
@@ -84,8 +91,8 @@ def test_the_source_names_law_and_load(mesh):
 
 def test_a_drawing_has_the_truths_that_keep_its_walls():
     drawn = beam()
-    possible = "sliding, stvk, gent, cylinder, oblique, friction, rubbing, 3d, "
-    with pytest.raises(UserError, match=f"it can have {possible}"):
+    possible = ", ".join(name for name, truth in TRUTHS.items() if truth.keeps_walls)
+    with pytest.raises(UserError, match=f"it can have {possible}$"):
         TRUTHS["print"].finger(drawn)
     assert TRUTHS["oblique"].finger(drawn) is drawn
 
@@ -96,6 +103,7 @@ def test_walls_that_a_design_cannot_have_are_refused_with_the_name_of_the_truth(
         TRUTHS["base"].finger(tight)
 
 
+@pytest.mark.usefixtures("few_elements")
 def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, coarse_mesh):
     """By hand, as before there were other truths; force and contact are those of the solution."""
     found = true_field(study, SLIDING)
@@ -145,7 +153,7 @@ def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkey
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_elements")
-@pytest.mark.parametrize("name", [name for name in TRUTHS if name != "3d"])  # see test_virtual_experiment
+@pytest.mark.parametrize("name", [name for name, truth in TRUTHS.items() if not truth.solid])
 def test_every_truth_comes_to_its_full_load(study, name):
     found = true_field(replace(study, mesh=MeshSettings(size=2.0)), TRUTHS[name])
     assert 0.1 < found.contact.force < 2.0  # N/mm: thick or thin, sliding or not, it is one finger

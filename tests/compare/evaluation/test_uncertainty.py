@@ -1,11 +1,8 @@
 """A solver's own error beside every difference from it."""
 
-import json
-
 import numpy as np
 import pytest
 
-from compare.evaluation.evaluation import Evaluation, ReferenceDifferences
 from compare.evaluation.metrics import indistinct, reference_differences
 
 
@@ -20,21 +17,6 @@ def test_it_is_the_difference_of_the_improved_solution(estimated):
     assert estimated.marker_uncertainty is not None
     np.testing.assert_allclose(estimated.marker_uncertainty, 0.01 * np.abs(estimated.marker_displacement))
     assert own.mae_markers == pytest.approx(estimated.marker_uncertainty.sum(axis=1).mean())
-
-
-def test_a_solver_without_an_estimate_has_none(fem):
-    assert (fem.uncertainty, fem.marker_uncertainty) == (None, None)
-
-
-@pytest.mark.parametrize("name", ["estimated", "fem"])
-def test_it_comes_back_from_disk(name, request, tmp_path):
-    before: Evaluation = request.getfixturevalue(name)
-    before.save(tmp_path / "fem.npz", "key")
-    after = Evaluation.load(tmp_path / "fem.npz", "key")
-    assert after is not None
-    assert isinstance(after.uncertainty, ReferenceDifferences | None)
-    assert json.dumps(after.uncertainty) == json.dumps(before.uncertainty)
-    np.testing.assert_array_equal(after.marker_uncertainty, before.marker_uncertainty)
 
 
 @pytest.mark.parametrize(

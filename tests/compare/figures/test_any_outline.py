@@ -7,7 +7,6 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import evaluated
 from compare.figures.gallery import draw
 from compare.report.html_report import report_html
@@ -15,11 +14,8 @@ from geometry.finger.finger import Finger
 from geometry.finger.presets import load_design
 from geometry.mesh.mesher import build_mesh
 from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.problem import Problem
-from solvers.solution import Solution, Status
-from tests.compare.conftest import BendingField
+from tests.compare.conftest import BendingField, closed_form
 from tests.compare.figures.drawn_pages import Page, page_of
 from tests.fingers import beam, ring
 
@@ -29,7 +25,10 @@ FINGERS: dict[str, Finger] = {"ring": ring(), "beam": beam(), "csiro": load_desi
 def compared(finger: Finger) -> Results:
     """Two solvers with a known field, on a coarse mesh."""
     mesh = build_mesh(finger, MeshSettings(size=2.0))
-    evaluations = [_evaluation(mesh, name, scale) for name, scale in (("fem", 0.02), ("pinn-std", 0.021))]
+    evaluations = [
+        evaluated(closed_form(mesh, BendingField(scale), solver=name), mesh)
+        for name, scale in (("fem", 0.02), ("pinn-std", 0.021))
+    ]
     observations = Observations(
         points=mesh.markers,
         displacements=evaluations[0].marker_displacement + 0.1,
@@ -42,19 +41,6 @@ def compared(finger: Finger) -> Results:
     return Results(finger, mesh, observations, evaluations, evaluations[0])
 
 
-def _evaluation(mesh: TriangleMesh, name: str, scale: float) -> Evaluation:
-    solution = Solution(
-        solver=name,
-        problem=Problem(mesh),
-        field=BendingField(scale),
-        energy=scale**2,
-        reaction=np.array([0.0, -scale]),
-        status=Status(True, "a closed form"),
-        stats={"seconds": 1.0},
-    )
-    return evaluated(solution, mesh)
-
-
 @pytest.fixture(scope="module", params=FINGERS)
 def comparison(request: pytest.FixtureRequest) -> Results:
     return compared(FINGERS[request.param])
@@ -62,7 +48,7 @@ def comparison(request: pytest.FixtureRequest) -> Results:
 
 @pytest.fixture(scope="module")
 def pages(comparison: Results) -> dict[str, Page]:
-    names = ("overlay", "von_mises", "strain_xx", "mesh", "design", "marker_errors")
+    names = ("overlay", "von_mises", "mesh", "design", "marker_errors")
     return {name: page_of(draw(comparison, name).figure) for name in names}
 
 
@@ -109,18 +95,10 @@ def test_the_base_is_hatched_along_each_of_its_parts(comparison, pages):
 
 def test_the_report_of_a_finger_without_parameters_has_its_facts_and_no_symbols() -> None:
     text = report_html(compared(ring()), [], {})
-    assert "60 mm by 60 mm" in text
-    assert "1 cavity" in text
-    assert ring().section.digest in text
+    facts = ("60 mm by 60 mm", "1 cavity", ring().section.digest, "The base is clamped (31.42 mm)")
+    assert [fact for fact in facts if fact not in text] == []
     assert "<sub>tip</sub>" not in text
-    assert 'class="tight"' not in text
-    assert "The base is clamped (31.42 mm)" in text
-
-
-def test_the_report_of_a_finger_with_parameters_has_the_symbols_of_the_paper() -> None:
-    text = report_html(compared(load_design("csiro")), [], {})
-    assert "<sub>tip</sub>" in text
-    assert "in 2 pieces" in text
+    assert "<sub>tip</sub>" in report_html(compared(load_design("csiro")), [], {})
 
 
 def test_a_cylinder_stands_on_a_curved_front() -> None:

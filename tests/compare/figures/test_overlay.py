@@ -13,9 +13,8 @@ from compare.evaluation.evaluation import Evaluation
 from compare.figures.overlay import draw_overlay
 from geometry.observations import Observations
 from geometry.registration import Homography, Pictures
-from solvers.problem import Load, Problem
-from solvers.solution import Solution, Status
-from tests.compare.conftest import BendingField
+from solvers.problem import Load
+from tests.compare.conftest import BendingField, closed_form
 from tests.compare.figures.drawn_pages import page_of
 
 
@@ -25,15 +24,7 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
 ):
     """And on the body: the found frame of the pictures is taken off what was observed, and said."""
     points = np.array([[2.3, -1.1], [7.7, -3.2]])
-    solution = Solution(
-        solver="bent",
-        problem=Problem(mesh),
-        field=BendingField(1.0),
-        energy=1.0,
-        reaction=np.zeros(2),
-        status=Status(True, "a closed form"),
-        stats={},
-    )
+    solution = closed_form(mesh, BendingField(1.0))
     pressed = Homography(points.mean(axis=0), np.array([3.0, 0.1, 0.2, 0.01, 0.0, 0.0]))
     if turned:
         still = Homography(points.mean(axis=0), np.zeros(6))
@@ -48,14 +39,12 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
         simulated=True,
         marker_radius=0.8,
     )
-    crosses, circles = [], []
+    drawn: dict[str, list[np.ndarray]] = {"x": [], "o": []}
     plot = Axes.plot
 
     def watched(axes: Axes, *arguments: object, **options: object) -> object:
-        if isinstance(arguments[-1], str) and arguments[-1] == "x":
-            crosses.append(np.column_stack(arguments[:2]))
-        if isinstance(arguments[-1], str) and arguments[-1] == "o":
-            circles.append(np.column_stack(arguments[:2]))
+        if isinstance(arguments[-1], str) and arguments[-1] in drawn:
+            drawn[arguments[-1]].append(np.column_stack(arguments[:2]))
         return plot(axes, *arguments, **options)
 
     monkeypatch.setattr(Axes, "plot", watched)
@@ -63,9 +52,9 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
     page = page_of(draw_overlay(compared(evaluation, observations=observations)))
     x, y = points.T
     expected = points + np.stack([0.01 * y**2, -0.02 * x**2], axis=1)
-    assert len(crosses) == len(circles) > 0
-    for drawn in (*crosses, *circles):
-        np.testing.assert_allclose(drawn, expected, rtol=1e-12)
+    assert len(drawn["x"]) == len(drawn["o"]) > 0
+    for places in (*drawn["x"], *drawn["o"]):
+        np.testing.assert_allclose(places, expected, rtol=1e-12)
     said = any("the frame it found" in text.get_text() for text in page.figure.findobj(Text))
     assert said == turned
 

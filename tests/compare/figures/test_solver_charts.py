@@ -51,13 +51,6 @@ def test_a_growing_load_does_not_approach_the_reference() -> None:
     assert readable("newton_iterations") == "newton iterations"
 
 
-def test_axes_name_what_a_record_is_over(fem, pinn, compared):
-    drawn = draw_convergence(compared(fem, pinn))
-    assert drawn is not None
-    assert drawn.axes[0].get_xlabel() == "hidden units of the network"
-    assert drawn.axes[1].get_ylabel() == "distance from fem, %"
-
-
 def test_two_results_are_joined_by_dots_and_no_curve(fem, pinn, compared):
     short = {name: column[:2] for name, column in pinn.history.items()}
     drawn = draw_convergence(compared(fem, replace(pinn, history=short)))

@@ -182,7 +182,6 @@ MEASURED = Path()
 """Table of the measured markers; set by the test."""
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.* is damaged .* and is made again")
 def test_any_history_ends_with_the_numbers_of_a_fresh_folder(
     without_pictures, few_elements, monkeypatch, tmp_path
@@ -193,7 +192,7 @@ def test_any_history_ends_with_the_numbers_of_a_fresh_folder(
     run_state_machine_as_test(
         Histories,
         settings=settings(
-            max_examples=8,
+            max_examples=4,
             stateful_step_count=10,
             deadline=None,
             derandomize=True,

@@ -1,11 +1,5 @@
 """The paper's networks in the main job and the search: killed or interrupted, they go on to the same bits."""
 
-import os
-import shutil
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,14 +12,12 @@ from rich.console import Console
 
 from compare.pipeline.job import Job
 from compare.pipeline.pipeline import run
-from compare.runtime.exits import NOT_CONVERGED
 from compare.runtime.stages import Stages
 from geometry.errors import UserError
 from solvers.problem import Load
 from solvers.registry import make_solver
 from solvers.solver import Progress
 from tests.compare.pipeline.runs import compare
-from tests.pinnray.commands.programs import WITHOUT_PICTURES
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -92,36 +84,3 @@ def test_a_checkpoint_of_another_job_is_refused_in_one_line(paper_job):
     other = replace(paper_job, load=Load(displacement=(0.0, -9.0)), resume=True)
     with pytest.raises(UserError, match=r"checkpoint\.safetensors belongs to another problem [^\n]*$"):
         compare(other)
-
-
-@pytest.mark.slow
-def test_a_killed_run_ends_as_if_it_had_not_been(measured, tmp_path):
-    """Killed without notice, it goes on from the last checkpoint that it wrote.
-
-    What a kill would leave is copied from a stopped process, which then goes on to its end. The other one is
-    a process of its own: the order in which a process loads torch and PETSc, each with its BLAS, was seen to
-    change the last bits.
-    """
-    line = f"compare --solvers pinn-std --mesh-size 1.0 --quiet --measurements {measured}"
-    line += "".join(f" --solver-set pinn-std.{key}={value}" for key, value in {**TINY, "epochs": 60}.items())
-
-    def started(*options: str) -> subprocess.Popen[bytes]:
-        return subprocess.Popen(
-            [sys.executable, "-c", WITHOUT_PICTURES, *line.split(), *options],
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-            stderr=subprocess.DEVNULL,
-        )
-
-    out, whole = tmp_path / "run", started("--out", str(tmp_path / "whole"))
-    training = Path("training", "pinn-std")
-    limit = time.monotonic() + 240
-    while not (tmp_path / "whole.partial" / training / "history.csv").exists() and time.monotonic() < limit:
-        time.sleep(0.005)
-    whole.send_signal(signal.SIGSTOP)
-    shutil.copytree(tmp_path / "whole.partial", tmp_path / "run.partial")
-    whole.send_signal(signal.SIGCONT)
-    before = record(tmp_path / "run.partial" / training)
-    resumed = started("--out", str(out), "--resume")
-    assert resumed.wait() == whole.wait() == NOT_CONVERGED
-    assert bits(out) == bits(tmp_path / "whole")
-    assert record(out / "training" / "pinn-std")[: len(before)] == before

@@ -1,6 +1,5 @@
 """The main job: what it writes, what it leaves when it is stopped, and how it goes on from there."""
 
-import csv
 import hashlib
 import json
 import re
@@ -20,7 +19,6 @@ from compare.runtime.provenance import package_versions
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from geometry.registration import FIXED, HAND_HELD
@@ -29,6 +27,7 @@ from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
 from solvers.solver import NoSolutionError, Progress, silent
 from tests.compare.pipeline.runs import compare
+from tests.compare.tables import rows_of
 from vision.measurements import read_measurements
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
@@ -80,11 +79,6 @@ def without_times(told: dict[str, Any]) -> dict[str, Any]:
     return copy
 
 
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
 # What a whole run writes
 
 
@@ -98,14 +92,11 @@ def test_every_file_of_the_design_is_there(finished):
         "force_displacement.csv fields/truth.vtu fields/fem.vtu fields/fem-nonlinear.vtu solutions/fem.npz "
         "solutions/fem-nonlinear.npz"
     )
-    assert set(files(finished)) == {*others.split(), *(f"figures/{name}.png" for name in pictures.split())}
-    assert not finished.with_name("run.partial").exists()
-
-
-def test_run_json_has_the_digest_of_every_other_file(finished):
-    digests = {name: hashlib.sha256(content).hexdigest() for name, content in files(finished).items()}
-    del digests["run.json"]
+    content = files(finished)
+    assert set(content) == {*others.split(), *(f"figures/{name}.png" for name in pictures.split())}
+    digests = {name: hashlib.sha256(file).hexdigest() for name, file in content.items() if name != "run.json"}
     assert strictly(finished / "run.json")["files_sha256"] == digests
+    assert not finished.with_name("run.partial").exists()
 
 
 def test_run_json_tells_where_the_result_comes_from(finished):
@@ -119,10 +110,8 @@ def test_run_json_tells_where_the_result_comes_from(finished):
     assert told["solvers"]["fem"] == {"degree": 2, "estimate": True, "linear_solver": "auto"}
     assert told["versions"] == package_versions()
     assert told["machine"]["cores"] > 0
-    assert list(told["seconds"]) == [
-        *("mesh", "measurements", "fem", "fem-nonlinear", "certificate", "checks"),
-        *("fields", "tables", "pictures"),
-    ]
+    stages = "mesh measurements fem fem-nonlinear certificate checks fields tables pictures"
+    assert list(told["seconds"]) == stages.split()
     assert datetime.fromisoformat(told["started"]).tzinfo is not None
 
 
@@ -140,11 +129,11 @@ def test_metrics_of_the_default_finger(finished):
 
 def test_tables_agree_with_metrics(finished):
     solvers = strictly(finished / "metrics.json")["solvers"]
-    for marker, row in enumerate(rows(finished / "markers.csv")):
+    for marker, row in enumerate(rows_of(finished / "markers.csv")):
         for name, told in solvers.items():
             assert float(row[f"{name}_ae_u_mm"]) == told["markers"]["ae_u"][marker]
             assert float(row[f"{name}_ae_v_mm"]) == told["markers"]["ae_v"][marker]
-    summary = {row["solver"]: row for row in rows(finished / "summary.csv")}
+    summary = {row["solver"]: row for row in rows_of(finished / "summary.csv")}
     assert list(summary) == list(solvers)
     for name, told in solvers.items():
         expected = {f"{key}_mm": told["markers"][key] for key in ("mae_u", "mae_v", "mae_sum", "mae_rss")}
@@ -170,11 +159,9 @@ def test_the_report_holds_the_numbers(finished):
     for told in strictly(finished / "metrics.json")["solvers"].values():
         for key in ("mae_u", "mae_v", "mae_sum", "mae_rss"):
             assert f"{told['markers'][key]:.3f}" in report
-    assert len(re.findall("data:image/(?:png|webp);base64,", report)) == len(
-        list((finished / "figures").iterdir())
-    )
+    pictures = re.findall("data:image/(?:png|webp);base64,", report)
+    assert len(pictures) == len(list((finished / "figures").iterdir()))
     assert strictly(finished / "run.json")["mesh_sha256"] in report
-    assert "Simulated by fem-nonlinear" in report
 
 
 def test_the_observations_of_a_run_give_the_same_metrics_again(finished, job):
@@ -191,7 +178,7 @@ def test_without_the_mark_they_count_as_measured(finished, tmp_path, job):
     again = job(FemSolver(), measurements=bare)
     outcome = compare(again)
     assert metrics(outcome)["measurements"]["source"] == "measured"
-    assert {row["observations"] for row in rows(again.out / "markers.csv")} == {"measured"}
+    assert {row["observations"] for row in rows_of(again.out / "markers.csv")} == {"measured"}
     assert "simulated" not in (again.out / "observations.csv").read_text()
     assert "imulated" not in (again.out / "report.html").read_text(encoding="utf-8")
 
@@ -208,10 +195,9 @@ def test_a_marker_that_was_not_seen(tmp_path):
     assert [value is None for value in errors["ae_u"]] == [False, True, False]
     assert [value is None for value in errors["ae_v"]] == [False, True, False]
     assert errors["mae_u"] == pytest.approx((errors["ae_u"][0] + errors["ae_u"][2]) / 2)
-    hidden = rows(out / "markers.csv")[1]
+    hidden = rows_of(out / "markers.csv")[1]
     assert hidden["visible"] == "0"
     assert [hidden[name] for name in ("observed_u_mm", "fem_ae_u_mm", "fem_ae_v_mm")] == [""] * 3
-    assert "2 of 3 markers seen" in (out / "report.html").read_text(encoding="utf-8")
     read = read_measurements(out / "observations.csv", marker_radius=0.8)
     assert read.visible.tolist() == [True, False, True]
 
@@ -240,7 +226,6 @@ def test_only_a_solver_that_assimilates_is_given_the_markers_and_it_is_marked(jo
     assert [solvers[name]["markers"]["in_sample"] for name in ("blind", "seeing")] == [False, True]
     assert [solvers[name]["held_out"] is None for name in ("blind", "seeing")] == [False, True]
     assert [evaluation.certificate is None for evaluation in outcome.evaluations] == [False, True]
-    assert 'id="in-sample"' in (wanted.out / "report.html").read_text(encoding="utf-8")
 
 
 def test_other_measurements_are_assimilated_again(job, tmp_path):
@@ -254,24 +239,6 @@ def test_other_measurements_are_assimilated_again(job, tmp_path):
 
 
 # Stopped halfway
-
-STOPS = [
-    pytest.param(OSError("a fault of the system"), id="error"),
-    pytest.param(UserError("a problem that it cannot solve"), id="refusal"),
-    pytest.param(KeyboardInterrupt(), id="Ctrl-C"),
-]
-
-
-@pytest.mark.parametrize("stop", STOPS)
-def test_a_run_that_is_stopped_leaves_the_last_result_and_what_it_finished(job, stop):
-    complete = job(Scripted("old"))
-    compare(complete)
-    before = files(complete.out)
-    with pytest.raises(type(stop)):
-        compare(job(Scripted("first"), Scripted("second", stop)))
-    assert files(complete.out) == before
-    kept = complete.out.with_name("run.partial")
-    assert [path.name for path in (kept / "solutions").iterdir()] == ["first.npz"]
 
 
 def test_a_run_goes_on_without_a_solver_that_raises(job):
@@ -288,17 +255,14 @@ def test_a_run_goes_on_without_a_solver_that_raises(job):
     assert "raise self.end" in trace
     assert "RuntimeError: a fault" in trace
     assert json.loads((out / "run.json").read_text())["failed"] == {"second": line}
-    assert "solver second raised RuntimeError" in (out / "report.html").read_text()
     compare(job(Scripted("first"), Scripted("third"), resume=True))  # its file is one of the run's own
 
 
 def test_a_run_goes_on_without_a_solver_that_finds_no_solution(job):
     """Nobody needs a traceback of that."""
     found = compare(job(Scripted("first"), Scripted("second", NoSolutionError("no equilibrium near rest"))))
-    assert [evaluation.solver for evaluation in found.evaluations] == ["first"]
     assert found.failed == {"second": "second found no solution: no equilibrium near rest"}
     assert not (job().out / "errors").exists()
-    assert "no equilibrium near rest" in (job().out / "report.html").read_text()
 
 
 @pytest.mark.parametrize("reference", [None, "second"], ids=["nothing is left", "it is the reference"])
@@ -306,21 +270,6 @@ def test_a_run_without_the_solver_that_it_needs_ends_in_one_line(job, reference)
     solvers = [Scripted("first")] * (reference is not None) + [Scripted("second", KeyError("x"))]
     with pytest.raises(UserError, match=r"solver second raised KeyError: 'x' \(.*test_pipeline\.py:\d+\)$"):
         compare(job(*solvers, reference=reference))
-
-
-def test_several_equilibria_are_told(job, monkeypatch):
-    said = "2 stable equilibria"
-    monkeypatch.setattr(
-        "compare.pipeline.pipeline.with_branches", lambda evaluations, problem: (evaluations, [said])
-    )
-    assert said in compare(job(Scripted("first"))).remarks
-
-
-@pytest.mark.parametrize("stop", STOPS)
-def test_a_run_that_is_stopped_before_it_finished_anything_leaves_nothing(job, tmp_path, stop):
-    with pytest.raises(type(stop)):
-        compare(job(Scripted("first", stop)))
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_resumed_run_does_not_solve_again_and_gives_the_same(job, tmp_path):
@@ -337,67 +286,34 @@ def test_a_resumed_run_does_not_solve_again_and_gives_the_same(job, tmp_path):
         assert (tmp_path / "out" / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_a_resumed_run_adds_a_solver_to_a_finished_one_and_drops_another(job):
-    """Both hand their work to `fem`, and keep their own names."""
-    first, second = Scripted("first"), Scripted("second")
-    compare(job(first))
-    outcome = compare(job(first, second, resume=True))
-    assert (first.calls, second.calls) == (1, 1)
-    assert list(metrics(outcome)["solvers"]) == ["first", "second"]
-    compare(job(second, resume=True))
-    assert second.calls == 1
-    assert [path.name for path in (job().out / "solutions").iterdir()] == ["second.npz"]
-
-
-@pytest.mark.parametrize(
-    "spoil", [lambda whole: whole[: len(whole) // 2], lambda whole: b"", lambda whole: b"x"]
-)
-def test_a_damaged_solution_is_solved_again(job, spoil):
-    first = Scripted("first")
-    whole = compare(job(first))
-    (file,) = (job(first).out / "solutions").iterdir()
-    file.write_bytes(spoil(file.read_bytes()))
-    with pytest.warns(RuntimeWarning, match=r"first\.npz is damaged .* and is made again"):
-        resumed = compare(job(first, resume=True))
-    assert first.calls == 2
-    assert without_times(metrics(resumed)) == without_times(metrics(whole))
-
-
 @pytest.mark.parametrize(
     "changes",
     [
         {"resume": False},
         {"design": Design(front_thickness=2.2)},
-        {"mesh": MeshSettings(size=1.5)},
         {"material": Material(young=5.0)},
-        {"load": Load(displacement=(0.0, -9.0))},
         {"load": Load(kind="point")},
+        {"package_versions": {"other": "1"}},
+        {"sources_digest": "other"},
+        {"degree": 1},
+        {"measured": "x_mm,y_mm,u_mm,v_mm\n30,-1,0,-5\n"},
     ],
-    ids=["not resumed", "design", "mesh", "material", "stroke", "kind of load"],
+    ids=lambda changes: next(iter(changes)),
 )
-def test_another_job_is_not_resumed_from(job, changes):
+def test_another_job_is_not_resumed_from(job, measured, monkeypatch, changes):
     first = Scripted("first")
     compare(job(first))
-    compare(job(first, **{"resume": True, **changes}))
-    assert first.calls == 2
-
-
-def test_other_settings_and_markers_are_not_resumed_from(job, measured):
-    compare(job(Scripted("first")))
-    other = Scripted("first", degree=1)
-    compare(job(other, resume=True))
-    assert other.calls == 1
-    measured.write_text("x_mm,y_mm,u_mm,v_mm\n30,-1,0,-5\n")
-    assert compare(job(other, resume=True)).evaluations[0].marker_displacement.shape == (1, 2)
-    assert other.calls == 2
-
-
-@pytest.mark.parametrize("what", ["package_versions", "sources_digest"])
-def test_another_version_of_the_code_is_not_resumed_from(job, monkeypatch, what):
-    first = Scripted("first")
-    compare(job(first))
-    monkeypatch.setattr(f"compare.pipeline.solving.{what}", lambda *_: {"other": "1"})
-    compare(job(first, resume=True))
+    ((name, value),) = changes.items()
+    again = {"resume": True}
+    if name in ("package_versions", "sources_digest"):
+        monkeypatch.setattr(f"compare.pipeline.solving.{name}", lambda *_: value)
+    elif name == "degree":
+        first.degree = value
+    elif name == "measured":
+        measured.write_text(value)
+    else:
+        again |= changes
+    compare(job(first, **again))
     assert first.calls == 2
 
 
@@ -446,8 +362,7 @@ def test_a_solver_that_did_not_converge_is_marked_and_what_is_not_a_number_is_nu
     told = strictly(asked.out / "metrics.json")["solvers"]["first"]
     assert (told["status"], told["message"]) == ("not converged", "stopped after 20 steps; try more")
     assert told["seconds"] is None
-    assert rows(asked.out / "summary.csv")[0]["converged"] == "0"
-    assert "Stopped after 20 steps; try more" in (asked.out / "report.html").read_text(encoding="utf-8")
+    assert rows_of(asked.out / "summary.csv")[0]["converged"] == "0"
 
 
 def test_a_result_that_its_solver_believes_in_but_finite_elements_do_not_is_marked(job, monkeypatch):
@@ -462,12 +377,10 @@ def test_a_result_that_its_solver_believes_in_but_finite_elements_do_not_is_mark
     assert [evaluation.label for evaluation in drawn] == ["fem", "linear (not converged)"]
     told = strictly(asked.out / "metrics.json")["solvers"]
     assert [told[name]["status"] for name in ("fem", "linear")] == ["converged", "not converged"]
-    assert told["linear"]["message"].startswith("solved directly; the discretisation is the only error,")
     assert "; its stress is out of balance by" in told["linear"]["message"]
     assert told["linear"]["certificate"]["rel_excess"] > 0.05 > told["fem"]["certificate"]["rel_excess"]
-    assert [row["converged"] for row in rows(asked.out / "summary.csv")] == ["1", "0"]
-    assert {row["linear_converged"] for row in rows(asked.out / "markers.csv")} == {"0"}
-    assert "linear (not converged)" in (asked.out / "report.html").read_text(encoding="utf-8")
+    assert [row["converged"] for row in rows_of(asked.out / "summary.csv")] == ["1", "0"]
+    assert {row["linear_converged"] for row in rows_of(asked.out / "markers.csv")} == {"0"}
     assert pyvista.read(asked.out / "fields" / "linear.vtu").field_data["converged"][0] == 0
 
 
@@ -483,36 +396,6 @@ def test_the_archive_keeps_the_solvers_own_word(job):
 
 
 # Refused before anything is computed
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"solvers": []}, "no solver was asked for"),
-        ({"solvers": [Scripted("a"), Scripted("a")]}, "named twice: a, a"),
-        ({"reference": "fem"}, "the reference 'fem' is not among the solvers first"),
-        ({"load": Load(kind="patch")}, "first takes the loads mean, point, not 'patch'"),
-    ],
-)
-def test_a_job_that_cannot_be_done(job, tmp_path, changes, message):
-    first = Scripted("first")
-    with pytest.raises(UserError, match=message):
-        compare(job(first, **changes))
-    assert not (tmp_path / "out").exists()
-    assert first.calls == 0
-
-
-def test_markers_of_a_file_are_as_large_as_the_designs(job):
-    assert compare(job(Scripted("fem"), design=load_design("slender"))).observations.marker_radius == 0.6
-
-
-def test_markers_outside_the_finger(job, tmp_path, measured):
-    measured.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,0,0\n10,-10,0,0\n")  # in the first cavity
-    with pytest.raises(
-        UserError, match=r"not of this finger: 1 of 2 points .* \(10, -10\) mm.* before loading"
-    ):
-        compare(job(Scripted("first")))
-    assert not (tmp_path / "out").exists()
 
 
 def test_pictures_that_were_taken_as_they_are_are_said(job, observations):

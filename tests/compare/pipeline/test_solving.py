@@ -69,6 +69,7 @@ def numbers(evaluation: Evaluation) -> dict[str, Any]:
     return {**vars(evaluation), "stats": kept, **parts}
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_numbers_of_one_and_a_second_run_takes_them_over(solve, tmp_path, monkeypatch):
     solvers = FemNonlinearSolver(), FemSolver()
     (one, _), (two, seconds) = solve(1, *solvers), solve(2, *solvers)
@@ -126,7 +127,7 @@ def test_a_refusal_in_the_second_process_is_one_line_of_the_first(solve, name, c
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("refusing", "^refusing: the weight is negative$"),
+        pytest.param("refusing", "^refusing: the weight is negative$", marks=pytest.mark.slow),
         ("killed", "^killed: its process ended with exit code -9; a resumed run goes on"),
     ],
 )
@@ -137,7 +138,11 @@ def test_the_end_of_a_second_process_is_one_line_of_the_first(solve, name, messa
 
 @pytest.mark.parametrize(
     ("name", "ending"),
-    [("silent", signal.SIGKILL), ("silent", signal.SIGTERM), ("reporting", signal.SIGTERM)],
+    [
+        ("silent", signal.SIGKILL),
+        pytest.param("silent", signal.SIGTERM, marks=pytest.mark.slow),
+        pytest.param("reporting", signal.SIGTERM, marks=pytest.mark.slow),
+    ],
 )
 def test_no_process_outlives_the_run(tmp_path, name, ending):
     program = subprocess.Popen(

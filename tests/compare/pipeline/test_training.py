@@ -60,14 +60,6 @@ def test_an_interrupted_training_goes_on_and_its_files_end_in_the_output(job, tm
     assert not (tmp_path / "out" / "run.partial").exists()
 
 
-def test_without_resume_a_training_starts_afresh(job):
-    with pytest.raises(KeyboardInterrupt):
-        compare(job(Counting([], stop_after=3)))
-    again = Counting([])
-    compare(job(again))
-    assert again.epochs == [1, 2, 3, 4]
-
-
 def test_a_solution_that_is_taken_over_brings_its_training_along(job, tmp_path):
     compare(job(Counting([])))
     again = Counting([])
@@ -111,9 +103,3 @@ def test_the_energy_of_fem_is_told_if_it_was_solved_before_with_the_same_law(job
     _, context = counting.diary[0]
     assert context.reference_energy == (reference.energy if known else None)
     assert not context.resume
-
-
-def test_fem_that_comes_later_is_not_known(job):
-    counting = Counting([])
-    compare(job(counting, FemSolver(degree=1)))
-    assert counting.diary[0][1].reference_energy is None

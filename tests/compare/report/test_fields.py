@@ -75,19 +75,6 @@ def test_scalars_are_means_over_the_triangles(name, grid, sheared):
     np.testing.assert_allclose(grid.cell_data[name], expected)
 
 
-def test_it_says_whose_result_it_is(grid: pyvista.UnstructuredGrid, sheared: Evaluation) -> None:
-    assert list(grid.field_data["solver"]) == ["fem"]
-    assert list(grid.field_data["status"]) == ["solved directly"]
-    np.testing.assert_array_equal(np.ravel(grid.field_data["reaction_N_per_mm"]), sheared.reaction)
-
-
-def test_a_message_keeps_its_meaning_in_the_letters_of_vtk(sheared, mesh, tmp_path):
-    message = "its energy is −12 % above"
-    write_vtu(tmp_path / "fem.vtu", mesh, replace(sheared, message=message))
-    grid = pyvista.read(tmp_path / "fem.vtu")
-    assert list(grid.field_data["status"]) == ["its energy is -12 % above"]
-
-
 def test_a_mesh_file_says_where_boundaries_and_markers_are(mesh: TriangleMesh, tmp_path: Path) -> None:
     write_mesh(tmp_path / "mesh.vtu", mesh)
     data = pyvista.read(tmp_path / "mesh.vtu").point_data

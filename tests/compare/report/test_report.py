@@ -1,5 +1,5 @@
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,7 +11,7 @@ from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Results
 from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
-from compare.report import html_report
+from compare.report.html_report import report_html
 from compare.report.text import sentence, solve_numbers, stat
 from compare.runtime.tables import percent
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -61,33 +61,21 @@ def html(content) -> str:
     return render(content)
 
 
-@pytest.fixture(scope="module")
-def page(html) -> Page:
-    return Page(html)
+def render(comparison: Results, pictures: Sequence[Picture] = ()) -> str:
+    return report_html(comparison, pictures, {"seed": 17, "versions": {"numpy": "1.26.4"}})
 
 
-@pytest.fixture
-def pictures(tmp_path: Path) -> list[Picture]:
-    path, alt = tmp_path / "overlay.png", "Largest displacement, mm: fem 9."
-    Image.new("RGB", (4, 3), "red").save(path)
-    return [Picture(path, "Deformed finger", "Two fingers.", alt)]
-
-
-def render(
-    comparison: Results,
-    pictures: Sequence[Picture] = (),
-    provenance: Mapping[str, object] = {"seed": 17, "versions": {"numpy": "1.26.4"}},
-) -> str:
-    return html_report.report_html(comparison, pictures, provenance)
-
-
-def test_the_page_is_balanced_and_has_every_part_that_it_links(page):
+def page_of(comparison: Results, **changes: object) -> Page:
+    """The page of a comparison with other attributes: its tags are balanced, its links lead somewhere."""
+    page = Page(render(replace(comparison, **changes)).replace("\N{NO-BREAK SPACE}", " "))
     assert (page.unbalanced, page.open) == ([], [])
     assert {link[1:] for link in page.values("href")} <= set(page.values("id"))
+    return page
 
 
-def test_it_asks_for_nothing_from_outside(content: Results, pictures: list[Picture]) -> None:
-    html = render(content, pictures)
+def test_it_asks_for_nothing_from_outside(content: Results, tmp_path: Path) -> None:
+    Image.new("RGB", (4, 3), "red").save(tmp_path / "overlay.png")
+    html = render(content, [Picture(tmp_path / "overlay.png", "Deformed finger", "Two fingers.", "An alt.")])
     assert "<link" not in html
     packed = r'(?<=id="viewer-data">)[^<]*|(?<=id="viewer-library">)[^<]*'
     assert re.findall(r"url\(|@import|https?://", re.sub(packed, "", html)) == []
@@ -96,152 +84,87 @@ def test_it_asks_for_nothing_from_outside(content: Results, pictures: list[Pictu
 
 
 @pytest.mark.parametrize(
-    "expected",
-    [
-        *("0.300", "0.400", "0.700", "0.500", "disp, sum", "disp, rss", "Table I"),  # errors in both ways
-        "Comparison with fem",
-        "pinn-std 10.0 ",  # per cent: relative L2 of a solution that is a tenth larger
-        *(" 21.0 ", "−0.5500"),  # its energy and its reaction
-        *("90 mm", "E = 11.4 MPa", "plane strain", "v = −10 mm", "17", "1.26.4", "Solved directly."),
-        "paper: PINN-Ray std 1.37 0.48 – 1.452 – – – –",
-        "of its own experiment",
-        "fem gives no estimate of its own error.",
-        "pinn-std has no certificate: DOLFINx, which makes it, is not installed.",
-    ],
-)
-def test_the_page_says_what_was_compared_and_found(page, expected):
-    assert expected in page.text.replace("\N{NO-BREAK SPACE}", " ")
-
-
-@pytest.mark.parametrize(
     ("preset", "words"),
     [("fast", "random hidden weights"), ("paper", "training"), ("trained", "all weights")],
 )
 def test_a_network_is_called_what_it_is(content: Results, preset: str, words: str) -> None:
-    text = Page(render(replace(content, settings={"fem": {}, "pinn-std": {"preset": preset}}))).text
+    text = page_of(content, settings={"fem": {}, "pinn-std": {"preset": preset}}).text
     assert re.search(f"pinn-std: [^.]*{words}[^.]*\\(preset {preset}\\)", text)
 
 
-def test_every_picture_has_its_caption(content: Results, pictures: list[Picture]) -> None:
-    page = Page(render(content, pictures))
-    assert "Figure 1. Deformed finger. Two fingers." in page.text
-    assert page.values("alt") == ["Deformed finger. Largest displacement, mm: fem 9."]
-
-
-def test_simulated_displacements_are_warned_of(content: Results) -> None:
-    page = Page(render(content))
-    assert "simulated" in page.values("id")
-    assert "Simulated by another solver." in page.text
-
-
-def test_measured_displacements_are_not(content, observe, fem):
-    seen = observe(fem.marker_displacement, simulated=False, hidden=(0,))
-    page = Page(render(replace(content, observations=seen)))
+def test_measured_displacements_are_not_called_simulated(content, observe, fem):
+    assert "simulated" in page_of(content).values("id")
+    page = page_of(content, observations=observe(fem.marker_displacement, simulated=False, hidden=(0,)))
     assert "simulated" not in page.values("id")
     assert "simulated" not in page.text.lower()
-    assert "Measured by camera A. 2 of 3 markers seen." in page.text
 
 
 @pytest.mark.parametrize(("kind", "warned"), [("point", True), ("mean", False)])
 def test_a_point_load_is_said_to_have_no_limit(content: Results, kind: str, warned: bool) -> None:
-    page = Page(render(replace(content, load=Load(kind=kind))))
-    assert ("point-load" in page.values("id")) is warned
+    assert ("point-load" in page_of(content, load=Load(kind=kind)).values("id")) is warned
 
 
 @pytest.mark.parametrize("given", [True, False])
 def test_errors_on_assimilated_markers_are_training_errors(content: Results, given: bool) -> None:
     fem, pinn = content.evaluations
-    page = Page(render(replace(content, evaluations=[fem, replace(pinn, in_sample=given)])))
+    page = page_of(content, evaluations=[fem, replace(pinn, in_sample=given)])
     assert ("in-sample" in page.values("id")) is given
     numbers, none = [r" \d\.\d{3}" * 4, " –" * 4]
     assert re.search(f"pinn-std{none}{numbers}" if given else f"pinn-std{numbers}{none}", page.text)
     told = replace(pinn, in_sample=given, left_out=pinn.marker_displacement if given else None)
-    page = Page(render(replace(content, evaluations=[fem, told])))
+    page = page_of(content, evaluations=[fem, told])
     assert bool(re.search(f"pinn-std{numbers}{numbers}", page.text)) is given
-    assert ("pinn-std has no certificate: it pays energy for the markers" in page.text) is given
 
 
 @pytest.mark.parametrize("simulated", [True, False])
 def test_stress_is_held_against_the_truth_only_where_that_is_known(content, simulated):
     """The truth is the network's field, from which the reference is 9.09 % away."""
     fem, pinn = content.evaluations
-    given = replace(pinn, in_sample=True)
     truth = pinn if simulated else None
-    page = Page(render(replace(content, evaluations=[fem, given], truth=truth)))
+    page = page_of(content, evaluations=[fem, replace(pinn, in_sample=True)], truth=truth)
     assert ("truth" in page.values("id")) is simulated
     assert ("fem 9.09 9.09 9.09 −9.09 no pinn-std 0.00 0.00 0.00 0.00 yes" in page.text) is simulated
-    assert ("Nearer in von Mises stress: pinn-std." in page.text) is simulated
 
 
 def test_a_solver_that_failed_is_marked_everywhere(content: Results, failed: Evaluation) -> None:
-    page = Page(render(replace(content, evaluations=[*content.evaluations, failed])))
-    assert "fem-nonlinear did not converge. Stopped after 20 steps; try more load_steps." in page.text
-    bare = re.findall(r"fem-nonlinear(?! \(not converged\)| did not converge)", page.text)
-    assert bare == []
+    page = page_of(content, evaluations=[*content.evaluations, failed])
+    assert failed.message.capitalize() in page.text
+    assert re.findall(r"fem-nonlinear(?! \(not converged\)| did not converge)", page.text) == []
 
 
-def test_the_certificate_has_a_sentence_and_its_numbers(content: Results, mesh: TriangleMesh) -> None:
+def test_the_certificate_has_its_numbers(content: Results, mesh: TriangleMesh) -> None:
     """A network with the energy of fem times 1.21 at the same places: a given field, and far from balance."""
+    assert {"certificate", "regions"}.isdisjoint(page_of(content).values("id"))
     evaluations = with_certificates(content.evaluations, Problem(mesh))
-    page = Page(render(replace(content, evaluations=evaluations, reference=evaluations[0])))
-    text = page.text.replace("\N{NO-BREAK SPACE}", " ")
-    assert "pinn-std (not converged) is not to be relied on: its displacement, taken over" in text
+    page = page_of(content, evaluations=evaluations, reference=evaluations[0])
+    assert "pinn-std (not converged) is not to be relied on" in page.text
     assert {"certificate", "regions"} <= set(page.values("id"))
     certificate = evaluations[1].certificate
     assert certificate is not None
     shown = [certificate.rel_excess, certificate.energy_norm_error, certificate.weak_residual]
     shown += [region.excess for region in certificate.regions.values()]
-    assert [value for value in shown if percent(value).replace("\xa0", " ") not in text] == []
-    assert page.unbalanced == []
-
-
-def test_without_a_preset_no_kind_of_network_is_named(page):
-    assert "preset" not in page.text
-
-
-def test_without_certificates_and_estimates_there_is_no_table_of_them_and_no_plus_or_minus(page):
-    assert {"certificate", "regions"}.isdisjoint(page.values("id"))
-    assert "±" not in page.text
+    assert [value for value in shown if percent(value).replace("\xa0", " ") not in page.text] == []
 
 
 def test_the_own_error_of_the_reference_stands_beside_every_difference(content, estimated, evaluate):
-    near = evaluate("pinn-std", 1.005)
-    page = Page(render(replace(content, evaluations=[estimated, near], reference=estimated)))
-    text = page.text.replace("\N{NO-BREAK SPACE}", " ")
-    assert "The error of fem itself, by its own estimate: 1.00 % in the displacement" in text
-    assert text.count("±") > 12  # six and six differences, and the note
-    assert "0.500 ± 1.0" in text
+    assert "±" not in page_of(content).text
+    page = page_of(content, evaluations=[estimated, evaluate("pinn-std", 1.005)], reference=estimated)
+    assert page.text.count("±") > 12  # six and six differences, and the note
+    assert "0.500 ± 1.0" in page.text
     assert "within" in page.values("class")
-    assert "pinn-std differs from fem by less than the own error of fem in: displacement, " in text
-    assert "fem differs from fem" not in text
-    assert page.unbalanced == []
 
 
 @pytest.mark.parametrize(("tolerance", "warned"), [(1e-3, False), (1e-6, True)])
 def test_refinement_is_told_round_by_round(content, mesh, tolerance, warned):
     rounds = (RefinementRound(100, 70, 0.0123, 0.2), RefinementRound(250, 160, 0.00045, 0.1))
-    page = Page(render(replace(content, adaptation=Adaptation(tolerance, rounds, mesh))))
+    page = page_of(content, adaptation=Adaptation(tolerance, rounds, mesh))
     assert {"adapt"} <= set(page.values("id"))
     assert ("not-adapted" in page.values("id")) is warned
     assert "1 250 160 0.00045 10.0 %" in page.text
-    assert page.unbalanced == []
 
 
 def test_a_single_solver_is_compared_with_nothing(content: Results, fem: Evaluation) -> None:
-    text = Page(render(replace(content, evaluations=[fem]))).text
-    assert "nothing to compare it with" in text
-
-
-def test_foreign_text_stays_text(content, observe, fem):
-    seen = observe(fem.marker_displacement, source='simulated <script>alert("x")</script>')
-    foreign = render(replace(content, observations=seen), provenance={"<b>": "<script>"})
-    assert foreign.count("<script") == render(content).count("<script")
-
-
-def test_it_is_written_atomically(content: Results, tmp_path: Path) -> None:
-    html_report.write_report(tmp_path / "out" / "report.html", content, [], {})
-    assert (tmp_path / "out" / "report.html").read_text(encoding="utf-8") == render(content, provenance={})
-    assert len(list((tmp_path / "out").iterdir())) == 1
+    assert "nothing to compare it with" in page_of(content, evaluations=[fem]).text
 
 
 def test_what_a_solver_found_is_told_apart_from_its_other_numbers() -> None:
@@ -271,16 +194,6 @@ def test_held_out_errors_come_first_as_a_phone_shows_no_more(html) -> None:
     cells = re.findall(r"<td>(.*?)</td>", body[: body.index("</tr>")])
     assert "–" not in cells[:4]
     assert cells[4:] == 4 * ["–"]  # fem is given no markers
-
-
-def test_a_phone_shows_whole_captions_and_the_lines_of_the_first_column(html) -> None:
-    """A caption is as wide as its table, and a cell that stays in place leaves collapsed borders behind."""
-    phone = html[html.index("@media (max-width: 34rem)") : html.index("@media print")]
-    (caption,) = re.findall(r"\.scroll caption \{(.*?)\}", phone)
-    assert "position: sticky" in caption
-    assert "max-width: calc(100vw" in caption
-    (table,) = re.findall(r"\.scroll table \{(.*?)\}", phone)
-    assert "border-collapse: separate" in table
 
 
 def test_a_reader_who_wants_it_dark_has_it_dark_but_not_on_paper(html) -> None:

@@ -3,50 +3,17 @@
 import csv
 import io
 import re
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from compare.evaluation.evaluation import Evaluation
-from compare.figures import Picture
-from compare.figures.gallery import draw
-from compare.report.html_report import write_report
 from compare.runtime.html import write_html
 from compare.runtime.tables import TextTable
 from geometry.mesh.triangle_mesh import TriangleMesh
-from tests.compare.report.browser import SOFTWARE_WEBGL, TIMEOUT, Opened, chromium, opened
-
-TITLES = {"marker_errors": "Errors at the markers", "von_mises": "Von Mises stress"}
-"""Beginnings of the alternative texts of the pictures."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium(*SOFTWARE_WEBGL) as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def written(estimated, pinn, failed, evaluate, compared, tmp_path_factory) -> Path:
-    """A report with four solvers, one of which followed the load, a truth and two pictures."""
-    folder = tmp_path_factory.mktemp("report")
-    given = replace(evaluate("pinn-asm", 1.02), in_sample=True, left_out=estimated.marker_displacement)
-    end, fractions = failed.node_displacement, np.array([0.0, 0.5, 1.0])
-    path = np.stack([0 * end, 0.1 * end, end])  # far from linear
-    followed = replace(failed, path=path, history={"load_fraction": fractions})
-    comparison = compared(estimated, pinn, followed, given, truth=evaluate("fem-nonlinear", 1.05))
-    pictures = []
-    for name in TITLES:
-        drawing = draw(comparison, name)
-        picture = drawing.figure.save(folder / f"{name}.png")
-        pictures.append(Picture(picture, drawing.title, drawing.caption, drawing.alt))
-    write_report(folder / "report.html", comparison, pictures, {"seed": 17})
-    return folder / "report.html"
+from tests.compare.report.browser import TIMEOUT, Opened, opened
 
 
 @pytest.fixture(scope="module")
@@ -60,30 +27,6 @@ def viewer(desk: Opened) -> Page:
     desk.page.evaluate("document.getElementById('viewer').scrollIntoView()")
     desk.page.locator("#viewer[data-ready]").wait_for()
     return desk.page
-
-
-def painted(page: Page) -> set[tuple[int, int, int]]:
-    """The colours on the canvas of the field viewer."""
-    shot = Image.open(io.BytesIO(page.locator("#viewer-canvas").screenshot())).convert("RGB")
-    return {colour for _, colour in shot.getcolors(shot.width * shot.height)}
-
-
-def test_the_field_is_drawn_switched_and_zoomed(viewer: Page) -> None:
-    first = painted(viewer)
-    assert len(first) > 50
-    viewer.select_option("#viewer-solver", label="pinn-std")
-    viewer.select_option("#viewer-quantity", label="Von Mises stress")
-    viewer.select_option("#viewer-show", label="minus fem")
-    assert viewer.inner_text("#viewer-title") == "Von Mises stress, MPa: pinn-std minus fem"
-    assert "a scale of its own" in viewer.inner_text("#viewer-note")
-    viewer.wait_for_timeout(300)
-    second = painted(viewer)
-    assert len(second - first) > 20
-    before = viewer.locator("#viewer-canvas").screenshot()
-    viewer.locator("#viewer-canvas").focus()
-    viewer.keyboard.press("+")
-    viewer.wait_for_timeout(300)
-    assert viewer.locator("#viewer-canvas").screenshot() != before
 
 
 def test_the_middle_is_read_by_the_keyboard(viewer: Page, pinn: Evaluation, mesh: TriangleMesh) -> None:
@@ -146,23 +89,6 @@ def test_the_page_complains_of_nothing_and_asks_for_nothing(desk: Opened, viewer
     assert desk.asked == []
 
 
-@pytest.mark.parametrize("name", ["marker_errors", "von_mises"])
-def test_a_picture_on_the_page_is_the_one_that_was_written(desk: Opened, written: Path, name: str) -> None:
-    """Its pixels, and its proportions, as the reader sees them."""
-    with Image.open(written.with_name(f"{name}.png")) as file:
-        picture = file.convert("RGB")
-    shown = desk.page.get_by_alt_text(re.compile(TITLES[name]))
-    shown.evaluate("(image) => { image.closest('details').open = true; }")  # the viewer folds them away
-    natural = shown.evaluate("(image) => [image.naturalWidth, image.naturalHeight]")
-    assert tuple(natural) == picture.size
-    box = shown.evaluate("(image) => [image.clientWidth, image.clientHeight]")
-    assert box[0] > 400
-    assert box[1] / box[0] == pytest.approx(picture.height / picture.width, rel=0.01)
-    seen = Image.open(io.BytesIO(shown.screenshot())).convert("RGB").resize((64, 64))
-    off = np.abs(np.asarray(seen, dtype=int) - np.asarray(picture.resize((64, 64)), dtype=int))
-    assert off.mean() < 5
-
-
 def test_nothing_is_wider_than_a_phone(desk: Opened) -> None:
     desk.page.set_viewport_size({"width": 390, "height": 900})
     assert desk.page.evaluate("document.documentElement.scrollWidth") == 390
@@ -223,30 +149,6 @@ def test_a_table_is_copied_as_csv_and_latex(desk: Opened) -> None:
     assert r", \%" in latex
 
 
-def test_the_button_puts_the_table_on_the_clipboard(desk: Opened) -> None:
-    page = desk.page
-    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    page.get_by_role("button", name="Copy as CSV: Mean absolute error").click()
-    page.get_by_text("copied as CSV").wait_for()
-    assert page.evaluate("navigator.clipboard.readText()").startswith("Solver,")
-
-
-def test_a_part_is_folded_by_a_key(desk: Opened) -> None:
-    part = desk.page.locator("#design")
-    assert part.get_attribute("open") is not None
-    part.locator("summary").focus()
-    desk.page.keyboard.press("Enter")
-    assert part.get_attribute("open") is None
-
-
-def test_paper_has_every_part_unfolded(desk: Opened) -> None:
-    page = desk.page
-    page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = false))")
-    page.emulate_media(media="print")
-    assert page.locator("#viewer").is_hidden()
-    assert page.locator("#design table").bounding_box()["height"] > 20
-
-
 def height(page: Page) -> int:
     return int(page.evaluate("document.documentElement.scrollHeight"))
 
@@ -270,15 +172,7 @@ def test_a_table_that_goes_on_says_so_and_no_name_breaks(desk: Opened) -> None:
     page.wait_for_function("!document.querySelector('#table-one').parentElement.matches('.cut')")
 
 
-def test_a_picture_grows_on_a_click(desk: Opened) -> None:
-    image = desk.page.get_by_alt_text(re.compile(TITLES["marker_errors"]))
-    before = image.bounding_box()["width"]
-    image.click()
-    assert image.bounding_box()["width"] > 1.4 * before
-    image.click()
-    assert image.bounding_box()["width"] == before
-
-
+@pytest.mark.slow
 def test_a_whole_report_is_short_and_prints_on_few_pages(browser: Browser, finished: Path) -> None:
     page = opened(browser, finished / "report.html").page
     assert height(page) < 12_000

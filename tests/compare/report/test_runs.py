@@ -1,6 +1,5 @@
 """Several finished runs side by side: `pinnray report`."""
 
-import csv
 import json
 import re
 import shutil
@@ -16,6 +15,7 @@ from compare.report.runs import differing_settings, read_runs
 from geometry.atomic import write_json
 from pinnray.cli import main
 from solvers.solution import Estimated, IdentifiedForce
+from tests.compare.tables import rows_of
 
 Save = Callable[..., Path]
 
@@ -50,8 +50,7 @@ def test_one_run_gives_its_answers(save: Save, capsys: pytest.CaptureFixture[str
 def test_several_runs_are_one_page_and_one_table(save: Save, tmp_path: Path) -> None:
     runs = [save("first"), save("second", 1.1, seed=7)]
     assert main(["report", *map(str, runs), "--out", str(tmp_path / "both")]) == 0
-    with (tmp_path / "both" / "runs.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(tmp_path / "both" / "runs.csv")
     assert [(row["run"], row["solver"]) for row in rows] == [
         (run, solver) for run in ("first", "second") for solver in ("fem", "pinn-std", "fem-asm")
     ]
@@ -80,32 +79,6 @@ def test_what_differs_between_runs_is_named(save: Save) -> None:
 def test_runs_of_one_name_are_told_apart_by_their_paths(save: Save) -> None:
     folders = [save("a/run"), save("b/run")]
     assert [run.name for run in read_runs(folders)] == [str(folder) for folder in folders]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ([], "no run was given"),
-        (["nowhere"], "there is no folder nowhere"),
-        (["empty"], "empty has no metrics.json"),
-        (["damaged"], "metrics.json is damaged"),
-        (["foreign"], "is not of `compare`"),
-        (["first", "first"], "a run is given twice"),
-        (["first", "--out", "elsewhere"], "--out is for several runs"),
-        (["first", "second", "--out", "first/run.json"], "is a file"),
-    ],
-)
-def test_a_wrong_folder_is_refused_in_a_line(save, tmp_path, monkeypatch, capsys, arguments, words):
-    save("first"), save("second")
-    for name, text in (("damaged", "{"), ("foreign", json.dumps({"schema": 99}))):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "metrics.json").write_text(text, encoding="utf-8")
-        (tmp_path / name / "run.json").write_text("{}", encoding="utf-8")
-    (tmp_path / "empty").mkdir()
-    monkeypatch.chdir(tmp_path)
-    assert main(["report", *arguments]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert words in line
 
 
 def without_numbers(value):
@@ -150,11 +123,7 @@ def test_a_number_that_is_null_is_no_number(truthful, capsys, solvers):
     words = [capsys.readouterr().out, *(path.read_text("utf-8") for path in both.iterdir())]
     for text in words:
         assert not re.search(r"\b(nan|None|inf)\b", text)
-    rows = [
-        row
-        for row in csv.DictReader((both / "runs.csv").open())
-        if row["solver"] in (solvers or row["solver"])
-    ]
+    rows = [row for row in rows_of(both / "runs.csv") if row["solver"] in (solvers or row["solver"])]
     assert {row["force_N_per_mm"] for row in rows} == {""}
 
 
@@ -187,6 +156,13 @@ def test_a_run_that_lacks_a_number_is_one_line(save, capsys, solver, key, value)
     content["solvers"][solver][key] = value
     write_json(folder / "metrics.json", content)
     assert main(["report", str(folder)]) == 2
-    assert capsys.readouterr().err.endswith(
-        "metrics.json is damaged: a number is missing; make the run again\n"
-    )
+    assert "metrics.json is damaged: a number is missing" in capsys.readouterr().err
+
+
+def test_a_report_needs_a_run_and_a_free_name(save, tmp_path, capsys):
+    runs = [str(save("first")), str(save("second"))]
+    lone = [runs[0], "--out", str(tmp_path / "both")]
+    for arguments in ([], lone, [*runs, "--out", f"{runs[0]}/run.json"]):
+        assert main(["report", *arguments]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "both").exists()

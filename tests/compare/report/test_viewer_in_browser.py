@@ -1,8 +1,6 @@
 """The viewer of the report: moved, compared, played and saved as a reader does it, in Chromium."""
 
 import io
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,40 +9,13 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from compare.evaluation.evaluation import Evaluation
-from compare.report.html_report import write_report
 from geometry.arrays import FloatArray
 from geometry.mesh.triangle_mesh import TriangleMesh
-from tests.compare.report.browser import SOFTWARE_WEBGL, chromium, opened
+from tests.compare.report.browser import opened
 
 CANVAS = "document.getElementById('viewer-canvas')"
 ZOOM = f"{CANVAS}.layout.scene.aspectratio.x"
 SOLVER = "pinnrayFields.manifest.solvers[%d]"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium(*SOFTWARE_WEBGL) as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def truth(evaluate) -> Evaluation:
-    return evaluate("fem-nonlinear", 1.05)
-
-
-@pytest.fixture(scope="module")
-def followed(failed) -> Evaluation:
-    """A solver that recorded its path, which is far from linear."""
-    end = failed.node_displacement
-    path = np.stack([0 * end, 0.1 * end, end])
-    return replace(failed, path=path, history={"load_fraction": np.array([0.0, 0.5, 1.0])})
-
-
-@pytest.fixture(scope="module")
-def written(fem, pinn, followed, truth, compared, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("viewer") / "report.html"
-    write_report(path, compared(fem, pinn, followed, truth=truth), [], {"seed": 17})
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -159,6 +130,7 @@ def test_a_field_is_shown_minus_the_truth(viewer: Page, pinn: Evaluation, truth:
     viewer.select_option("#viewer-quantity", label="Von Mises stress")
     viewer.select_option("#viewer-show", label="minus truth")
     assert viewer.inner_text("#viewer-title") == "Von Mises stress, MPa: pinn-std minus truth"
+    assert "a scale of its own" in viewer.inner_text("#viewer-note")
     expected = pinn.per_triangle(pinn.von_mises - truth.von_mises)
     found = fields(viewer, 1, 1, 1.0, "'truth'")
     np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(expected).max())

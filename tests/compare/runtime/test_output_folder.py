@@ -34,11 +34,7 @@ def out(tmp_path: Path) -> Path:
 
 
 def write(
-    folder: Path,
-    *,
-    solutions: tuple[str, ...] = (),
-    training: str = "",
-    error: BaseException | None = None,
+    folder: Path, *, solutions: tuple[str, ...] = (), training: str = "", error: BaseException | None = None
 ) -> None:
     (folder / "report.html").write_text("new report")
     if training:
@@ -86,10 +82,7 @@ def test_an_error_before_anything_was_finished_leaves_nothing(tmp_path):
     [
         ((), {}),
         (("fem",), {"solutions/fem.npz": "new solution"}),
-        (
-            ("pinn",),
-            {"solutions/pinn.npz": "new solution", "training/pinn/checkpoint": "epoch 7"},
-        ),
+        (("pinn",), {"solutions/pinn.npz": "new solution", "training/pinn/checkpoint": "epoch 7"}),
     ],
 )
 def test_only_solutions_and_checkpoints_that_are_asked_for_outlive_an_earlier_attempt(out, keep, left):

@@ -44,13 +44,6 @@ def test_stages_of_other_processes_overlap_and_end_when_they_say_so():
     assert set(stages.seconds) == {"gp", "fem"}
 
 
-def test_a_long_note_stays_one_line_in_a_log():
-    log = console(terminal=False)
-    with Stages(log) as stages, stages.stage("fem") as progress:
-        progress(1.0, "word " * 50)
-    assert shown(log).count("\n") == 1
-
-
 def test_a_terminal_has_a_bar_a_stage():
     terminal = console(terminal=True)
     two_stages(Stages(terminal))
@@ -64,19 +57,6 @@ def test_quiet_shows_nothing(terminal):
     quiet = console(terminal=terminal)
     two_stages(Stages(quiet, quiet=True))
     assert shown(quiet) == ""
-
-
-def fail_halfway(stages: Stages) -> None:
-    with stages, stages.stage("fem"):
-        raise RuntimeError
-
-
-def test_a_stage_that_fails_is_not_said_to_be_done():
-    log = console(terminal=False)
-    stages = Stages(log)
-    with pytest.raises(RuntimeError):
-        fail_halfway(stages)
-    assert (shown(log), stages.seconds) == ("", {})
 
 
 def test_the_time_of_every_stage_is_kept():

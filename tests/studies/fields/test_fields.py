@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
@@ -151,21 +150,6 @@ def test_a_sweep_keeps_the_path_of_each_sample_on_the_moved_mesh(tmp_path, in_li
         assert path.numbers[number, :2] == pytest.approx(
             solution.reaction, abs=1e-3 * abs(solution.reaction[1])
         )
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"solver": "fem"}, "fem-nonlinear"),
-        ({"fixed": {"load": "mean"}}, "cylinder"),
-        ({"fixed": {"load": "cylinder"}, "varied": {"stroke": {"from": 2, "to": 8}}}, "full stroke"),
-        ({"varied": {"rib_count": {"from": 2, "to": 8}}}, "rib_count is a choice"),
-    ],
-)
-def test_a_study_that_no_moving_mesh_serves_is_refused(changes, says):
-    content = study().model_dump(by_alias=True, exclude_none=True)
-    with pytest.raises(UserError, match=says):
-        Study(**{**content, **changes})
 
 
 def test_a_path_between_its_equilibria_is_a_spline():

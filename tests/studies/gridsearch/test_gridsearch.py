@@ -1,28 +1,26 @@
 """The grid search: what a run is worth, what is kept, what is refused, and the order of the result."""
 
-import csv
 import json
 import shlex
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from compare.runtime.exits import INTERRUPTED, NOT_CONVERGED
-from geometry.arrays import FloatArray
+from compare.runtime.exits import NOT_CONVERGED
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.settings import MeshSettings
 from pinnray.cli import main
 from pinnray.commands.studies.gridsearch import read_settings
 from pinnray.options.shared import SolverOptions
 from solvers.fem.linear import FemSolver
+from solvers.lagrange import LagrangeField
 from solvers.problem import Load, Problem
-from solvers.solution import DisplacementField, Solution
+from solvers.solution import Solution
 from solvers.solver import TrainingDiverged
 from studies.gridsearch.search import grid_study, search_grid
 from studies.gridsearch.training_run import DIVERGED, FAILED, TRAINED, GridPoint, TrainingRun, best_of
@@ -31,6 +29,7 @@ from studies.sweep.measurement import Measurement, measured
 from studies.sweep.quantities import TRAINING, training
 from studies.sweep.study import Study
 from studies.sweep.workers import Workers
+from tests.compare.tables import rows_of
 
 TINY = {"preset": "paper", "epochs": 2, "width": 4, "layers": 1, "base_points": 5}
 DIED = "its worker process died 8 times"
@@ -83,27 +82,16 @@ def distance(point: GridPoint) -> float:
 # What a run is worth
 
 
-@dataclass(frozen=True)
-class Shifted:
-    """A field, moved as a whole."""
-
-    field: DisplacementField
-    by: tuple[float, float]
-
-    def displacement(self, location: LocatedPoints) -> FloatArray:
-        return self.field.displacement(location) + self.by
-
-    def gradient(self, location: LocatedPoints) -> FloatArray:
-        return self.field.gradient(location)
-
-
 @pytest.fixture(scope="module")
 def fem(coarse_mesh) -> Solution:
     """With what a training says of itself."""
-    history = {"total": np.array([9.0, 3.0])}
-    return replace(
-        FemSolver().solve(Problem(coarse_mesh)), history=history, stats={"epochs": 2, "seconds": 1.5}
-    )
+    said = {"history": {"total": np.array([9.0, 3.0])}, "stats": {"epochs": 2, "seconds": 1.5}}
+    return replace(FemSolver().solve(Problem(coarse_mesh)), **said)
+
+
+def shifted(field: LagrangeField, by: tuple[float, float]) -> LagrangeField:
+    """A field, moved as a whole."""
+    return LagrangeField(field.space, field.values + by)
 
 
 def test_the_reference_itself_is_at_no_distance(fem):
@@ -115,7 +103,7 @@ def test_the_reference_itself_is_at_no_distance(fem):
 
 def test_a_finger_that_moves_as_a_whole_violates_base_and_load_by_as_much(fem):
     """By (0.3, 0.4) mm, half a millimetre, of a stroke of 10 mm; the energy is that of the strain."""
-    worth = training(replace(fem, field=Shifted(fem.field, (0.3, 0.4))))
+    worth = training(replace(fem, field=shifted(fem.field, (0.3, 0.4))))
     assert (worth["base_violation"], worth["load_violation"]) == pytest.approx((0.5, 0.5))
     assert worth["boundary_violation"] == pytest.approx(0.05)
     assert worth["rel_energy"] == 0
@@ -123,7 +111,7 @@ def test_a_finger_that_moves_as_a_whole_violates_base_and_load_by_as_much(fem):
 
 def test_a_component_that_is_free_cannot_be_violated(fem):
     problem = replace(fem.problem, load=Load(displacement=(None, -10.0)))
-    moved = replace(fem, problem=problem, field=Shifted(fem.field, (7.0, 0.4)))
+    moved = replace(fem, problem=problem, field=shifted(fem.field, (7.0, 0.4)))
     assert training(moved)["load_violation"] == pytest.approx(0.4)
 
 
@@ -182,8 +170,7 @@ def test_runs_are_ranked_by_their_distance_from_fem_and_not_by_their_loss(wanted
     runs = search_grid(wanted)
     assert [run.point for run in runs] == sorted(points, key=distance)
     assert best_of(runs) == runs[0]
-    with (wanted.out / "gridsearch.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(wanted.out / "gridsearch.csv")
     assert [row["rank"] for row in rows] == ["1", "2", "3", "4"]
     assert [float(row["rel_l2_displacement"]) for row in rows] == sorted(map(distance, points))
     assert rows[0]["loss_MPa"] == str(1 / distance(runs[0].point))
@@ -221,7 +208,6 @@ def test_an_interrupted_search_goes_on_where_it_was(wanted, scripted):
     ("changes", "names"),
     [
         ({"study": study({**TINY, "epochs": 3})}, "study.settings"),
-        ({"study": study(load="point")}, "study.fixed"),
         ({"mesh": MeshSettings(size=1.5)}, "mesh.size"),
         ({"finger": Design(height=80.0)}, "finger.height"),
     ],
@@ -235,27 +221,9 @@ def test_another_search_in_the_same_folder_is_refused(wanted, scripted, changes,
     assert (wanted.out / "gridsearch.json").read_text() == before
 
 
-# On the command line
-
-
 def run_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> int:
     monkeypatch.chdir(tmp_path)
     return main(shlex.split("gridsearch --learning-rates 1e-3 --bc-weights 1,10 --mesh-size 1 --epochs 2"))
-
-
-def test_an_interrupted_search_says_how_to_go_on(tmp_path, capsys, monkeypatch, scripted):
-    def interrupted(point: GridPoint) -> float:
-        raise KeyboardInterrupt
-
-    scripted(interrupted)
-    assert run_on_the_command_line(tmp_path, monkeypatch) == INTERRUPTED
-    assert "goes on from what out/gridsearch-default keeps" in capsys.readouterr().err.splitlines()[-1]
-
-
-def test_a_search_whose_runs_all_diverged_says_so_by_its_exit_code(tmp_path, capsys, monkeypatch, scripted):
-    scripted(lambda _: ("not converged", "loss became nan"))
-    assert run_on_the_command_line(tmp_path, monkeypatch) == NOT_CONVERGED
-    assert capsys.readouterr().out.count("diverged") == 2
 
 
 def test_a_run_that_failed_is_named(tmp_path, capsys, monkeypatch, scripted):

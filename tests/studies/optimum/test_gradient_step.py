@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from studies.optimum.gradient_step import TRUST, stepped
 from studies.optimum.page import steps_sentence
-from studies.optimum.question import Limit, Question, question_of
+from studies.optimum.question import Limit, Question
 from studies.optimum.search import search_front
 from studies.sweep.job import StudyJob
 from studies.sweep.measurement import measured
@@ -89,9 +88,3 @@ def test_a_search_ends_with_the_steps_and_says_what_they_gained(tmp_path, monkey
     assert "step along exact derivatives" in said
     again = search_front(StudyJob(asked, Path(), tmp_path / "out", 2))
     assert again.fingers == found.fingers  # nothing is left to do
-
-
-def test_steps_without_derivatives_are_refused():
-    content = {"name": "step", "varied": VARIED, "objectives": {"wrap": "largest", "force": "largest"}}
-    with pytest.raises(UserError, match="steps: derivatives"):
-        question_of({**content, "steps": 3, "solver": "pinn-std"})

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from geometry.errors import UserError
 from studies.optimum.question import Question, load_question
 
 GOOD = """
@@ -36,36 +35,3 @@ def test_costs_are_least_at_the_best(tmp_path: Path) -> None:
     assert question.allows(values | {"thinnest_wall": 0.8})
     assert not question.allows(values | {"thinnest_wall": 3.1})
     assert question.samples == 13
-
-
-REFUSED = {
-    "one objective": (GOOD.replace('force = "least"\n', ""), "objectives"),
-    "no such quantity": (
-        GOOD.replace("wrap =", "wrapping ="),
-        "there is no quantity 'wrapping'; there",
-    ),
-    "no such sense": (GOOD.replace('"largest"', '"most"'), "objectives"),
-    "no limit": (
-        GOOD.replace("{at_most = 2.0}", "{}"),
-        "constraints.von_mises: give at_least, at_most",
-    ),
-    "limit without a name": (GOOD.replace("{at_most = 2.0}", "2.0"), "write constraints as NAME = {at_least"),
-    "a drawing": (
-        GOOD.replace("rib_thickness = {from = 0.6, to = 2.5}", 'section = {values = ["a.dxf"]}'),
-        "a drawing has no parameters to optimise",
-    ),
-    "samples": (
-        "samples = 4\n" + GOOD,
-        "samples belongs to a study; the search",
-    ),
-    "too few runs": (GOOD.replace("runs = 40", "runs = 4"), "runs = 4 is outside its range, 20 to"),
-    "study's own faults": (GOOD.replace("to = 2.5", "to = 0.1"), "from = 0.6 must be below to = 0.1"),
-}
-
-
-@pytest.mark.parametrize(("text", "message"), REFUSED.values(), ids=REFUSED)
-def test_a_wrong_question_is_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(UserError) as error:
-        asked(tmp_path, text)
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
