@@ -399,12 +399,7 @@ def test_the_docs_have_every_setting_of_the_other_presets_as_it_is():
 
 
 def test_the_docs_have_the_limits_of_the_certificate():
-    from compare.evaluation.certificate import (
-        CONDITION_LIMIT,
-        ENERGY_LIMIT,
-        INTERPOLANT_LIMIT,
-        WORK_LIMIT,
-    )
+    from compare.evaluation.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT, WORK_LIMIT
 
     said = [float(row[1].split(" %")[0]) / 100 for row in table(TRUST, "fault")]
     assert said == [ENERGY_LIMIT, CONDITION_LIMIT, INTERPOLANT_LIMIT, WORK_LIMIT]

@@ -6,7 +6,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, MeshSettings, UserError, cad, cad_files, load_design, marker_positions
+from geometry import Design, MeshSettings, cad, cad_files, load_design, marker_positions
 from geometry.mesh.mesher import build_mesh
 from tests.meshes import body_area, body_perimeter
 
@@ -123,8 +123,3 @@ def test_the_mesh_has_its_boundary_on_the_cad_face(design: Design) -> None:
     wires = cq.Compound.makeCompound([face.outerWire(), *face.innerWires()])
     nodes = mesh.points[np.unique(mesh.boundary_edges)]
     assert max(wires.distance(cq.Vertex.makeVertex(x, y, 0)) for x, y in nodes) < 1e-9
-
-
-def test_unknown_format_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"'obj'.*step, stl, dxf, svg"):
-        cad_files(Design(), tmp_path, formats=["obj"])

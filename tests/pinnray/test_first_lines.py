@@ -401,10 +401,7 @@ def larger_finger() -> object:
         (lambda: pr.solver("pinn"), "did you mean 'pinn-std' or 'pinn-asm' or 'pinn-id'"),
         (lambda: pr.solver(), "no solver was named .there are: fem, fem-nonlinear, "),
         (lambda: pr.solver("fem", preset="fast"), "fem has no presets; pinn-std and pinn-asm have"),
-        (
-            lambda: pr.solve(preset="best"),
-            "there is no preset 'best'; pinn-std has fast, local, ",
-        ),
+        (lambda: pr.solve(preset="best"), "there is no preset 'best'; pinn-std has fast, local, "),
         (lambda: pr.solve(material=3), "material must be a Material, such as .*, not 3"),
         (lambda: pr.solve(load=3), "load must be a Load or one of mean, point, patch, cylinder, not 3"),
         (lambda: pr.solve(load=pr.Load(), stroke=3), "stroke is part of the load that is given"),
@@ -416,10 +413,7 @@ def larger_finger() -> object:
         (lambda: pr.compare(solvers=3), "3 is no solver"),
         (lambda: pr.compare(solvers="fem", adapt="fine"), "adapt = 'fine' is no number"),
         (lambda: pr.compare(solvers="fem", out=3), "out is 3; give a path"),
-        (
-            lambda: pr.crossval(solvers="fem", out="x", seedz=2),
-            "'seedz'; did you mean seeds",
-        ),
+        (lambda: pr.crossval(solvers="fem", out="x", seedz=2), "'seedz'; did you mean seeds"),
         (lambda: pr.sweep(3), "give a dictionary such as .* not 3"),
         (lambda: pr.sweep({"rib_count": 4}), "rib_count: give a list of values, such as"),
         (lambda: pr.sweep({"ribs": [4, 6]}), "unknown parameter 'ribs'; did you mean rib_count"),

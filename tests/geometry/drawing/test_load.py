@@ -244,3 +244,17 @@ def test_drawn_fingers_are_meshed(path):
     assert mesh.areas.sum() == pytest.approx(finger.section.area, rel=1e-3)
     assert mesh.boundary_length("base") == pytest.approx(clamped_length(finger), rel=1e-6)
     np.testing.assert_allclose(mesh.markers, finger.markers, atol=1e-9)
+
+
+def test_lines_of_a_command_beat_those_of_a_file(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text("contact = [1, 2]\nclamp = [[0, 0], [0, 1]]")
+    found = load_description(path, ["contact = [3, 4]", "markers = 4"])
+    assert (found.contact, found.markers, found.clamp) == ((3, 4), 4, (((0, 0), (0, 1)),))
+
+
+def test_a_drawing_of_which_all_is_called_front_is_read(tmp_path):
+    """What is named may lie on the boundary, but here it is the boundary."""
+    path = write_svg(tmp_path / "a.svg", '<g id="front"><rect width="60" height="9"/></g>')
+    finger = finger_from_file(path, Description(clamp=[[0, 0], [0, -9]], contact=[40, 0]))
+    assert np.ptp(finger.section.outline.points, axis=0) == pytest.approx([60, 9])

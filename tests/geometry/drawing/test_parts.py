@@ -13,7 +13,6 @@ from geometry.drawing.load import finger_from_file
 from geometry.errors import UserError
 from geometry.mesh.mesher import session
 from geometry.mesh.settings import MeshSettings
-from tests.geometry.drawing.files import BEAM, write_dxf
 
 WHERE = {"markers": [[50, -2]], "materials": {"Strip": {"young": 2e5, "poisson": 0.3}}}
 
@@ -96,8 +95,3 @@ def test_what_would_lose_the_materials_is_refused(file):
 def test_a_material_of_no_part_is_refused(file, materials, said):
     with pytest.raises(UserError, match=said):
         finger_from_file(file, Description(**{**WHERE, "materials": materials}))
-
-
-def test_materials_of_a_drawing_without_parts_are_refused(tmp_path):
-    with pytest.raises(UserError, match="physical surfaces of a plane Gmsh mesh"):
-        finger_from_file(write_dxf(tmp_path / "beam.dxf", [BEAM]), Description(**WHERE))

@@ -14,15 +14,7 @@ from geometry.drawing.checks import body
 from geometry.drawing.formats import msh
 from geometry.drawing.formats.drawing import Drawing
 from geometry.drawing.load import read_drawing
-from tests.geometry.drawing.files import (
-    BEAM,
-    CSIRO,
-    FINRAY,
-    rectangle,
-    write_beam_mesh,
-    write_dxf,
-    write_svg,
-)
+from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, write_beam_mesh, write_svg
 
 
 def area(drawing: Drawing) -> float:
@@ -192,26 +184,6 @@ def test_no_script_of_gmsh_is_run(tmp_path, name):
     assert not mark.exists()
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("a.stl", "", "cannot read a.stl as a drawing; there are .step, .stp, .dxf, .svg, .msh"),
-        ("a.dxf", "no drawing", "a.dxf: it cannot be read as DXF"),
-        ("a.svg", "<svg", "a.svg: it cannot be read as SVG"),
-        ("a.step", "ISO", "a.step: it cannot be read as STEP"),
-        ("a.msh", "$Mesh", "a.msh: it is no Gmsh mesh: its first line is not"),
-        ("a.msh", "$MeshFormat", "a.msh: it cannot be read as a Gmsh mesh"),
-    ],
-)
-def test_unreadable_files(tmp_path, name, content, message):
-    (tmp_path / name).write_text(content)
-    with pytest.raises(UserError, match=message) as error:
-        read_drawing(tmp_path / name)
-    assert "\n" not in str(error.value)
-    with pytest.raises(UserError, match=r"there is no drawing|as a drawing"):
-        read_drawing(tmp_path / "missing" / name)
-
-
 def test_names_of_groups_are_utf_8(tmp_path):
     path = write_beam_mesh(tmp_path / "beam.msh", groups=("base", "contact"))
     path.write_bytes(path.read_bytes().replace(b'"contact"', b'"conta\xe9t"'))
@@ -221,23 +193,6 @@ def test_names_of_groups_are_utf_8(tmp_path):
         read_drawing(path)
 
 
-@pytest.mark.parametrize(
-    ("elements", "message"),
-    [
-        (["1 4 2 1 1 1 2 3 4", "2 4 2 1 1 1 2 3 4"], "its elements have no outer face; is each there twice"),
-        (["1 2 2 1 1 1 2 3", "2 2 2 1 1 1 2 3"], "there is no line or arc in it"),
-        (["1 4 2 1 1 1 2 3 9"], "a.msh: it cannot be read as a Gmsh mesh: Wrong node index 9"),
-    ],
-)
-def test_meshes_without_a_boundary_are_refused(tmp_path, elements, message):
-    (tmp_path / "a.msh").write_text(
-        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
-        + "\n".join(["$Elements", str(len(elements)), *elements, "$EndElements\n"])
-    )
-    with pytest.raises(UserError, match=message):
-        read_drawing(tmp_path / "a.msh")
-
-
 @pytest.mark.parametrize("tag", [0, 3, 9])
 def test_nodes_that_the_file_lacks_are_refused(tag):
     """Gmsh gives such tags, as it finds them in its memory, for damaged files of version 2."""
@@ -245,11 +200,3 @@ def test_nodes_that_the_file_lacks_are_refused(tag):
     assert msh._numbers(number, np.array([[1, 2, 4]], np.uint64)).tolist() == [[0, 1, 2]]
     with pytest.raises(UserError, match="an element has a node that the file lacks"):
         msh._numbers(number, np.array([[1, 2, tag]], np.uint64))
-
-
-def test_a_plane_cuts_solids_only(tmp_path):
-    path = write_dxf(tmp_path / "a.dxf", [rectangle(0, 0, 10, 10)])
-    with pytest.raises(UserError, match="plane already"):
-        read_drawing(path, plane="z = 1")
-    with pytest.raises(UserError, match="misses the solid, which reaches from 0 to 12 mm"):
-        read_drawing(FINRAY / "Finray_8.stp", plane="z = 20")

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from geometry import UserError
+from geometry.cache import drawn_finger
 from geometry.drawing.checks import body
 from geometry.drawing.description import Description
 from geometry.drawing.formats import step_parts
 from geometry.drawing.formats.planes import plane_of, plane_text
 from geometry.drawing.load import finger_from_file, read_drawing
+from tests.geometry.drawing.files import FINRAY
 
 BODY = cq.Solid.makeBox(60, 20, 12)
 DISC = cq.Solid.makeCylinder(0.8, 0.6, pnt=cq.Vector(0, 0, 11.4))
@@ -211,17 +213,33 @@ def test_planes_in_any_direction(text, normal, offset):
     assert same * np.sign(again @ found) == pytest.approx(distance, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    "text", ["z", "z = ", "z = z", "0 z = 1", "x - x = 1", "w = 2", "z = 1e999", "2 = z", "= 3"]
-)
-def test_what_is_no_plane_is_refused(text):
-    with pytest.raises(UserError, match="cannot read the plane"):
-        plane_of(text)
-
-
 def test_a_turned_solid_is_cut_by_a_turned_plane(tmp_path):
     solid = cq.Workplane("XY").box(60, 20, 12).edges("|X").chamfer(0.3).val()
     path = saved(tmp_path, solid.rotate((0, 0, 0), (1, 0, 0), 30))
     drawing = read_drawing(path, plane="-0.5 y + 0.86602540378 z = 0")
     assert body(drawing.loops).area == pytest.approx(1200, rel=1e-6)
     assert drawing.depth == pytest.approx(12, abs=1e-4)
+
+
+def test_a_damaged_file_is_refused_by_the_worker(tmp_path):
+    """OpenCASCADE prints about it to the standard output, on which the child process answers."""
+    path = tmp_path / "cut.stp"
+    path.write_bytes((FINRAY / "Finray_8.stp").read_bytes()[:3000])
+    with pytest.raises(UserError, match="it is damaged or cut off"):
+        drawn_finger(path, Description(), cache_dir=tmp_path / "cache")
+
+
+def test_no_other_file_is_read(tmp_path, monkeypatch):
+    """OpenCASCADE reads the parts of an assembly from files of any folder."""
+    from cadquery.occ_impl.exporters.assembly import toCAF
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.STEPControl import STEPControl_StepModelType
+
+    monkeypatch.chdir(tmp_path)
+    _, document = toCAF(cq.Assembly(name="whole").add(BODY, name="body"))
+    writer = STEPCAFControl_Writer()
+    writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs, "part-")
+    writer.Write("whole.step")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["part-body.stp", "whole.step"]
+    with pytest.raises(UserError, match="refers to another file, 'part-body"):
+        read_drawing(Path("whole.step"))

@@ -151,22 +151,6 @@ def test_grading_reaches_its_size_where_asked_and_only_there(setting, place):
     assert length[far].min() > 0.3
 
 
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        ({"size": 0}, "size = 0"),  # below the bound
-        ({"size": "fine"}, "size = 'fine'"),
-        ({"sise": 1}, "did you mean size"),
-        ({"coarsening": 0.5}, "coarsening = 0.5"),
-    ],
-)
-def test_wrong_settings_give_one_line(values: dict[str, object], text: str) -> None:
-    with pytest.raises(UserError) as refused:
-        MeshSettings(**values)
-    assert text in str(refused.value)
-    assert "\n" not in str(refused.value)
-
-
 def random_design(seed: int) -> Design:
     """A finger drawn evenly from wide ranges; draws that break a rule are drawn again."""
     rng = np.random.default_rng(seed)

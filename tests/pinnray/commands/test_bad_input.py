@@ -53,11 +53,7 @@ def test_a_closed_stream_is_no_fault(command, closed):
     ("before", "argument", "said"),
     [
         ("ulimit -n 16;", "out", "the limit of open files is 16; allow 128 (ulimit -n 128)"),
-        (
-            "ulimit -f 8;",
-            "out",
-            "files may not become longer than 8192 bytes; allow 16777216 (ulimit",
-        ),
+        ("ulimit -f 8;", "out", "files may not become longer than 8192 bytes; allow 16777216 (ulimit"),
         ("", "a\udcff", r"the argument 'a\udcff' is not UTF-8; take another name"),
     ],
 )
