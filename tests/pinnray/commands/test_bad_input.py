@@ -63,10 +63,3 @@ def test_what_the_libraries_cannot_start_with_is_one_line(folder, before, argume
     done = run_python(*line, before=before)
     assert (done.returncode, done.stderr.count("\n")) == (BAD_INPUT, 1)
     assert done.stderr.startswith(f"error: {said}")
-
-
-def test_bad_input_of_a_process_has_no_traceback(folder):
-    done = run_python("-m", "pinnray.cli", "compare", "--solvers", "fen")
-    assert (done.returncode, done.stdout) == (BAD_INPUT, "")
-    assert done.stderr.startswith("error: no solver is called 'fen'")
-    assert done.stderr.count("\n") == 1

@@ -64,11 +64,6 @@ def test_a_quiet_command_prints_nothing_and_writes_the_same(command, tmp_path, m
     assert written() == loud
 
 
-def test_a_quiet_command_still_says_what_is_wrong(capsys):
-    assert main(["mesh", "--mesh-size", "0", "--quiet"]) == 2
-    assert capsys.readouterr().err.startswith("error: --mesh-size")
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_every_help_has_every_default(name, capsys):
     assert main([name, "--help"]) == 0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.validation.printed_finger import FINGERS
-from compare.runtime.exits import BAD_INPUT
 from geometry.registration import HAND_HELD
 from pinnray.cli import main
 from vision.measurements import read_measurements
@@ -35,20 +34,3 @@ def test_given_scales_are_those_of_the_pictures(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main([*GIVEN, "--scale", "1.03,1.02"]) == 0
     assert capsys.readouterr().out.startswith("scale 1.03 mm per unit at rest, 1.02 pressed\n")
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--scale", "0"], "error: --scale 0: give same, lengths, or millimetres per unit"),
-        (["--scale", "wide"], "error: --scale 'wide': give 1 or 2 numbers"),
-        (["--out", "points.txt"], "error: --out points.txt: give the name of a table"),
-    ],
-)
-def test_bad_input_is_one_line(tmp_path, monkeypatch, capsys, options, said):
-    monkeypatch.chdir(tmp_path)
-    assert main([*GIVEN, *options]) == BAD_INPUT
-    error = capsys.readouterr().err
-    assert error.startswith(said)
-    assert error.count("\n") == 1
-    assert not list(tmp_path.iterdir())

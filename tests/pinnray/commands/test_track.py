@@ -119,12 +119,6 @@ def test_a_pipe_is_recorded_even_if_its_film_is_refused(film, tmp_path, monkeypa
         np.testing.assert_array_equal([frame.image for frame in kept], rest)
 
 
-def test_a_file_is_not_recorded_again(film, tmp_path, capsys):
-    assert main(["track", str(film / "video.mkv"), "--record", str(tmp_path / "run.mkv")]) == BAD_INPUT
-    assert "a recording keeps the frames of a camera or a pipe" in capsys.readouterr().err
-    assert not (tmp_path / "run.mkv").exists()
-
-
 def test_the_table_shows_deviations_below_a_micrometre(film, tmp_path, capsys):
     """They are 0.0002 to 0.0005 mm in this film."""
     options = ["--camera", str(film / "camera.json"), "--without-video"]
@@ -250,18 +244,3 @@ def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys, without_p
     run = json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert len(run["film"]["video_sha256"]) == 64
     assert "track/final.png" in run["files_sha256"]
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--measurements", "nowhere.mkv"], "no such video"),
-        (["--measurements", "nowhere.csv"], "there is no file nowhere.csv"),
-        (["--camera", "camera.json"], "is for --measurements VIDEO"),
-    ],
-)
-def test_compare_refuses_what_is_no_film(options, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["compare", "--solvers", "fem", *options]) == BAD_INPUT
-    assert said in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []

@@ -47,26 +47,6 @@ def test_mesh_and_scene_are_written_with_the_material(tmp_path, capsys):
     assert json.loads((tmp_path / "material.json").read_text())["young_Pa"] == 3e6
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["mesh", "--score"], "--score is of mujoco"),
-        (["mesh", "--layers", "0"], "layers = 0: give a whole number from 1"),
-        (["mujoco", "--loss-factor", "3"], "loss_factor = 3: give a number above 0"),
-        (["mujoco", "--friction", "0.5"], "without friction"),
-        (["mujoco", "--load", "mean"], "under a cylinder"),
-        (["gazebo"], "mujoco"),
-    ],
-)
-def test_bad_input_is_one_line(tmp_path, capsys, arguments, said):
-    if arguments[0] == "mujoco":
-        pytest.importorskip("mujoco")
-    out = tmp_path / "out"
-    assert main(["export", *arguments, "--mesh-size", "2", "--out", str(out)]) == 2
-    assert said in capsys.readouterr().err
-    assert not out.exists()
-
-
 def test_without_mujoco_it_says_how_to_get_it(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert main(["export", "mujoco", "--mesh-size", "2", "--out", str(tmp_path / "out")]) == 2
