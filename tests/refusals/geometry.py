@@ -9,23 +9,24 @@ import numpy as np
 from geometry import Design, MeshSettings, Observations, TriangleMesh, cad_files, load_design, parse_overrides
 from geometry.drawing.description import Description, load_description
 from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.drawing.formats.msh import _numbers as msh_numbers
 from geometry.drawing.formats.planes import plane_of
 from geometry.drawing.load import finger_from_file, read_drawing
 from geometry.mesh.quadrature import triangle_rule
 from geometry.registration import Registration
 from geometry.text_files import read_json, read_toml
-from tests.geometry.drawing.files import BEAM, FINRAY, broken_dxf, rectangle, write_dxf, write_svg
+from tests.geometry.drawing.files import (
+    BEAM,
+    FINRAY,
+    broken_dxf,
+    rectangle,
+    write_beam_mesh,
+    write_dxf,
+    write_svg,
+)
 
-__all__ = [
-    "Design",
-    "DrawnFinger",
-    "MeshSettings",
-    "Registration",
-    "cad_files",
-    "load_design",
-    "parse_overrides",
-]
-__all__ += ["plane_of", "triangle_rule"]
+__all__ = ["Design", "DrawnFinger", "MeshSettings", "Registration", "cad_files", "load_design"]
+__all__ += ["msh_numbers", "parse_overrides", "plane_of", "triangle_rule"]
 
 HOLE = rectangle(40, -7, 10, 4)
 BOWTIE = [(0, 0), (100, -10), (100, 0), (0, -10)]
@@ -103,6 +104,13 @@ def msh(*elements: str) -> object:
         + "\n".join(["$Elements", str(len(elements)), *elements, "$EndElements\n"])
     )
     return read("a.msh")
+
+
+def named_mesh(name: bytes) -> object:
+    """The drawing of a mesh with another name in quotes for its contact."""
+    path = write_beam_mesh(Path("a.msh"), groups=("base", "contact"))
+    path.write_bytes(path.read_bytes().replace(b'"contact"', name))
+    return read_drawing(path)
 
 
 def described(*lines: str) -> Description:

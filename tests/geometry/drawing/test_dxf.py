@@ -17,6 +17,7 @@ from geometry.drawing.load import read_drawing
 from tests.geometry.drawing.files import BEAM, broken_dxf, rectangle, write_dxf
 
 HOLE = rectangle(20, -7, 10, 4)
+HEADER = "0\nSECTION\n2\nHEADER\n"
 
 
 def document_with(path: Path, units: int = 4) -> tuple[Document, Path]:
@@ -72,19 +73,22 @@ def test_an_ellipse_in_an_absurd_unit_is_refused_for_the_unit(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "head", ["", "999\na comment\n", "0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1009\n0\nENDSEC\n"]
+    "text",
+    [
+        # without a unit, mm are assumed
+        lines_text(),
+        lines_text(head="999\na comment\n"),
+        lines_text(head=f"{HEADER}9\n$ACADVER\n1\nAC1009\n0\nENDSEC\n"),
+        # coordinates in another order
+        *(lines_text(order) for order in ((10, 11, 20, 21), (20, 10, 21, 11), (11, 21, 20, 10))),
+        "\ufeff" + lines_text(),  # a byte order mark
+    ],
 )
-def test_without_a_unit_in_the_header_mm_are_assumed(tmp_path, head):
-    (tmp_path / "a.dxf").write_text(lines_text(head=head))
+def test_lines_of_the_twelfth_release_are_read(tmp_path, text):
+    (tmp_path / "a.dxf").write_text(text, encoding="utf-8")
     drawing = read_drawing(tmp_path / "a.dxf")
-    assert drawing.note == "DXF, mm (assumed)"
+    assert drawing.note.startswith("DXF, mm (assumed)")
     assert body(drawing.loops).area == pytest.approx(1000)
-
-
-@pytest.mark.parametrize("order", [(10, 11, 20, 21), (20, 10, 21, 11), (11, 21, 20, 10)])
-def test_coordinates_in_another_order_are_read(tmp_path, order):
-    (tmp_path / "a.dxf").write_text(lines_text(order))
-    assert area(tmp_path / "a.dxf") == pytest.approx(1000)
 
 
 @pytest.mark.parametrize(
@@ -97,11 +101,6 @@ def test_a_repair_that_would_leave_something_out_is_refused(tmp_path, lost):
     assert read_drawing(tmp_path / "a.dxf").note == "DXF, mm (assumed), repaired"
     (tmp_path / "a.dxf").write_text(text.replace("0\nLINE", f"{lost}0\nLINE", 1))
     assert "it cannot be read as DXF: " in refusal(tmp_path / "a.dxf")
-
-
-def test_a_byte_order_mark_is_no_damage(tmp_path):
-    (tmp_path / "a.dxf").write_text("\ufeff" + lines_text(), encoding="utf-8")
-    assert area(tmp_path / "a.dxf") == pytest.approx(1000)
 
 
 def test_what_is_on_layer_0_of_a_block_is_on_the_layer_of_its_insertion(tmp_path):
@@ -132,38 +131,20 @@ def test_rows_and_columns_of_an_insertion_count(tmp_path, rows, columns, turn):
     assert area(path) == pytest.approx(1000 - rows * columns * np.pi, rel=1e-9)
 
 
-def frozen(document: Document, name: str = "frame") -> None:
-    document.layers.add(name).freeze()
-
-
-def turned_off(document: Document, name: str = "frame") -> None:
-    document.layers.add(name).off()
-
-
-@pytest.mark.parametrize("hide", [frozen, turned_off])
-@pytest.mark.parametrize("inner", ["0", "frame"])
-def test_hidden_insertions_do_not_count(tmp_path, hide, inner):
+@pytest.mark.parametrize(("hide", "holes"), [("freeze", 0), ("off", 1)])
+def test_a_frozen_insertion_hides_all_its_layers_and_one_that_is_off_its_own(tmp_path, hide, holes):
     document, path = document_with(tmp_path)
-    hide(document)
-    block = document.blocks.new("sheet")
-    block.add_lwpolyline(rectangle(-50, -50, 200, 100), close=True, dxfattribs={"layer": inner})
-    nested = document.blocks.new("nested")
-    nested.add_blockref("sheet", (0, 0))
-    document.modelspace().add_blockref("nested", (0, 0), dxfattribs={"layer": "frame"})
+    getattr(document.layers.add("frame"), hide)()
+    hole, sheet = document.blocks.new("hole"), document.blocks.new("sheet")
+    hole.add_circle((20, -5), 1, dxfattribs={"layer": "cut"})
+    hole.add_circle((40, -5), 1)
+    for layer in ("0", "frame"):
+        sheet.add_lwpolyline(rectangle(-50, -50, 200, 100), close=True, dxfattribs={"layer": layer})
+    document.blocks.new("nested").add_blockref("sheet", (0, 0))
+    for name in ("hole", "nested"):
+        document.modelspace().add_blockref(name, (0, 0), dxfattribs={"layer": "frame"})
     document.saveas(path)
-    assert area(path) == pytest.approx(1000)
-
-
-def test_a_frozen_insertion_hides_all_its_layers_and_one_that_is_off_its_own(tmp_path):
-    for hide, holes in ((frozen, 0), (turned_off, 1)):
-        document, path = document_with(tmp_path)
-        hide(document)
-        block = document.blocks.new("hole")
-        block.add_circle((20, -5), 1, dxfattribs={"layer": "cut"})
-        block.add_circle((40, -5), 1)
-        document.modelspace().add_blockref("hole", (0, 0), dxfattribs={"layer": "frame"})
-        document.saveas(path)
-        assert area(path) == pytest.approx(1000 - holes * np.pi)
+    assert area(path) == pytest.approx(1000 - holes * np.pi)
 
 
 @pytest.mark.parametrize("where", ["entity", "insertion", "in the block", "polyline"])

@@ -19,9 +19,8 @@ BODY = cq.Solid.makeBox(60, 20, 12)
 DISC = cq.Solid.makeCylinder(0.8, 0.6, pnt=cq.Vector(0, 0, 11.4))
 
 
-def at(*place: float) -> cq.Location:
-    """A location by x, y, z, mm, and angles about x, y, z, degrees."""
-    return cq.Location(*place)
+at = cq.Location
+"""A location by x, y, z, mm, and angles about x, y, z, degrees."""
 
 
 def exported(path: Path, assembly: cq.Assembly) -> Path:
@@ -68,9 +67,8 @@ def test_a_component_called_marker_makes_its_bodies_markers(tmp_path):
     """In Fusion's files `marker-1:1` is a component and `Body1` the solid within it."""
     whole = cq.Assembly(name="marker test").add(BODY, name="body")
     for number in (1, 2):
-        part = cq.Assembly(name=f"marker-1:{number}").add(
-            DISC, name=f"Body{number}", loc=at(20 * number, 5, 0)
-        )
+        part = cq.Assembly(name=f"marker-1:{number}")
+        part.add(DISC, name=f"Body{number}", loc=at(20 * number, 5, 0))
         whole.add(part, name=f"marker-1:{number}")
     drawing = read_drawing(exported(tmp_path, whole))
     assert sorted(drawing.markers.round(9).tolist()) == [[20, 5], [40, 5]]
@@ -141,12 +139,10 @@ def test_end_faces_in_several_coplanar_parts_are_one(tmp_path, solid):
             assert area(path, plane=offset) == pytest.approx(1200)
 
 
-@pytest.mark.parametrize(("step", "plane"), [(6, "z = 6"), (4, "z = 4")])
-def test_a_plane_in_the_face_of_a_step_gives_one_section(tmp_path, step, plane):
-    low = cq.Solid.makeBox(60, 20, step)
-    high = cq.Solid.makeBox(30, 20, 12 - step, pnt=cq.Vector(0, 0, step))
+def test_a_plane_in_the_face_of_a_step_gives_one_section(tmp_path):
+    low, high = cq.Solid.makeBox(60, 20, 4), cq.Solid.makeBox(30, 20, 8, pnt=cq.Vector(0, 0, 4))
     path = saved(tmp_path, low.fuse(high).Solids()[0])
-    assert area(path, plane=plane) == pytest.approx(1200)
+    assert area(path, plane="z = 4") == pytest.approx(1200)
 
 
 @pytest.mark.parametrize(("plane", "expected"), [("z = 12", 1200), ("z = 0", 1200), ("y = 20", 720)])
@@ -181,16 +177,6 @@ def test_a_face_without_a_normal_somewhere_is_no_hindrance(tmp_path, kind):
     assert read_drawing(path, plane="z = 3").depth == pytest.approx(12)
     with pytest.raises(UserError, match="the solid is not extruded; give the plane"):
         read_drawing(path)
-
-
-def test_the_depth_of_a_solid_that_is_not_extruded_is_measured_across_the_plane(tmp_path):
-    solid = cq.Workplane("XY").box(60, 20, 12).edges("|X").chamfer(0.3).val()
-    path = saved(tmp_path, solid)
-    drawing = read_drawing(path, plane="z = 0")
-    assert drawing.depth == pytest.approx(12, abs=1e-6)
-    assert "cut, 12 mm across" in drawing.note
-    assert read_drawing(path, plane="y = 0").depth == pytest.approx(20, abs=1e-6)
-    assert finger_from_file(path, Description(plane="z = 0")).sources["depth"] == "drawn"
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,6 @@ def test_a_tensile_test_ends_with_the_options_for_compare(tmp_path, capsys):
     young = float(out.partition("--young ")[2].split()[0])
     assert young == pytest.approx(2.0, rel=0.01)
     assert "--poisson 0.499 --law neo-hookean" in out
-    assert "secant modulus at 10%" in out
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -26,7 +25,6 @@ def test_without_a_test_the_materials_are_listed_with_their_sources(capsys):
     assert main(["material"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(MATERIALS)
-    assert all("MPa" in line and "breaks at" in line for line in lines)
 
 
 def test_a_known_material_gives_modulus_and_ratio_unless_they_are_given(tmp_path, capsys):
@@ -46,8 +44,6 @@ def test_a_known_material_gives_modulus_and_ratio_unless_they_are_given(tmp_path
         forces[name] = whole
     assert forces["sheet"] == pytest.approx(forces["by hand"])
     assert forces["own modulus"] == pytest.approx(2 * forces["sheet"], rel=1e-3)
-    assert main(["solve", "fem", "--material", "rubber"]) == 2
-    assert "there is no material 'rubber'; there are tpu-85a" in capsys.readouterr().err
 
 
 def test_a_material_is_named_in_python_too():
@@ -55,5 +51,3 @@ def test_a_material_is_named_in_python_too():
     assert solution.problem.material.young == pr.MATERIALS["dragon-skin-30"].material.young
     assert solution.figures.force == pytest.approx(solution.force)
     assert solution.figures.force_at(5.0) == pytest.approx(solution.force / 2)
-    with pytest.raises(pr.UserError, match="no material 'rubber'"):
-        pr.solve("default", material="rubber", size=2.0)
