@@ -42,7 +42,11 @@ def test_a_drawing_is_not_replaced_by_what_is_drawn_from_it(folder, capsys):
 
 @pytest.mark.parametrize(
     ("command", "closed"),
-    [("--version", "<&-"), ("solvers", ">&-"), ("--version", "2>&-")],  # a table by Rich where it is closed
+    [
+        ("solvers", ">&-"),  # a table by Rich
+        pytest.param("--version", "<&-", marks=pytest.mark.slow),
+        pytest.param("--version", "2>&-", marks=pytest.mark.slow),
+    ],
 )
 def test_a_closed_stream_is_no_fault(command, closed):
     done = run_python("-m", "pinnray.cli", command, after=closed)

@@ -136,6 +136,7 @@ def test_a_preset_brings_its_job_unless_told_otherwise(preset, finger, physics, 
     assert PhysicsOptions(**physics).read(preset)[1].kind == load
 
 
+@pytest.mark.slow
 def test_a_preset_as_a_setting_changes_the_solver_and_not_the_job(folder, capsys, without_pictures):
     """Both ways lead to the same solver."""
     tiny = ["--solver-set", "pinn-std.epochs=2", "--solver-set", "pinn-std.width=4", "--quiet"]
@@ -356,6 +357,7 @@ def test_a_full_disk_is_told_in_one_line_and_leaves_no_part_of_a_file(
 # Surroundings
 
 
+@pytest.mark.slow
 def test_a_home_that_cannot_be_written_is_not_needed(folder, tmp_path_factory):
     """Neither for the mesh nor for what DOLFINx compiles and matplotlib remembers."""
     cache = tmp_path_factory.mktemp("cache")
