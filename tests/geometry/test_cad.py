@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import ezdxf
 import numpy as np
 import pytest
 
@@ -57,22 +56,6 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {file.name: file for file in files}
 
 
-def test_every_format_is_written(written: dict[str, Path]) -> None:
-    assert set(written) == {
-        "finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf", "section.svg",
-    }  # fmt: skip
-
-
-def test_step_holds_body_and_markers_as_named_parts(written: dict[str, Path]) -> None:
-    import cadquery as cq
-
-    solids = cq.importers.importStep(str(written["finger.step"])).solids().vals()
-    assert len(solids) == 10
-    assert sum(solid.Volume() for solid in solids) == pytest.approx(body_area(Design()) * 20, rel=1e-9)
-    text = written["finger.step"].read_text()
-    assert all(f"'{name}'" in text for name in ("body", "marker-1", "marker-9"))
-
-
 def stl_volume(path: Path) -> float:
     """Volume inside the facets by the divergence theorem, mm^3; binary or text STL."""
     content = path.read_bytes()
@@ -89,25 +72,6 @@ def test_stl_files_enclose_the_volumes(written: dict[str, Path]) -> None:
     discs = 9 * np.pi / 4 * 1.6**2 * 0.6
     assert stl_volume(written["finger-markers.stl"]) == pytest.approx(discs, rel=0.01)  # facets of circles
     assert stl_volume(written["finger-body.stl"]) == pytest.approx(body_area(Design()) * 20 - discs, rel=1e-4)
-
-
-def test_dxf_has_a_layer_for_the_outline_and_one_for_the_markers(written: dict[str, Path]) -> None:
-    entities = list(ezdxf.readfile(written["section.dxf"]).modelspace())
-    lines = [entity for entity in entities if entity.dxf.layer == "outline"]
-    circles = [entity for entity in entities if entity.dxf.layer == "markers"]
-    assert len(lines) == 3 + 4 * 5
-    length = sum((entity.dxf.end - entity.dxf.start).magnitude for entity in lines)
-    assert length == pytest.approx(body_perimeter(Design()), rel=1e-9)
-    centres = sorted((circle.dxf.center.x, circle.dxf.center.y) for circle in circles)
-    np.testing.assert_allclose(centres, marker_positions(Design()), atol=1e-9)
-    assert {circle.dxf.radius for circle in circles} == {0.8}
-
-
-def test_svg_is_in_true_scale(written: dict[str, Path]) -> None:
-    text = written["section.svg"].read_text()
-    assert 'width="94mm" height="34mm"' in text
-    assert text.count("<circle") == 9
-    assert text.count(" Z") == 1 + 5
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ from ezdxf.document import Drawing as Document
 
 from geometry import UserError
 from geometry.drawing.checks import body
-from geometry.drawing.formats.dxf_blocks import sound
 from geometry.drawing.formats.dxf_file import HEADER_UNITS
 from geometry.drawing.load import read_drawing
 from tests.geometry.drawing.files import BEAM, broken_dxf, rectangle, write_dxf
@@ -170,17 +169,6 @@ def test_what_cannot_be_read_does_not_matter_where_it_is_hidden(tmp_path, kind):
     document.modelspace()[-1].dxf.layer = "old"
     document.saveas(tmp_path / "a.dxf")
     assert area(tmp_path / "a.dxf") == pytest.approx(1000)
-
-
-def test_a_damaged_entity_is_named_with_its_place():
-    entity = ezdxf.new().modelspace().add_circle((3, 4), 1)
-    for error, said in (
-        (ValueError("no radius.\nmore"), "no radius"),
-        (TypeError("x"), "a value is missing"),
-    ):
-        place = r"the CIRCLE at \(3, 4\) on layer '0' is damaged: "
-        with pytest.raises(UserError, match=place + said), sound(entity, "0"):
-            raise error
 
 
 def test_markers_drawn_of_arcs_are_circles(tmp_path):

@@ -11,7 +11,6 @@ from geometry.finger.section import cells
 from geometry.mesh.mesher import build_mesh
 from geometry.mesh.settings import MeshSettings
 from solvers.lagrange import LagrangeSpace
-from tests.meshes import permuted
 from tests.refusals.geometry import square
 
 
@@ -31,20 +30,6 @@ def test_mesh_is_independent_of_the_arrays_it_was_made_from() -> None:
 
 def test_edges_of_the_square() -> None:
     assert square().edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
-
-
-def test_permutation_keeps_the_body_and_changes_the_numbering(default_mesh: TriangleMesh) -> None:
-    mesh, other = default_mesh, permuted(default_mesh, 3)
-    assert other.digest != mesh.digest
-    assert other.areas.sum() == pytest.approx(mesh.areas.sum(), rel=1e-14)
-    assert sorted(other.areas.round(12)) == sorted(mesh.areas.round(12))
-    assert (other.markers == mesh.markers).all()
-    assert (other.points[other.contact_node] == mesh.points[mesh.contact_node]).all()
-    for name in mesh.boundaries:
-        ends, same = (sorted(m.points[m.boundary(name)].reshape(-1, 4).tolist()) for m in (mesh, other))
-        assert ends == same
-    centroids, same = (sorted(m.at_centroids().points.round(9).tolist()) for m in (mesh, other))
-    assert centroids == same
 
 
 def test_saved_mesh_is_read_back_the_same(default_mesh: TriangleMesh, tmp_path: Path) -> None:

@@ -7,17 +7,9 @@ import pytest
 
 from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_through_thickness
 from geometry import marker_positions as positions_of
-from geometry.finger.section import cells, corner_angles
 from geometry.mesh.boundary import boundary_loops
 from geometry.mesh.mesher import build_mesh
-from tests.meshes import body_area, boundary_lengths, corner_area
-
-
-def polygon_of_loop(mesh: TriangleMesh, loop: np.ndarray) -> float:
-    """Area inside a closed boundary, mm^2, by the shoelace formula over its edges."""
-    edges = mesh.boundary_edges
-    start, end = (mesh.points[edges[np.isin(edges[:, 0], loop)][:, k]] for k in range(2))
-    return float(abs(0.5 * (start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]).sum()))
+from tests.meshes import body_area, boundary_lengths
 
 
 def test_area_is_that_of_the_section(design: Design, mesh: TriangleMesh) -> None:
@@ -58,18 +50,6 @@ def test_euler_characteristic_counts_the_ribs(design: Design, mesh: TriangleMesh
     euler = len(mesh.points) - len(mesh.edges) + len(mesh.triangles)
     assert 1 - euler == design.rib_count + 1  # holes
     assert len(boundary_loops(mesh)) == design.rib_count + 2
-
-
-def test_cells_have_their_areas(design: Design, mesh: TriangleMesh) -> None:
-    """Less the corners that a fillet fills; its arcs are chords in the mesh, which costs some per mille."""
-    expected = []
-    for corners in cells(design):
-        x, y = corners.T
-        sharp = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-        filled = sum(corner_area(angle, design.fillet_radius) for angle in corner_angles(corners))
-        expected.append(sharp - filled)
-    measured = [polygon_of_loop(mesh, loop) for loop in boundary_loops(mesh)[1:]]
-    np.testing.assert_allclose(measured, expected, rtol=2e-3 if design.fillet_radius else 1e-12)
 
 
 def test_walls_and_ribs_measure_their_thickness(design: Design, mesh: TriangleMesh) -> None:

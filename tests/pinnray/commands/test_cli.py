@@ -253,12 +253,6 @@ def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, mo
     assert Path("out/default/report.html").is_file()
 
 
-def test_a_training_that_is_too_short_does_not_converge(folder, capsys, without_pictures):
-    given = "--solvers pinn-std --mesh-size 1 --measurements good.csv"
-    given += " --solver-set pinn-std.wall_spacing=5 --solver-set pinn-std.corner_spacing=5 --quiet"
-    assert main(["compare", *given.split()]) == NOT_CONVERGED
-
-
 def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, without_pictures):
     """Compilers and other libraries do not say where."""
 

@@ -46,9 +46,7 @@ def unread(code: str, words: str, *streams: str) -> subprocess.CompletedProcess[
     [
         (COMMAND, "solvers"),  # a table by Rich
         pytest.param(COMMAND, "--help", marks=pytest.mark.slow),  # by Cyclopts
-        pytest.param(
-            COMMAND, "mesh --mesh-size 3 --out {out}", marks=pytest.mark.slow
-        ),  # by print, in a buffer
+        pytest.param(COMMAND, "mesh --mesh-size 3 --out {out}", marks=pytest.mark.slow),  # by print
         (LONG, ""),
     ],
 )

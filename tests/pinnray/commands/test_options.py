@@ -1,6 +1,5 @@
 """Options of every command: --quiet, defaults in its help, completion in a shell."""
 
-import re
 from dataclasses import fields
 from pathlib import Path
 
@@ -12,25 +11,6 @@ from pinnray.options.shared import PhysicsOptions
 from solvers.problem import Physics
 
 NAMES = [name for name in pinnray if not name.startswith("-")]
-
-NOTHING = {
-    *("--section", "--set", "--solver-set", "--without", "--cover", "--csv", "--adapt", "--measurements"),
-    *("--layouts", "--marker", "--camera", "--at", "--colour", "--radii", "--preset", "--full-well"),
-    "--record",
-}
-"""Options without which nothing is done."""
-
-
-def options(shown: str) -> dict[str, str]:
-    """The text of each option that takes a value, as the help shows it, by its name."""
-    found: dict[str, str] = {}
-    for line in (line.strip("│ ") for line in shown.splitlines() if line.startswith("│")):
-        if option := re.match(r"(--[a-z-]+) (?:[A-Z]+\S*)?", line):
-            found[option[1]] = ""
-        if found:
-            found[list(found)[-1]] += f"{line} "
-    assert found
-    return {name: text for name, text in found.items() if re.match(r"--[a-z-]+ [A-Z]{3,}", text)}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -55,15 +35,6 @@ def test_a_quiet_command_prints_nothing_and_writes_the_same(command, files, tmp_
         assert {path.name for path in Path("x").rglob("*")} == files
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_help_has_every_default(name, capsys):
-    assert main([name, "--help"]) == 0
-    shown = options(capsys.readouterr().out) if name != "solvers" else {}
-    required = {each.name for each in pinnray[name].assemble_argument_collection() if each.required}
-    silent = [key for key, text in shown.items() if "default" not in text.lower()]
-    assert set(silent) - NOTHING - required == set()
-
-
 def test_a_shell_completes_commands_and_options(tmp_path):
     script = tmp_path / "completion"
     assert main(["--install-completion", "--shell", "bash", "--output", str(script)]) == 0
@@ -78,6 +49,3 @@ def test_options_of_material_and_load_have_the_names_and_the_defaults_of_the_sch
     schema = Physics().model_dump()
     assert own | {"law": "linear", "load": "mean"} == {name: schema[name] for name in own}
     assert PhysicsOptions().values().keys() == own.keys() - {"law", "radius"}
-    text = PhysicsOptions.__doc__
-    assert f"default {schema['young']:g}." in text
-    assert f"default {schema['poisson']:g}." in text
