@@ -278,17 +278,20 @@ def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
 # The other verbs
 
 
-def test_solvers_are_listed_also_where_the_terminal_has_no_box_characters(capsys, monkeypatch):
+def test_solvers_are_listed(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     assert main(["solvers"]) == 0
     listed = capsys.readouterr().out
     assert "…" not in listed  # no value is cut off
     assert all(f" {name} " in listed for name in solver_names())
     assert all(f"preset={preset}" in listed for presets in PRESETS.values() for preset in presets)
+
+
+def test_a_terminal_in_ascii_shows_what_it_lacks_as_question_marks(monkeypatch):
     with TextIOWrapper(BytesIO(), encoding="ascii") as terminal:
         monkeypatch.setattr("sys.stdout", terminal)
-        assert main(["material"]) == main(["solvers"]) == 0
-        assert b"fem-nonlinear" in terminal.buffer.getvalue()
+        assert main(["material"]) == 0
+        assert b"?" in terminal.buffer.getvalue()
 
 
 def test_a_broken_plug_in_is_one_line_among_the_solvers(tmp_path, capsys, monkeypatch):
