@@ -58,6 +58,7 @@ def test_typed_keywords_are_the_parameters_with_their_types(words: Any, model: A
     assert hints.keys() <= known
 
 
+@pytest.mark.slow
 def test_a_type_checker_knows_the_keywords(tmp_path: Path):
     script = tmp_path / "script.py"
     script.write_text(
@@ -252,6 +253,7 @@ def test_ranges_are_sampled_and_a_design_may_be_an_object(in_line: None):
 # --- what the camera sees ---
 
 
+@pytest.mark.slow
 def test_the_rig_films_what_is_calibrated_tracked_and_weighed(tmp_path: Path):
     motion, out = pr.Motion(rest=2, moving=1, held=2), tmp_path / "film"
     film = pr.rig(
