@@ -33,12 +33,7 @@ def smallest_angle(mesh: TriangleMesh) -> float:
 def boundary_lengths(design: Design) -> dict[str, float]:
     """Length of `base`, `front`, `back` and `contact` of a finger without tilt, rounding and foot, mm."""
     back = float(np.hypot(design.base_width, design.height))
-    return {
-        "base": design.base_width,
-        "front": design.height,
-        "back": back,
-        "contact": design.contact_width,
-    }
+    return {"base": design.base_width, "front": design.height, "back": back, "contact": design.contact_width}
 
 
 def body_area(design: Design) -> float:

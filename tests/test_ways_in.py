@@ -75,17 +75,6 @@ def test_conda_brings_the_project_itself():
     assert {"fenics-dolfinx", "petsc4py", "mpi4py"} <= {re.split("[<>=]", name)[0] for name in packages}
 
 
-def test_the_extra_fem_is_a_wheel_of_dolfinx_for_the_python_that_the_readme_says():
-    (wanted,) = PROJECT["optional-dependencies"]["fem"]
-    found = re.fullmatch(
-        r"dolfinx-solver-real>=[\d.]+; python_version >= '(.+?)' and .*'linux' and .*'x86_64'", wanted
-    )
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert found
-    assert f"Python {found[1]} or newer" in readme
-    assert 'pip install ".[fem]"' in readme
-
-
 def test_every_citation_of_the_paper_has_an_entry():
     text, entries = (
         (ROOT / "paper" / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib")

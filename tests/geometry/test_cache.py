@@ -179,7 +179,11 @@ def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_p
     [
         ({"kind": "mesh", "settings": COARSE.model_dump()}, ": File too large"),
         # OpenCASCADE writes a part and says nothing
-        ({"kind": "cad", "formats": ["step"]}, "/finger.step: a part was not written; is the disk full?"),
+        pytest.param(
+            {"kind": "cad", "formats": ["step"]},
+            "/finger.step: a part was not written; is the disk full?",
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=["mesh", "cad"],
 )
@@ -208,6 +212,7 @@ def test_cache_folder(variables: dict[str, str], expected: str, monkeypatch: pyt
 
 
 @pytest.mark.mpi
+@pytest.mark.slow
 def test_meshing_works_under_mpirun(tmp_path: Path) -> None:
     mpirun = shutil.which("mpirun")
     assert mpirun, "mpirun comes with DOLFINx"

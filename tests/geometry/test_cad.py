@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, MeshSettings, UserError, cad, cad_files, load_design, marker_positions
+from geometry import Design, MeshSettings, cad, cad_files, load_design, marker_positions
 from geometry.mesh.mesher import build_mesh
 from tests.meshes import body_area, body_perimeter
 
@@ -57,22 +56,6 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {file.name: file for file in files}
 
 
-def test_every_format_is_written(written: dict[str, Path]) -> None:
-    assert set(written) == {
-        "finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf", "section.svg",
-    }  # fmt: skip
-
-
-def test_step_holds_body_and_markers_as_named_parts(written: dict[str, Path]) -> None:
-    import cadquery as cq
-
-    solids = cq.importers.importStep(str(written["finger.step"])).solids().vals()
-    assert len(solids) == 10
-    assert sum(solid.Volume() for solid in solids) == pytest.approx(body_area(Design()) * 20, rel=1e-9)
-    text = written["finger.step"].read_text()
-    assert all(f"'{name}'" in text for name in ("body", "marker-1", "marker-9"))
-
-
 def stl_volume(path: Path) -> float:
     """Volume inside the facets by the divergence theorem, mm^3; binary or text STL."""
     content = path.read_bytes()
@@ -91,25 +74,6 @@ def test_stl_files_enclose_the_volumes(written: dict[str, Path]) -> None:
     assert stl_volume(written["finger-body.stl"]) == pytest.approx(body_area(Design()) * 20 - discs, rel=1e-4)
 
 
-def test_dxf_has_a_layer_for_the_outline_and_one_for_the_markers(written: dict[str, Path]) -> None:
-    entities = list(ezdxf.readfile(written["section.dxf"]).modelspace())
-    lines = [entity for entity in entities if entity.dxf.layer == "outline"]
-    circles = [entity for entity in entities if entity.dxf.layer == "markers"]
-    assert len(lines) == 3 + 4 * 5
-    length = sum((entity.dxf.end - entity.dxf.start).magnitude for entity in lines)
-    assert length == pytest.approx(body_perimeter(Design()), rel=1e-9)
-    centres = sorted((circle.dxf.center.x, circle.dxf.center.y) for circle in circles)
-    np.testing.assert_allclose(centres, marker_positions(Design()), atol=1e-9)
-    assert {circle.dxf.radius for circle in circles} == {0.8}
-
-
-def test_svg_is_in_true_scale(written: dict[str, Path]) -> None:
-    text = written["section.svg"].read_text()
-    assert 'width="94mm" height="34mm"' in text
-    assert text.count("<circle") == 9
-    assert text.count(" Z") == 1 + 5
-
-
 @pytest.mark.parametrize(
     "design", [Design(fillet_radius=1.0), load_design("csiro")], ids=["fillets", "csiro"]
 )
@@ -123,8 +87,3 @@ def test_the_mesh_has_its_boundary_on_the_cad_face(design: Design) -> None:
     wires = cq.Compound.makeCompound([face.outerWire(), *face.innerWires()])
     nodes = mesh.points[np.unique(mesh.boundary_edges)]
     assert max(wires.distance(cq.Vertex.makeVertex(x, y, 0)) for x, y in nodes) < 1e-9
-
-
-def test_unknown_format_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"'obj'.*step, stl, dxf, svg"):
-        cad_files(Design(), tmp_path, formats=["obj"])

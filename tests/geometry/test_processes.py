@@ -147,6 +147,7 @@ def test_a_process_that_ends_without_an_answer_does_not_stop_the_others(capfd):
     assert "ZeroDivisionError" in capfd.readouterr().err  # whose fault it is can be read
 
 
+@pytest.mark.slow
 def test_a_task_is_tried_again_where_a_process_may_die(tmp_path):
     """The first process that reads it is killed, as by somebody else."""
     assert answers_of(die_once, {"a": tmp_path}, deaths=2) == {"a": "alive"}
@@ -177,7 +178,7 @@ def test_a_file_that_cannot_be_written_is_told_in_one_line(tmp_path, capfd):
     assert "Traceback" not in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("work", [endless, endless_with_petsc])
+@pytest.mark.parametrize("work", [endless, pytest.param(endless_with_petsc, marks=pytest.mark.slow)])
 def test_an_interruption_lets_every_process_save_its_state(tmp_path, work):
     heard = set()
 
@@ -238,6 +239,7 @@ def test_a_process_does_not_inherit_an_mpi_run():
     assert kept["PYTHONPATH"].endswith(os.pathsep + "/x")
 
 
+@pytest.mark.slow
 def test_a_warning_of_several_processes_is_one_line_once(capfd):
     with warnings.catch_warnings():
         warnings.simplefilter("default")  # Python's own, which pytest replaces
@@ -245,6 +247,7 @@ def test_a_warning_of_several_processes_is_one_line_once(capfd):
     assert capfd.readouterr().err == "warning: the disk is full\n"
 
 
+@pytest.mark.slow
 def test_a_process_beside_this_one_stays_for_the_next_task():
     """The system ends processes with the thread that made them: it is not the one that waits."""
     with Pool(1) as pool:

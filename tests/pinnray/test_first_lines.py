@@ -1,6 +1,5 @@
 """First lines of a user: keywords, defaults, one-line reprs, messages that suggest the right word."""
 
-import ast
 import subprocess
 import sys
 import typing
@@ -44,18 +43,6 @@ def compared() -> pr.Comparison:
 # --- what is there ---
 
 
-def test_dir_lists_what_is_loaded_on_first_use_and_nothing_else():
-    code = "import pinnray as pr; print([*dir(pr)] == [*pr.__all__], 'sweep' in dir(pr))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["True", "True"]
-
-
-def test_the_reference_lists_every_name():
-    pages = (ROOT / "docs" / "reference" / "python").glob("*.md")
-    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
-    assert [name for name in pr.__all__ if f"`{name}`" not in text and f".{name}\n" not in text] == []
-
-
 @pytest.mark.parametrize(
     ("words", "model", "names"),
     [
@@ -71,6 +58,7 @@ def test_typed_keywords_are_the_parameters_with_their_types(words: Any, model: A
     assert hints.keys() <= known
 
 
+@pytest.mark.slow
 def test_a_type_checker_knows_the_keywords(tmp_path: Path):
     script = tmp_path / "script.py"
     script.write_text(
@@ -83,21 +71,8 @@ def test_a_type_checker_knows_the_keywords(tmp_path: Path):
         "pr.solve('default', rib_cuont=6)  # wrong\n"
         "pr.Load('cilinder')  # wrong\n"
     )
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "mypy",
-            "--strict",
-            "--config-file",
-            str(ROOT / "pyproject.toml"),
-            str(script),
-        ],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        check=False,
-    )
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", "pyproject.toml", str(script)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
     assert [line.split(":")[1] for line in done.stdout.splitlines() if ": error:" in line] == ["6", "7", "8"]
 
 
@@ -135,8 +110,6 @@ def test_a_preset_alone_means_the_network_that_has_it(monkeypatch: pytest.Monkey
 def test_a_design_is_changed_by_keywords_or_a_dictionary():
     assert pr.load_design("default", rib_count=6) == pr.load_design("default", {"N": 6})
     assert pr.mesh(rib_count=6, **COARSE).digest == pr.mesh(pr.Design(rib_count=6), **COARSE).digest
-    with pytest.raises(pr.UserError, match=r"rib_count .N. is given twice"):
-        pr.load_design("default", {"rib_count": 6}, rib_count=5)
 
 
 @pytest.mark.parametrize(
@@ -195,12 +168,6 @@ def test_markers_stress_and_force_of_a_solution(solved: pr.Solution):
     assert solved.von_mises.shape == (len(solved.problem.mesh.triangles),)
     assert solved.force == pytest.approx(-20.0 * solved.reaction[1])  # N/mm over a depth of 20 mm
     assert solved.force == figures_of(solved).force  # defined alike
-    assert "N over a depth of 20 mm" in solved._repr_html_()
-
-
-def test_the_markers_of_observations_are_those_of_the_solution():
-    found = pr.solve("default", "fem-asm", measurements=pr.Observations(*SHORT), **COARSE)
-    assert found.at_markers().shape == (2, 2)
 
 
 def test_a_solution_is_a_table(solved: pr.Solution, compared: pr.Comparison):
@@ -221,8 +188,6 @@ def test_a_solution_is_a_file_and_a_grid(solved: pr.Solution, tmp_path: Path):
     written, grid = pyvista.read(solved.save(tmp_path / "x.vtu")), solved.to_pyvista()
     assert written.cell_data["von_mises_MPa"].tolist() == grid.cell_data["von_mises_MPa"].tolist()
     assert len(pd.read_csv(solved.save(str(tmp_path / "x.csv")))) == grid.n_cells
-    with pytest.raises(pr.UserError, match=r"x.stl: give a name that ends in .vtu"):
-        solved.save(tmp_path / "x.stl")
 
 
 def test_a_solution_is_shown_deformed(solved: pr.Solution, monkeypatch: pytest.MonkeyPatch):
@@ -236,8 +201,6 @@ def test_a_solution_is_shown_deformed(solved: pr.Solution, monkeypatch: pytest.M
     assert options["scalars"] == "von_mises_MPa"
     moved = solved.problem.mesh.points + solved.to_dataframe("nodes")[["u_mm", "v_mm"]].to_numpy()
     assert np.allclose(points[:, :2], moved)
-    with pytest.raises(pr.UserError, match="there is no field 'stress'"):
-        solved.show("stress")
 
 
 @pytest.mark.parametrize("quantity", get_args(FieldName))
@@ -248,11 +211,6 @@ def test_every_quantity_of_the_viewer_is_plotted(solved: pr.Solution, quantity: 
     signed = next(each.signed for each in VIEWED if each.name == quantity)
     assert low == (-high if signed else 0)
     assert high > 0
-
-
-def test_the_solution_of_a_solver_of_ones_own_gets_these_too():
-    problem = pr.Problem(pr.mesh(**COARSE))
-    assert pr.Solution.of(pr.solver("fem").solve(problem)).von_mises.max() > 0
 
 
 def test_every_object_is_one_short_line(solved: pr.Solution, compared: pr.Comparison, tmp_path: Path):
@@ -295,6 +253,7 @@ def test_ranges_are_sampled_and_a_design_may_be_an_object(in_line: None):
 # --- what the camera sees ---
 
 
+@pytest.mark.slow
 def test_the_rig_films_what_is_calibrated_tracked_and_weighed(tmp_path: Path):
     motion, out = pr.Motion(rest=2, moving=1, held=2), tmp_path / "film"
     film = pr.rig(
@@ -313,24 +272,19 @@ def test_the_rig_films_what_is_calibrated_tracked_and_weighed(tmp_path: Path):
 # --- progress ---
 
 
-class Shown:
-    """Stands for the module `IPython.display`."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def display(self, text: str, *, display_id: bool) -> SimpleNamespace:
-        self.texts.append(text)
-        return SimpleNamespace(update=self.texts.append)
-
-
 def test_a_notebook_shows_the_progress_in_one_line(monkeypatch: pytest.MonkeyPatch):
     from rich.console import Console
 
     from compare.runtime.stages import NotebookLine, shown_stages
 
-    shown, module = Shown(), ModuleType("IPython.display")
-    module.__dict__.update(display=shown.display, Pretty=str)
+    texts: list[str] = []
+
+    def display(text: str, *, display_id: bool) -> SimpleNamespace:
+        texts.append(text)
+        return SimpleNamespace(update=texts.append)
+
+    module = ModuleType("IPython.display")
+    module.__dict__.update(display=display, Pretty=str)
     monkeypatch.setitem(sys.modules, "IPython", ModuleType("IPython"))
     monkeypatch.setitem(sys.modules, "IPython.display", module)
     monkeypatch.setattr(Console, "is_jupyter", True, raising=False)
@@ -338,11 +292,11 @@ def test_a_notebook_shows_the_progress_in_one_line(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(NotebookLine, "EVERY", 0.0)
     with shown_stages(None) as stages, stages.stage("fem") as report:
         report(0.5, "half way")
-    assert shown.texts[:2] == ["fem", "fem: 50% half way"]
-    assert shown.texts[-1].startswith("fem 0.")
+    assert texts[:2] == ["fem", "fem: 50% half way"]
+    assert texts[-1].startswith("fem 0.")
     with shown_stages(False) as stages, stages.stage("gp"):
         pass
-    assert "gp" not in "".join(shown.texts)
+    assert "gp" not in "".join(texts)
 
 
 def test_outside_a_notebook_nothing_is_shown_unless_asked(capfd: pytest.CaptureFixture[str]):
@@ -364,116 +318,13 @@ def test_a_solver_that_is_to_fit_markers_says_what_it_does_without():
         pr.solve("default", "fem", **COARSE)
 
 
-def test_a_thin_wall_has_smaller_markers_and_says_so():
+def test_a_thin_wall_has_smaller_markers():
     thin = pr.load_design("default", front_thickness=1.0)
     assert thin.marker_diameter == pytest.approx(0.8)
-    assert ("Diameter of a marker", "", "0.8 mm, as the usual 1.6 mm do not fit") in thin.facts()
-    assert "the usual 1.6 mm do not fit" in thin._repr_html_()
     assert thin.replaced(front_thickness=2.0).marker_diameter == 1.6
     assert pr.Design().small_markers == pr.load_design("slender").small_markers == ""
     assert pr.Design().digest == "0dde50692e7380cf9eeec686dc391289ae5b0969cfcecdac632f340ffe975f0b"
     assert pr.Design(back_thickness=0.5).marker_diameter == pytest.approx(0.3)
-
-
-def cavity_marker() -> object:
-    return pr.solve("default", "fem-asm", measurements=pr.Observations([[30, -8]], [[0, -5]]), **COARSE)
-
-
-def larger_finger() -> object:
-    markers = pr.load_design("slender").markers
-    return pr.solve("default", "fem-asm", measurements=pr.Observations(markers, 0 * markers), **COARSE)
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: pr.Design(ribs=6), "unknown parameter 'ribs'; did you mean rib_count .N."),
-        (lambda: pr.solve(ribs=6), "did you mean rib_count"),
-        (lambda: pr.solve(E=5, young=5), "young .E. is given twice, by its name and by its symbol"),
-        (lambda: pr.Material(modulus=6), "did you mean young .E."),
-        (lambda: pr.Load(strok=5), "did you mean stroke"),
-        (lambda: pr.Load(stroke=5, displacement=(0, -5)), "stroke and displacement both say how far"),
-        (lambda: pr.Load(stroke="deep"), "stroke = 'deep' is not a finite number"),
-        (lambda: pr.solve(mesh_size=1), "did you mean size"),
-        (lambda: pr.mesh(stroke=8), "unknown parameter 'stroke'"),  # no mesh depends on it
-        (lambda: pr.solver("FEM"), "did you mean 'fem'"),
-        (lambda: pr.solver("fem_nonlinear"), "did you mean 'fem-nonlinear'"),
-        (lambda: pr.solver("pinn"), "did you mean 'pinn-std' or 'pinn-asm' or 'pinn-id'"),
-        (lambda: pr.solver(), "no solver was named .there are: fem, fem-nonlinear, "),
-        (lambda: pr.solver("fem", preset="fast"), "fem has no presets; pinn-std and pinn-asm have"),
-        (
-            lambda: pr.solve(preset="best"),
-            "there is no preset 'best'; pinn-std has fast, local, ",
-        ),
-        (lambda: pr.solve(material=3), "material must be a Material, such as .*, not 3"),
-        (lambda: pr.solve(load=3), "load must be a Load or one of mean, point, patch, cylinder, not 3"),
-        (lambda: pr.solve(load=pr.Load(), stroke=3), "stroke is part of the load that is given"),
-        (lambda: pr.solve(material=pr.Material(), E=3), "young is part of the material that is given"),
-        (lambda: pr.Problem(3), "mesh must be a TriangleMesh, not 3"),
-        (lambda: pr.load_design(3), "3 is no design; give the name of a preset"),
-        (lambda: pr.load_design("default", 3), "a dictionary such as"),
-        (lambda: pr.load_drawing(None), "the drawing is None; give a path"),
-        (lambda: pr.compare(solvers=3), "3 is no solver"),
-        (lambda: pr.compare(solvers="fem", adapt="fine"), "adapt = 'fine' is no number"),
-        (lambda: pr.compare(solvers="fem", out=3), "out is 3; give a path"),
-        (
-            lambda: pr.crossval(solvers="fem", out="x", seedz=2),
-            "'seedz'; did you mean seeds",
-        ),
-        (lambda: pr.sweep(3), "give a dictionary such as .* not 3"),
-        (lambda: pr.sweep({"rib_count": 4}), "rib_count: give a list of values, such as"),
-        (lambda: pr.sweep({"ribs": [4, 6]}), "unknown parameter 'ribs'; did you mean rib_count"),
-        (lambda: pr.sweep({"rib_count": [4]}, ribs=6), "unknown parameter 'ribs'; did you mean rib_count"),
-        (lambda: pr.predict("x", 3), "the fingers are dictionaries"),
-        (lambda: pr.predict(3, []), "the sweep is 3; give a path"),
-        (lambda: pr.optimise(3), "the question is 3; give a path"),
-        (lambda: pr.track("film.mkv", method="eyes"), "method = 'eyes': there are precise, hough"),
-        (lambda: pr.track("film.mkv", color="red"), "unknown parameter 'color'; did you mean colour"),
-        (lambda: pr.film_forces("film.mkv", color="red"), "unknown parameter 'color'; did you mean colour"),
-        (lambda: pr.film_forces("film.mkv", camera=3), "the camera is 3; give a path"),
-        (lambda: pr.rig(out="x", tilt=60), "tilt = 60: give a number from -30 to 30"),
-        (lambda: pr.calibrate(3, "9x6", square=20), "a photograph is 3; give a path"),
-        (lambda: pr.Observations([[1, 2]], [[1, 2, 3]]), "displacements must have shape"),
-        (lambda: pr.Observations("a", "b"), "points holds something that is no number"),
-        (lambda: pr.Observations.from_csv(3), "the measurements is 3; give a path"),
-        (cavity_marker, "it is in a cavity, as a marker of another design would be"),
-    ],
-)
-def test_a_wrong_value_is_one_line_of_ours(call: Callable[[], object], said: str):
-    with pytest.raises(pr.UserError, match=said) as refused:
-        call()
-    assert "\n" not in str(refused.value)
-    assert "--" not in str(refused.value)
-
-
-@pytest.mark.parametrize("call", [cavity_marker, larger_finger])
-def test_markers_of_another_finger_are_not_taken_for_another_unit(call: Callable[[], object]):
-    with pytest.raises(pr.UserError, match="not of this finger") as refused:
-        call()
-    assert "micrometres" not in str(refused.value)
-
-
-def test_a_report_or_a_plot_of_nothing_is_one_line(compared: pr.Comparison, solved: pr.Solution):
-    for call, said in (
-        (lambda: compared.report(3), "the report is 3; give a path"),
-        (lambda: solved.plot("stress"), "there is no field 'stress' to plot"),
-        (lambda: solved.plot(scale="large"), "scale = 'large' is not a finite number"),
-        (lambda: solved.to_dataframe("corners"), "there are triangles, nodes, markers"),
-    ):
-        with pytest.raises(pr.UserError, match=said):
-            call()
-
-
-def test_no_function_of_the_front_door_names_an_option_of_the_command_line():
-    found = []
-    for path in (ROOT / "pinnray").glob("*.py"):
-        texts = (node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-        found += [
-            f"{path.name}:{node.lineno}"
-            for node in texts
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and "--" in node.value
-        ]
-    assert found == []
 
 
 def test_every_word_of_a_job_is_known_to_editors():

@@ -1,11 +1,17 @@
 """Files of the refused command lines, each wrong in one way."""
 
+import cv2
+import numpy as np
+
 HEADER = "x_mm,y_mm,u_mm,v_mm"
 
 BEAM = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="10mm" viewBox="0 0 60 10">'
     '<path d="M 0 0 H 60 V 10 H 0 Z"/></svg>'
 )
+
+PICTURE = cv2.imencode(".png", np.full((80, 160, 3), 210, np.uint8))[1].tobytes()
+"""Light grey, 160 by 80 pixels."""
 
 FILES: dict[str, str | bytes] = {
     "broken.toml": "height = = 90",
@@ -29,4 +35,18 @@ FILES: dict[str, str | bytes] = {
     "finger.toml": "height = 95",
     "folder.vtu/kept": "",
     "foreign/thesis.txt": "three years of work",
+    "film.mkv": "no film",
+    "shots/1.png": PICTURE,
+    "half.json": '{"fiducials": [',
+    "strip.csv": "strain,stress_MPa\n0.1,1\n0.2,2\n0.3,3\n",
+    "options/misspelt.toml": '[options]\nsolverz = "fem"',
+    "options/kind.toml": '[options]\nmesh-size = "fine"',
+    "options/design.toml": '[options]\ndesign = "none-such"',
+    "options/solvers.json": '{"options": {"solvers": "none-such", "mesh-size": 1}}',
+    "options/no table.toml": "mesh-size = 1",
+    "options/outside.toml": "mesh-size = 1\n[options]",
+    "options/elsewhere.toml": '[options]\nout = "/tmp/other"',
+    "options/above.toml": '[options]\nout = ["a/../../other"]',
+    "options/later.toml": "schema = 2\n[options]",
+    "options/broken.toml": "[options",
 }

@@ -57,3 +57,33 @@ def write_beam_mesh(path: Path, *, groups: Sequence[str] = ("base", "contact"), 
     finally:
         gmsh.finalize()
     return path
+
+
+def broken_dxf(path: Path, kind: str) -> Path:
+    """The beam in a DXF file with something that cannot be read."""
+    document = ezdxf.new(units=4)
+    space = document.modelspace()
+    space.add_lwpolyline(BEAM, close=True)
+    if kind == "missing":
+        space.add_blockref("bracket", (0, 0))
+    elif kind == "missing within":
+        document.blocks.new("outer").add_blockref("bracket", (0, 0))
+        space.add_blockref("outer", (0, 0))
+    elif kind == "itself":
+        document.blocks.new("ring").add_blockref("RING", (0, 0))
+        space.add_blockref("ring", (0, 0))
+    elif kind == "each other":
+        document.blocks.new("one").add_blockref("two", (0, 0))
+        document.blocks.new("two").add_blockref("one", (0, 0))
+        space.add_blockref("one", (0, 0))
+    elif kind == "grid":
+        document.blocks.new("dot").add_circle((0, 0), 1)
+        space.add_blockref("dot", (0, 0), dxfattribs={"row_count": 30000, "column_count": 30000})
+    elif kind in ("knots", "weights"):
+        spline = space.add_open_spline([(8, -4), (9, -5), (10, -4), (11, -5)])
+        spline.knots = [0, 0, 0, 0, 1, 1] if kind == "knots" else spline.knots
+        spline.weights = [1, 1] if kind == "weights" else []
+    elif kind == "unread":
+        space.add_3dface([(0, 0), (1, 0), (1, 1)])
+    document.saveas(path)
+    return path

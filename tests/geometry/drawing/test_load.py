@@ -7,7 +7,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, MeshSettings, UserError
+from geometry import MeshSettings, UserError
 from geometry.cache import expected_triangles, finger_mesh
 from geometry.drawing.checks import least_thickness
 from geometry.drawing.description import Description, load_description
@@ -18,14 +18,6 @@ from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, rectangle, write_b
 
 FILES = [*sorted(FINRAY.glob("*.stp")), CSIRO]
 IDS = [path.stem for path in FILES]
-
-
-def ring_file(path, outer=20.0, inner=15.0):
-    document = ezdxf.new(units=4)
-    document.modelspace().add_circle((3, 4), outer)
-    document.modelspace().add_circle((3, 4), inner)
-    document.saveas(path)
-    return path
 
 
 def clamped_length(finger):
@@ -95,31 +87,30 @@ def test_a_long_curved_body_is_touched_at_its_side(tmp_path):
 def test_the_frame_does_not_depend_on_the_file_s(tmp_path, turn, mirror):
     """A wedge drawn anywhere, with clamp and contact given there, is the same finger."""
     angle = np.radians(turn)
-    matrix = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]) @ np.diag(
-        [1, mirror]
-    )
+    turned = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    matrix = turned @ np.diag([1, mirror])
 
     def there(points):
         return (np.asarray(points, dtype=float) @ matrix.T + [12, -7]).tolist()
 
-    path = write_dxf(
-        tmp_path / "wedge.dxf", [there([(0, 0), (0, -30), (90, 0)]), there(rectangle(5, -20, 10, 15))]
-    )
-    description = Description(
-        clamp=there([(0, 0), (0, -30)]), contact=there([(35, 0)])[0], markers=there([(40, -3), (20, -2)])
-    )
-    finger = finger_from_file(path, description)
+    curves = [there([(0, 0), (0, -30), (90, 0)]), there(rectangle(5, -20, 10, 15))]
+    clamp, (contact,) = there([(0, 0), (0, -30)]), there([(35, 0)])
+    description = Description(clamp=clamp, contact=contact, markers=there([(40, -3), (20, -2)]))
+    finger = finger_from_file(write_dxf(tmp_path / "wedge.dxf", curves), description)
     assert finger.contact_abscissa == pytest.approx(35)
     assert finger.markers == pytest.approx(np.array([[20, -2], [40, -3]]))
-    assert finger.section.outline.points[list(finger.section.outline.pieces("front"))] == pytest.approx(
-        np.array([[90, 0]])
-    )
+    front = list(finger.section.outline.pieces("front"))
+    assert finger.section.outline.points[front] == pytest.approx(np.array([[90, 0]]))
     assert finger.placement.inverse(finger.markers) == pytest.approx(np.array(there([(20, -2), (40, -3)])))
     assert finger.sources["clamp"] == finger.sources["contact"] == finger.sources["markers"] == "given"
 
 
 def test_ring(tmp_path):
-    finger = finger_from_file(ring_file(tmp_path / "ring.dxf"))
+    document = ezdxf.new(units=4)
+    for radius in (20, 15):
+        document.modelspace().add_circle((3, 4), radius)
+    document.saveas(tmp_path / "ring.dxf")
+    finger = finger_from_file(tmp_path / "ring.dxf")
     outline = finger.section.outline
     assert clamped_length(finger) == pytest.approx(2 * np.pi * 20 / 6, rel=1e-2)  # the lowest sixth
     front = np.concatenate([outline.ends[which] for which in outline.pieces("front")])
@@ -188,23 +179,14 @@ def test_the_lines_of_a_finger_give_it_again(tmp_path, units, lines):
     assert set(again.sources.values()) == {"given"}
 
 
-def test_the_lines_of_a_cut_solid_hold_its_plane():
-    finger = finger_from_file(FILES[0], Description(plane="z = 5"))
-    assert 'plane = "z = 5"' in description_lines(finger)
-
-
 def test_mesh_with_groups_is_taken_as_it_is(tmp_path):
     groups = ("base", "contact", "front", "markers")
     finger = finger_from_file(write_beam_mesh(tmp_path / "beam.msh", groups=groups))
     mesh = finger.mesh
     assert mesh is not None
     assert mesh.areas.sum() == pytest.approx(1000)
-    assert {name: round(mesh.boundary_length(name), 6) for name in mesh.boundaries} == {
-        "base": 10,
-        "front": 100,
-        "back": 100,
-        "contact": 4,
-    }
+    lengths = {name: round(mesh.boundary_length(name), 6) for name in mesh.boundaries}
+    assert lengths == {"base": 10, "front": 100, "back": 100, "contact": 4}
     assert mesh.markers == pytest.approx(np.array([[50, -5]]))
     assert mesh.points[mesh.contact_node] == pytest.approx([42, 0])
     assert (finger.contact_abscissa, finger.contact_width) == pytest.approx((42, 4))
@@ -234,17 +216,6 @@ def test_definition_is_read_back(path):
     assert again.digest == finger.digest
     assert again.facts() == finger.facts()
     assert finger.plot().axes
-    with pytest.raises(UserError, match="no definition"):
-        DrawnFinger.from_definition(Design().definition())
-
-
-def test_facts_say_where_values_come_from():
-    facts = {meaning: value for meaning, _, value in finger_from_file(FILES[0]).facts()}
-    assert facts["Drawing"] == "Finray_8.stp (STEP, extruded by 12 mm, at z = 0)"
-    assert facts["Placement"] == "mirrored in x, shifted by (52.8, 0) mm"
-    assert facts["Depth"] == "12 mm, drawn"
-    assert facts["Clamped length"] == "10 mm, proposed"
-    assert len(facts["SHA-256 of the drawing"]) == 64
 
 
 @pytest.mark.parametrize("path", [FILES[0], CSIRO], ids=["Finray_8", "csiro"])
@@ -254,3 +225,17 @@ def test_drawn_fingers_are_meshed(path):
     assert mesh.areas.sum() == pytest.approx(finger.section.area, rel=1e-3)
     assert mesh.boundary_length("base") == pytest.approx(clamped_length(finger), rel=1e-6)
     np.testing.assert_allclose(mesh.markers, finger.markers, atol=1e-9)
+
+
+def test_lines_of_a_command_beat_those_of_a_file(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text("contact = [1, 2]\nclamp = [[0, 0], [0, 1]]")
+    found = load_description(path, ["contact = [3, 4]", "markers = 4"])
+    assert (found.contact, found.markers, found.clamp) == ((3, 4), 4, (((0, 0), (0, 1)),))
+
+
+def test_a_drawing_of_which_all_is_called_front_is_read(tmp_path):
+    """What is named may lie on the boundary, but here it is the boundary."""
+    path = write_svg(tmp_path / "a.svg", '<g id="front"><rect width="60" height="9"/></g>')
+    finger = finger_from_file(path, Description(clamp=[[0, 0], [0, -9]], contact=[40, 0]))
+    assert np.ptp(finger.section.outline.points, axis=0) == pytest.approx([60, 9])

@@ -8,7 +8,7 @@ from shapely.geometry import LineString, Point, Polygon
 
 from geometry import Design, finger_section, marker_positions
 from geometry.finger.section import cells, rib_axes, ribs
-from tests.meshes import body_area, body_perimeter, boundary_lengths, corner_area, polygon_area
+from tests.meshes import body_area, body_perimeter, polygon_area
 
 THICKNESS = {"front": "front_thickness", "back": "back_thickness", "base": "base_thickness"}
 
@@ -79,15 +79,6 @@ def test_ribs_slope_by_their_angle(angle: float, leans: int) -> None:
 def test_ribs_are_evenly_spaced_along_the_front_wall() -> None:
     feet = [corners[[0, 3], 0].mean() for corners in ribs(Design())]
     np.testing.assert_allclose(feet, 2 + 68 / 5 * np.arange(1, 5), rtol=1e-14)
-
-
-def test_boundary_lengths_of_the_papers_finger() -> None:
-    lengths = boundary_lengths(Design())
-    assert lengths == pytest.approx({"base": 30, "front": 90, "back": np.hypot(90, 30), "contact": 2})
-
-
-def test_fillet_of_a_right_angle_leaves_a_square_less_a_quarter_circle() -> None:
-    assert corner_area(np.pi / 2, 2.0) == pytest.approx(4 - np.pi)
 
 
 def test_front_markers_are_evenly_spaced_on_the_centre_line() -> None:

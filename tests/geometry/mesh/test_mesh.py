@@ -6,46 +6,12 @@ import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon
 
-from geometry import Design, OutsideBodyError, ShapeError, TriangleMesh, UserError
+from geometry import Design, OutsideBodyError, TriangleMesh
 from geometry.finger.section import cells
 from geometry.mesh.mesher import build_mesh
 from geometry.mesh.settings import MeshSettings
 from solvers.lagrange import LagrangeSpace
-from tests.meshes import permuted
-
-SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-
-
-def square(**changes: object) -> TriangleMesh:
-    """The unit square as two triangles."""
-    parts: dict[str, object] = {
-        "points": SQUARE,
-        "triangles": [[0, 1, 2], [0, 2, 3]],
-        "boundaries": {"base": [[3, 0]], "front": [[2, 3]], "contact": [[2, 3]]},
-        "marker_nodes": [1, 2],
-        "contact_node": 2,
-    }
-    return TriangleMesh(**{**parts, **changes})  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("changes", "kind", "text"),
-    [
-        ({"points": SQUARE[:, :1]}, ShapeError, "points"),  # one coordinate
-        ({"triangles": [[0, 1, 2, 3]]}, ShapeError, "triangles"),  # a quadrilateral
-        ({"triangles": [[0, 2, 1]]}, UserError, "clockwise"),
-        ({"triangles": [[0, 1, 1]]}, UserError, "flat"),
-        ({"triangles": [[0, 1, 7]]}, UserError, "outside 0..3"),
-        ({"marker_nodes": [4]}, UserError, "outside 0..3"),
-        ({"contact_node": -1}, UserError, "outside 0..3"),
-        ({"boundaries": {"base": [[0, 9]]}}, UserError, "outside 0..3"),
-        ({"points": np.full((4, 2), np.nan)}, UserError, "not finite"),
-        ({"depth": 0.0}, UserError, "above 0 mm"),
-    ],
-)
-def test_impossible_mesh_is_refused(changes: dict[str, object], kind: type[UserError], text: str) -> None:
-    with pytest.raises(kind, match=text):
-        square(**changes)
+from tests.refusals.geometry import square
 
 
 def test_arrays_cannot_be_written() -> None:
@@ -56,33 +22,14 @@ def test_arrays_cannot_be_written() -> None:
 
 
 def test_mesh_is_independent_of_the_arrays_it_was_made_from() -> None:
-    points = SQUARE.copy()
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     mesh = square(points=points)
     points[0] = 99
     assert mesh.points[0].tolist() == [0, 0]
 
 
-def test_unknown_boundary_lists_those_there_are() -> None:
-    with pytest.raises(UserError, match=r"no boundary 'top'; it has base, front, contact"):
-        square().boundary("top")
-
-
 def test_edges_of_the_square() -> None:
     assert square().edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
-
-
-def test_permutation_keeps_the_body_and_changes_the_numbering(default_mesh: TriangleMesh) -> None:
-    mesh, other = default_mesh, permuted(default_mesh, 3)
-    assert other.digest != mesh.digest
-    assert other.areas.sum() == pytest.approx(mesh.areas.sum(), rel=1e-14)
-    assert sorted(other.areas.round(12)) == sorted(mesh.areas.round(12))
-    assert (other.markers == mesh.markers).all()
-    assert (other.points[other.contact_node] == mesh.points[mesh.contact_node]).all()
-    for name in mesh.boundaries:
-        ends, same = (sorted(m.points[m.boundary(name)].reshape(-1, 4).tolist()) for m in (mesh, other))
-        assert ends == same
-    centroids, same = (sorted(m.at_centroids().points.round(9).tolist()) for m in (mesh, other))
-    assert centroids == same
 
 
 def test_saved_mesh_is_read_back_the_same(default_mesh: TriangleMesh, tmp_path: Path) -> None:
@@ -137,13 +84,6 @@ def test_points_are_inside_exactly_where_the_section_is(default_mesh: TriangleMe
         except OutsideBodyError:
             located = False
         assert located == inside, point
-
-
-def test_point_in_a_cavity_is_named_in_the_error(default_mesh: TriangleMesh) -> None:
-    with pytest.raises(
-        OutsideBodyError, match=r"1 of 2 points lie outside the body, the first at \(6, -10\) mm"
-    ):
-        default_mesh.locate([[1.0, -1.0], [6.0, -10.0]])
 
 
 def test_location_at_nodes_and_barycentric_points_agrees_with_search(default_mesh: TriangleMesh) -> None:

@@ -7,17 +7,9 @@ import pytest
 
 from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_through_thickness
 from geometry import marker_positions as positions_of
-from geometry.finger.section import cells, corner_angles
 from geometry.mesh.boundary import boundary_loops
 from geometry.mesh.mesher import build_mesh
-from tests.meshes import body_area, boundary_lengths, corner_area
-
-
-def polygon_of_loop(mesh: TriangleMesh, loop: np.ndarray) -> float:
-    """Area inside a closed boundary, mm^2, by the shoelace formula over its edges."""
-    edges = mesh.boundary_edges
-    start, end = (mesh.points[edges[np.isin(edges[:, 0], loop)][:, k]] for k in range(2))
-    return float(abs(0.5 * (start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]).sum()))
+from tests.meshes import body_area, boundary_lengths
 
 
 def test_area_is_that_of_the_section(design: Design, mesh: TriangleMesh) -> None:
@@ -58,18 +50,6 @@ def test_euler_characteristic_counts_the_ribs(design: Design, mesh: TriangleMesh
     euler = len(mesh.points) - len(mesh.edges) + len(mesh.triangles)
     assert 1 - euler == design.rib_count + 1  # holes
     assert len(boundary_loops(mesh)) == design.rib_count + 2
-
-
-def test_cells_have_their_areas(design: Design, mesh: TriangleMesh) -> None:
-    """Less the corners that a fillet fills; its arcs are chords in the mesh, which costs some per mille."""
-    expected = []
-    for corners in cells(design):
-        x, y = corners.T
-        sharp = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-        filled = sum(corner_area(angle, design.fillet_radius) for angle in corner_angles(corners))
-        expected.append(sharp - filled)
-    measured = [polygon_of_loop(mesh, loop) for loop in boundary_loops(mesh)[1:]]
-    np.testing.assert_allclose(measured, expected, rtol=2e-3 if design.fillet_radius else 1e-12)
 
 
 def test_walls_and_ribs_measure_their_thickness(design: Design, mesh: TriangleMesh) -> None:
@@ -151,22 +131,6 @@ def test_grading_reaches_its_size_where_asked_and_only_there(setting, place):
     assert length[far].min() > 0.3
 
 
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        ({"size": 0}, "size = 0"),  # below the bound
-        ({"size": "fine"}, "size = 'fine'"),
-        ({"sise": 1}, "did you mean size"),
-        ({"coarsening": 0.5}, "coarsening = 0.5"),
-    ],
-)
-def test_wrong_settings_give_one_line(values: dict[str, object], text: str) -> None:
-    with pytest.raises(UserError) as refused:
-        MeshSettings(**values)
-    assert text in str(refused.value)
-    assert "\n" not in str(refused.value)
-
-
 def random_design(seed: int) -> Design:
     """A finger drawn evenly from wide ranges; draws that break a rule are drawn again."""
     rng = np.random.default_rng(seed)
@@ -187,7 +151,7 @@ def random_design(seed: int) -> Design:
             continue
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [1, 4, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 2, 3))])
 def test_random_admissible_design_meshes(seed: int) -> None:
     design = random_design(seed)
     mesh = build_mesh(design, MeshSettings(size=2, coarsening=2))

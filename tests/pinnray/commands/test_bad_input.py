@@ -42,7 +42,11 @@ def test_a_drawing_is_not_replaced_by_what_is_drawn_from_it(folder, capsys):
 
 @pytest.mark.parametrize(
     ("command", "closed"),
-    [("--version", "<&-"), ("solvers", ">&-"), ("--version", "2>&-")],  # a table by Rich where it is closed
+    [
+        ("solvers", ">&-"),  # a table by Rich
+        pytest.param("--version", "<&-", marks=pytest.mark.slow),
+        pytest.param("--version", "2>&-", marks=pytest.mark.slow),
+    ],
 )
 def test_a_closed_stream_is_no_fault(command, closed):
     done = run_python("-m", "pinnray.cli", command, after=closed)
@@ -53,11 +57,7 @@ def test_a_closed_stream_is_no_fault(command, closed):
     ("before", "argument", "said"),
     [
         ("ulimit -n 16;", "out", "the limit of open files is 16; allow 128 (ulimit -n 128)"),
-        (
-            "ulimit -f 8;",
-            "out",
-            "files may not become longer than 8192 bytes; allow 16777216 (ulimit",
-        ),
+        ("ulimit -f 8;", "out", "files may not become longer than 8192 bytes; allow 16777216 (ulimit"),
         ("", "a\udcff", r"the argument 'a\udcff' is not UTF-8; take another name"),
     ],
 )
@@ -67,10 +67,3 @@ def test_what_the_libraries_cannot_start_with_is_one_line(folder, before, argume
     done = run_python(*line, before=before)
     assert (done.returncode, done.stderr.count("\n")) == (BAD_INPUT, 1)
     assert done.stderr.startswith(f"error: {said}")
-
-
-def test_bad_input_of_a_process_has_no_traceback(folder):
-    done = run_python("-m", "pinnray.cli", "compare", "--solvers", "fen")
-    assert (done.returncode, done.stdout) == (BAD_INPUT, "")
-    assert done.stderr.startswith("error: no solver is called 'fen'")
-    assert done.stderr.count("\n") == 1

@@ -17,7 +17,6 @@ import pyvista
 from compare.runtime.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
 from geometry.cache import cad_files, finger_mesh
 from geometry.finger.design import Design
-from geometry.finger.presets import preset_names
 from geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.cli import compare_main, main
 from pinnray.options.preset_jobs import JOBS, JobDefaults, job_defaults
@@ -49,23 +48,22 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_table_and_the_report_are_named(folder, capsys, without_pictures):
     assert compare_main([*SMALL[1:], "--measurements", "good.csv"]) == 0
     output = capsys.readouterr()
-    assert "Mean absolute error at" in output.out
-    assert "measured" in output.out
     mae = json.loads(Path("out/default/metrics.json").read_text())["solvers"]["fem"]["markers"]["mae_u"]
     row, _ = [line for line in output.out.splitlines() if line.startswith("  fem ")]
     assert f"{mae:.3f}" in row
-    assert output.out.splitlines()[-1] == "report: out/default/report.html"
     assert Path("out/default/report.html").is_file()
     stages = [line.split(":")[0] for line in output.err.splitlines()]
     assert stages == [
-        *("mesh", "measurements", "fem", "certificate", "checks"),
-        *("fields", "tables", "pictures", "report"),
+        "mesh",
+        "measurements",
+        "fem",
+        "certificate",
+        "checks",
+        "fields",
+        "tables",
+        "pictures",
+        "report",
     ]
-
-
-def test_quiet_prints_nothing(folder, capsys, without_pictures):
-    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == 0
-    assert capsys.readouterr() == ("", "")
 
 
 def test_json_prints_the_metrics_and_nothing_else(folder, capsys, without_pictures):
@@ -85,18 +83,9 @@ def test_markers_that_no_finger_explains_are_said_first(folder, capsys, without_
     assert told["solvers"]["fem-id"]["status"] == "not converged"
     assert "in reverse order their displacements fit" in told["warnings"][0]
     assert told["solvers"]["fem-id"]["force"]["size"]["value"] > 0
-    output = capsys.readouterr()
-    assert output.err.index(told["warnings"][0]) < output.err.index("error: fem-id did not converge")
-    assert "fem-id (not converged) found: force" in output.out
-    report = Path("here/report.html").read_text()
-    assert report.index("What speaks against these numbers?") < report.index("What is not converged?")
-    assert "in reverse order" in report
-
-
-@pytest.mark.parametrize("options", [["--quiet"], ["--json"]])
-def test_quiet_does_not_hide_an_error(folder, capsys, options):
-    assert main(["compare", "--solvers", "fen", *options]) == BAD_INPUT
-    assert capsys.readouterr().err.startswith("error: no solver is called 'fen'")
+    errors = capsys.readouterr().err
+    assert errors.index(told["warnings"][0]) < errors.index("error: fem-id did not converge")
+    assert "in reverse order" in Path("here/report.html").read_text()
 
 
 def test_the_options_reach_the_job(folder, capsys, without_pictures):
@@ -147,6 +136,7 @@ def test_a_preset_brings_its_job_unless_told_otherwise(preset, finger, physics, 
     assert PhysicsOptions(**physics).read(preset)[1].kind == load
 
 
+@pytest.mark.slow
 def test_a_preset_as_a_setting_changes_the_solver_and_not_the_job(folder, capsys, without_pictures):
     """Both ways lead to the same solver."""
     tiny = ["--solver-set", "pinn-std.epochs=2", "--solver-set", "pinn-std.width=4", "--quiet"]
@@ -194,15 +184,9 @@ def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsy
     output = capsys.readouterr()
     warnings = [line for line in output.err.splitlines() if line.startswith("warning: ")]
     assert len(warnings) == 3
-    assert warnings[0].startswith("warning: left out: fem-id (fem-id: the neo-hookean law is given")
-    assert warnings[1].startswith("warning: left out: fem-nonlinear (fem-nonlinear: ")
-    assert warnings[2].startswith("warning: left out: gp (gp goes through markers")
     assert not any(line.startswith("gp:") for line in output.err.splitlines())
     run = json.loads(Path("out/default/run.json").read_text())
     assert (list(run["solvers"]), list(run["left_out"])) == (["fem"], ["fem-id", "fem-nonlinear", "gp"])
-    assert "Left out: fem-id (fem-id: the neo-hookean law" in Path("out/default/report.html").read_text(
-        "utf-8"
-    )
 
 
 def test_the_complete_table_and_that_of_the_paper_are_solvers_that_exist():
@@ -266,15 +250,7 @@ def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, mo
     assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == NOT_CONVERGED
     said = "error: fem did not converge: stopped at 40 % of the load; take smaller steps\n"
     assert capsys.readouterr() == ("", said)
-    assert "Stopped at 40 % of the load" in Path("out/default/report.html").read_text(encoding="utf-8")
-
-
-def test_a_training_that_is_too_short_does_not_converge(folder, capsys, without_pictures):
-    settings = ["pinn-std.wall_spacing=5", "pinn-std.corner_spacing=5"]
-    options = [word for setting in settings for word in ("--solver-set", setting)]
-    small = ["--solvers", "pinn-std", "--mesh-size", "1.0", "--measurements", "good.csv", "--quiet"]
-    assert main(["compare", *small, *options]) == NOT_CONVERGED
-    assert capsys.readouterr().err.startswith("error: pinn-std did not converge: ")
+    assert Path("out/default/report.html").is_file()
 
 
 def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, without_pictures):
@@ -307,8 +283,15 @@ def test_solvers_are_listed(capsys, monkeypatch):
     assert main(["solvers"]) == 0
     listed = capsys.readouterr().out
     assert "…" not in listed  # no value is cut off
-    assert all(f"│ {name} " in listed for name in solver_names())
+    assert all(f" {name} " in listed for name in solver_names())
     assert all(f"preset={preset}" in listed for presets in PRESETS.values() for preset in presets)
+
+
+def test_a_terminal_in_ascii_shows_what_it_lacks_as_question_marks(monkeypatch):
+    with TextIOWrapper(BytesIO(), encoding="ascii") as terminal:
+        monkeypatch.setattr("sys.stdout", terminal)
+        assert main(["material"]) == 0
+        assert b"?" in terminal.buffer.getvalue()
 
 
 def test_a_broken_plug_in_is_one_line_among_the_solvers(tmp_path, capsys, monkeypatch):
@@ -326,10 +309,9 @@ def test_a_broken_plug_in_is_one_line_among_the_solvers(tmp_path, capsys, monkey
 
 def test_one_solver_alone(folder, capsys):
     assert main(["solve", "fem", "--mesh-size", "1.0", "--out", "fields/fem.vtu"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("fem: solved directly")
-    assert lines[1].startswith("energy 1.11")
-    assert lines[-1] == "fields/fem.vtu"
+    _, energy, *_, file = capsys.readouterr().out.splitlines()
+    assert energy.startswith("energy 1.11")
+    assert file == "fields/fem.vtu"
     assert pyvista.read("fields/fem.vtu").n_cells > 1000
 
 
@@ -337,8 +319,7 @@ def test_one_solver_that_follows_the_load_has_its_forces_beside_the_fields(folde
     options = "--mesh-size 1.0 --load patch --slide --stroke 2 --law st-venant-kirchhoff"
     assert main(["solve", "fem-nonlinear", *options.split(), "--out", "fields/pressed.vtu"]) == 0
     written = [
-        "fields/pressed.vtu",
-        *(f"fields/pressed_force_displacement.{kind}" for kind in ("csv", "png")),
+        f"fields/pressed{end}" for end in (".vtu", "_force_displacement.csv", "_force_displacement.png")
     ]
     assert capsys.readouterr().out.splitlines()[-3:] == written
     rows = list(csv.DictReader(Path(written[1]).read_text().splitlines()))
@@ -370,22 +351,10 @@ def test_a_full_disk_is_told_in_one_line_and_leaves_no_part_of_a_file(
     assert not list(Path("here").glob(".*"))
 
 
-def test_the_mesh_alone(folder, capsys):
-    assert main(["mesh", "--mesh-size", "1.0", "--out", "here"]) == 0
-    assert "triangles, area" in capsys.readouterr().out
-    assert sorted(path.name for path in Path("here").iterdir()) == ["mesh.npz", "mesh.png", "mesh.vtu"]
-
-
-def test_the_design_alone(folder, capsys):
-    assert main(["design", "--formats", "svg", "--out", "here"]) == 0
-    listed = capsys.readouterr().out.splitlines()
-    assert listed == ["here/section.svg", "here/finger.toml", "here/design.png"]
-    assert all(Path(name).is_file() for name in listed)
-
-
 # Surroundings
 
 
+@pytest.mark.slow
 def test_a_home_that_cannot_be_written_is_not_needed(folder, tmp_path_factory):
     """Neither for the mesh nor for what DOLFINx compiles and matplotlib remembers."""
     cache = tmp_path_factory.mktemp("cache")
@@ -394,15 +363,6 @@ def test_a_home_that_cannot_be_written_is_not_needed(folder, tmp_path_factory):
     done = run_python(*line, before="unset XDG_CACHE_HOME;", **place)
     assert (done.returncode, "/proc/absent" in done.stderr) == (0, False), done.stderr
     assert {path.name for path in cache.iterdir()} >= {"fenics"}
-
-
-def test_a_terminal_without_greek_letters_shows_the_tables(folder, monkeypatch, without_pictures):
-    with TextIOWrapper(BytesIO(), encoding="ascii") as terminal:
-        monkeypatch.setattr("sys.stdout", terminal)
-        assert main([*SMALL, "--measurements", "good.csv", "--out", "here"]) == 0
-        shown = terminal.buffer.getvalue()
-    assert b"Mean absolute error at 2 markers" in shown
-    assert b"?" in shown
 
 
 # A solver of another package
@@ -424,43 +384,10 @@ def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder, monkeypatch, caps
 # Help
 
 
-@pytest.mark.parametrize("arguments", [["--version"], ["compare", "--version"], ["track", "--version"]])
+@pytest.mark.parametrize("arguments", [["--version"], ["compare", "--version"]])
 def test_the_version_is_that_of_this_program(arguments, capsys):
     assert main(arguments) == 0
     assert capsys.readouterr().out == f"{version('pinn-ray')}\n"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--help"], ["compare", "design", "gridsearch", "mesh", "solve", "solvers"]),
-        (
-            ["compare", "--help"],
-            ["Parameters", "Finger", "Physics", "Solvers' settings", "Output", "compare --design slender"],
-        ),
-    ],
-)
-def test_help_names_every_group_and_the_exit_codes(arguments, words, capsys):
-    assert main(arguments) == 0
-    shown = " ".join(capsys.readouterr().out.split())
-    for word in [*words, "Exit codes", "130 interrupted"]:
-        assert word in shown
-
-
-def test_help_names_every_option_of_the_main_job(capsys):
-    assert main(["compare", "--help"]) == 0
-    text = capsys.readouterr().out
-    options = (
-        "design set mesh-size adapt young poisson plane law load radius stroke direction slide solvers "
-        "solver-set seed preset device measurements reference out resume quiet json"
-    )
-    assert all(f"--{option} " in text for option in options.split())
-    assert "[default: ()]" not in text
-
-
-def test_every_preset_is_accepted():
-    for name in preset_names():
-        assert FingerOptions(design=name).read()[0].name == name
 
 
 def test_a_tolerance_that_is_not_reached_ends_with_its_own_code(monkeypatch, tmp_path, capsys):
@@ -468,9 +395,7 @@ def test_a_tolerance_that_is_not_reached_ends_with_its_own_code(monkeypatch, tmp
     monkeypatch.setattr(adapt, "adapted", partial(adapt.adapted, most_rounds=2))
     options = ["--mesh-size", "1", "--adapt", "1e-6", "--out", str(tmp_path / "mesh")]
     assert main(["mesh", *options]) == NOT_CONVERGED
-    progress, error = capsys.readouterr().err.split("error: ")
-    assert "s, the markers are known to 0.01" in progress
-    assert error.startswith("the markers are known to 0.01")
+    assert "error: the markers are known to 0.01" in capsys.readouterr().err
     assert len((tmp_path / "mesh" / "adapt.csv").read_text(encoding="utf-8").splitlines()) == 3
     assert len(TriangleMesh.load(tmp_path / "mesh" / "mesh.npz").triangles) > 1322
 
@@ -481,7 +406,6 @@ def test_solve_gives_the_markers_to_a_solver_that_assimilates(tmp_path, capsys):
     out = tmp_path / "pulled.vtu"
     options = ["--mesh-size", "1.0", "--measurements", str(markers), "--out", str(out)]
     assert main(["solve", "fem-asm", *options]) == 0
-    assert "mm when they are left out" in capsys.readouterr().out
     assert out.exists()
 
 

@@ -45,8 +45,8 @@ def unread(code: str, words: str, *streams: str) -> subprocess.CompletedProcess[
     ("code", "words"),
     [
         (COMMAND, "solvers"),  # a table by Rich
-        (COMMAND, "--help"),  # by Cyclopts
-        (COMMAND, "mesh --mesh-size 3 --out {out}"),  # lines by print, in a buffer until the end
+        pytest.param(COMMAND, "--help", marks=pytest.mark.slow),  # by Cyclopts
+        pytest.param(COMMAND, "mesh --mesh-size 3 --out {out}", marks=pytest.mark.slow),  # by print
         (LONG, ""),
     ],
 )
@@ -56,12 +56,11 @@ def test_a_closed_pipe_ends_a_command_quietly(code, words, tmp_path):
     assert re.sub(r"mesh: .* s\n", "", done.stderr) == ""  # a line of progress
 
 
-@pytest.mark.parametrize("words", ["mesh --set height=1", "mesh --mesh-size 3 --out {out}"])
-def test_so_does_a_closed_pipe_of_messages(words, tmp_path):
-    done = unread(COMMAND, words.format(out=tmp_path), "stdout", "stderr")
-    assert done.returncode == 141
+def test_so_does_a_closed_pipe_of_messages():
+    assert unread(COMMAND, "mesh --set height=1", "stdout", "stderr").returncode == 141
 
 
+@pytest.mark.slow
 def test_the_results_are_kept(tmp_path):
     out, markers = tmp_path / "run", tmp_path / "markers.csv"
     markers.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,0,-5\n85,-1,-2,-0.5\n")
@@ -71,6 +70,7 @@ def test_the_results_are_kept(tmp_path):
     assert (out / "report.html").stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_output_that_finds_no_room_is_an_error_in_one_line(tmp_path):
     with open("/dev/full", "w", encoding="utf-8") as full:
         done = subprocess.run(
@@ -82,6 +82,4 @@ def test_output_that_finds_no_room_is_an_error_in_one_line(tmp_path):
             stderr=subprocess.PIPE,
         )
     assert done.returncode == 2
-    assert len([line for line in done.stderr.splitlines() if line.startswith("error: ")]) == 1
-    assert "Traceback" not in done.stderr
-    assert "Exception ignored" not in done.stderr
+    assert [line.partition(":")[0] for line in done.stderr.splitlines()] in (["error"], ["mesh", "error"])

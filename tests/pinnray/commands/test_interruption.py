@@ -97,13 +97,14 @@ def meshing(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], int, Path]]
         os.kill(number, signal.SIGKILL)
 
 
-@pytest.mark.parametrize("number", ENDING, ids=lambda number: number.name)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 def test_a_signal_while_the_program_is_imported_is_one_line(number):
     command = started(WHILE_IMPORTING, str(int(number)))
     assert command.communicate(timeout=60) == ("", "interrupted\n")
     assert command.returncode == INTERRUPTED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP], ids=["in the background", "nohup"])
 def test_a_signal_that_the_shell_has_ignored_stays_ignored(number):
     command = started(WHILE_IMPORTING, str(int(number)), ignored=number)

@@ -61,30 +61,3 @@ def test_the_run_says_what_it_depends_on_and_may_be_replaced(folder):
     assert main(["rig", *options.split(), "--out", str(folder)]) == 0
     np.testing.assert_array_equal(filmed(folder), before)
     assert not (folder / "boards").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ("--noise -1", "noise = -1 grey levels is outside its range, 0 to 100 grey levels"),
-        ("--blur soft", "blur = 'soft' is not a finite number"),
-        ("--rest 0", "rest = 0 frames is outside its range"),
-        ("--size big", "--size big: give width and height"),
-        ("--size 4000x3000", "frames of 4000x3000 pixels; the rig makes up to 4 million"),
-        ("--tilt 80", "--tilt 80: the camera looks down"),
-        ("--codec h264", "no codec 'h264'; there are ffv1, mjpg, mp4v, png"),
-        ("--cover 5", "--cover 5: write marker=share"),
-        ("--irregular 0.2", "--irregular 0.2: give a share from 0 to 0.1"),
-        ("--layers 0.6", "--layers 0.6: give a share from 0 to 0.5"),
-        ("--cover 10=0.5", "there is no marker 10 to cover; there are 1 to 9"),
-        ("--solver fem,pinn-std", "name one --solver"),
-        ("--boards 3 --board 9", "cannot read the board '9'"),
-    ],
-)
-def test_what_is_wrong_is_told_in_one_line_and_nothing_is_left(options, said, capsys, tmp_path):
-    out = tmp_path / "film"
-    assert main(["rig", "--mesh-size", "1", *options.split(), "--out", str(out)]) == 2
-    errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error")]
-    assert len(errors) == 1
-    assert said in errors[0]
-    assert not list(tmp_path.iterdir())

