@@ -52,14 +52,6 @@ def slopes_of(function: Callable[[FloatArray], FloatArray], place: FloatArray) -
     return np.column_stack(columns)
 
 
-def test_a_similarity_is_the_papers_linear_transform() -> None:
-    found = SIMILARITY.pixels(POINTS, np.array([6.0, -2.0, 300.0, 400.0]))
-    x, y = POINTS.T
-    np.testing.assert_allclose(
-        found, np.column_stack([6 * x - 2 * y + 300, -2 * x - 6 * y + 400]), rtol=1e-14
-    )
-
-
 def test_a_homography_divides_by_the_depth() -> None:
     found = plane("homography").pixels(POINTS)
     depth = 1 + 1e-3 * POINTS[:, 0] - 5e-4 * POINTS[:, 1]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from tests.fingers import beam
 from vision.calibration.camera import Camera
 from vision.discs.disc_detector import DiscDetections
@@ -123,8 +122,3 @@ def test_a_static_camera_leaves_the_discs_as_they_are() -> None:
     static = CameraMotion(0.1, None)
     assert static.undone(final) is final
     assert static.deviation == 0
-
-
-def test_no_fiducial_at_both_ends_is_one_line() -> None:
-    with pytest.raises(UserError, match="no fiducial is seen in the end where it was at the start"):
-        find_camera_motion(SCENE, discs(START, hidden=(0, 1, 2)), discs(START, hidden=(3, 4, 5)))

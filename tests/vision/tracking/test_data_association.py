@@ -93,15 +93,6 @@ def test_all_joint_hypotheses_of_random_problems():
     assert unsure > 80
 
 
-def test_the_order_of_detections_does_not_matter():
-    found, expected, fields = random_problem(8)
-    names = associate_markers(found, expected, fields)
-    turned = associate_markers(found[::-1], expected, fields)
-    assert len(found) > 1
-    assert (names >= 0).any()
-    assert np.where(turned >= 0, len(found) - 1 - turned, -1).tolist() == names.tolist()
-
-
 def test_without_detections_all_are_missing():
     expected = np.array([[1.0, 2.0], [3.0, 4.0]])
     assert associate_markers(np.empty((0, 2)), expected, rest_covariances(expected)).tolist() == [-1, -1]
@@ -184,12 +175,6 @@ def test_covariances_of_a_step(jump):
         v = (0.25**2 * a * b + 0.6**2 * walk(a, b)) * exp(-0.5 * ((hi - hj) / 0.4) ** 2)
         assert found[0, i, j] == pytest.approx(size * u, rel=1e-4)  # of the quadrature across the kink
         assert found[1, i, j] == pytest.approx(size * v, rel=1e-4)
-
-
-def test_a_step_is_a_sixteenth_of_the_stroke_or_all_of_it():
-    small, large = step_covariances(POINTS, REACH)
-    assert small == pytest.approx(large / 256, rel=1e-12)
-    assert large == pytest.approx(step_covariances(POINTS, REACH, (1.0,))[0], rel=1e-12)
 
 
 def test_covariances_at_rest():
