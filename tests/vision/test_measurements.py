@@ -104,13 +104,6 @@ def test_a_marker_that_was_not_seen_has_its_position_only(tmp_path):
     assert not back.displacements[~written.visible].any()
 
 
-def test_optional_columns_may_be_left_out(tmp_path):
-    found = read(tmp_path, f"{HEADER}\n9,-1,0.5,-2\n")
-    assert (found.points.tolist(), found.displacements.tolist()) == ([[9, -1]], [[0.5, -2]])
-    assert (found.standard_deviations.tolist(), found.visible.tolist()) == ([[0, 0]], [True])
-    assert (found.source, found.label) == ("measurements from markers.csv", "measured")
-
-
 def test_columns_may_be_in_any_order_among_others(tmp_path):
     found = read(tmp_path, "v_mm,note,visible,x_mm,u_mm,y_mm\n-2,left,1.0,9,0.5,-1\n")
     assert (found.points.tolist(), found.displacements.tolist()) == ([[9, -1]], [[0.5, -2]])

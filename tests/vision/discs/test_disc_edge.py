@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from geometry.errors import ShapeError, UserError
 from tests.vision.discs.disc_images import DiscImage, Edge
 from vision.discs.disc_fit import FittedDiscs, fit_discs
 
@@ -70,14 +69,6 @@ def assert_covered(discs: FittedDiscs, errors: np.ndarray) -> None:
 )
 def test_errors_are_what_the_covariances_say(image, noise):
     assert_covered(*measured(image, noise=noise))
-
-
-def test_clean_pictures_give_a_hundredth_of_a_pixel():
-    _, errors = measured(DiscImage())
-    assert (
-        np.sqrt((errors**2).mean()) < 0.0105
-    )  # bound 0.0080, by chi-square with 120 degrees below 1.3 times
-    assert np.abs(errors.mean(axis=0)).max() < 3.5 * 0.0080 / np.sqrt(COUNT)
 
 
 @pytest.mark.parametrize("off", [2.0, 4.0, 6.0])
@@ -188,42 +179,6 @@ def test_no_picture_is_too_odd(radii):
         discs = fit_discs(picture.astype(np.uint8), guesses, radii=radii)
         assert np.isfinite(discs.centres[discs.found]).all()
         assert discs.found.mean() < 0.05  # of white noise, chance makes a disc
-
-
-def test_a_disc_of_unknown_radius_must_be_seen_by_half():
-    assert not measured(DiscImage(centre=(20, -1)))[0].found.any()
-
-
-def test_discs_of_many_sizes_keep_their_order():
-    images = [replace(DiscImage(), radius=radius) for radius in (8.0, 4.0, 14.0, 5.0)]
-    picture, centres = sheet(images)
-    discs = fit_discs(
-        picture, [(*centre, image.radius) for centre, image in zip(centres, images, strict=True)]
-    )
-    assert discs.radii == pytest.approx([8, 4, 14, 5], abs=0.1)
-    assert np.abs(discs.centres - centres).max() < 0.05
-
-
-def test_no_guess_no_disc():
-    assert fit_discs(np.zeros((9, 9), dtype=np.uint8), np.empty((0, 3))).centres.shape == (0, 2)
-
-
-GREY = np.zeros((20, 20), dtype=np.uint8)
-
-
-@pytest.mark.parametrize(
-    ("image", "guesses", "radii", "error", "said"),
-    [
-        (GREY[..., None], [(9, 9, 3)], None, UserError, "grey images of eight bits"),
-        (GREY / 1.0, [(9, 9, 3)], None, UserError, "grey images of eight bits"),
-        (GREY, [(9, 9, 0)], None, UserError, "radius of a disc must be above zero"),
-        (GREY, [(9, 9, 3)], -1, UserError, "radius of a disc must be above zero"),
-        (GREY, [(9, 9)], None, ShapeError, r"guesses must have shape \('n', 3\)"),
-    ],
-)
-def test_what_cannot_be_fitted_is_refused(image, guesses, radii, error, said):
-    with pytest.raises(error, match=said):
-        fit_discs(image, guesses, radii=radii)
 
 
 def test_guesses_where_little_agrees_are_not_found_and_stop_no_other():

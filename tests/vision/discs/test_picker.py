@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from tests.vision.discs.dots import Dots, dots
 from vision.discs.colour import ColourRange, read_colour
 from vision.discs.colour_picker import pick_colour
@@ -58,20 +57,6 @@ def test_a_rectangle_gives_nearly_what_a_click_gives():
     assert read_colour(str(clicked)) == clicked
 
 
-@pytest.mark.parametrize(
-    ("place", "message"),
-    [
-        ((640, 10), "640,10 is not within the image of 640x360 pixels"),
-        ((-1, 10, 20, 20), "is not within the image"),
-        ((1, 2, 3), "a place is x,y or x0,y0,x1,y1 in pixels, not 1,2,3"),
-        ((float("nan"), 2), "not nan,2"),
-    ],
-)
-def test_an_impossible_place_is_one_line(place, message):
-    with pytest.raises(UserError, match=message):
-        pick_colour(dots(5.0, size=(640, 360)).image, place)
-
-
 def lightness(grey: int) -> float:
     return 116 * (((grey / 255 + 0.055) / 1.055) ** 2.4) ** (1 / 3) - 16
 
@@ -92,10 +77,3 @@ def test_what_is_not_connected_to_the_click_does_not_count():
     alone = pick_colour(scene.image, (x, y))
     scene.image[250:, 450:] = 135
     assert pick_colour(scene.image, (x, y)) == alone
-
-
-def test_a_click_onto_a_speck_is_refused():
-    speck = np.zeros((40, 50, 3), np.uint8)
-    speck[20:23, 30:33] = 255  # of which the median leaves a cross
-    with pytest.raises(UserError, match="there are 5 pixels of one colour; choose the middle of a marker"):
-        pick_colour(speck, (31, 21))

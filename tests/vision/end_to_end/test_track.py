@@ -9,7 +9,7 @@ import pytest
 
 from geometry.arrays import FloatArray
 from tests.fingers import beam
-from tests.vision.tracking.listed_discs import NOISE, ListedDiscs
+from tests.vision.tracking.listed_discs import NOISE, ListedDiscs, middles, seen
 from vision.calibration.camera import Camera, Pose
 from vision.discs.colour import DARK, ColourRange
 from vision.frames.frame import CapturedImage, Frames, Image
@@ -33,20 +33,6 @@ SHARES = (0.0, 0.0, 0.0, 0.3, 0.7, 1.0, 1.0, 1.0)
 """Of the displacement, in the frames of a film."""
 
 
-def seen(points: FloatArray, pose: Pose, height: float = 0.0) -> FloatArray:
-    return CAMERA.project(np.column_stack([points, np.full(len(points), height)]), pose)
-
-
-def middles(points: FloatArray, radius: float, pose: Pose) -> FloatArray:
-    """Places of the images of circles, by many points."""
-    angles = np.linspace(0, 2 * np.pi, 100, endpoint=False)
-    around = points[:, None] + radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    x, y = seen(around.reshape(-1, 2), pose).reshape(len(points), -1, 2).transpose(2, 0, 1)
-    turns = x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)
-    parts = [((of + np.roll(of, -1, axis=1)) * turns).sum(axis=1) for of in (x, y)]
-    return np.column_stack(parts) / (3 * turns.sum(axis=1))[:, None]
-
-
 def picture(
     listed: ListedDiscs,
     places: FloatArray,
@@ -58,8 +44,8 @@ def picture(
     markers, corners = np.delete(places, lost, axis=0), np.delete(SPACE.points, hidden, axis=0)
     scale = CAMERA.fx / POSE.translation[2]
     return listed.picture(
-        (RED, middles(markers, 0.8, pose), 0.8 * scale, 100.0),
-        (DARK, middles(corners, 2.0, pose), 2 * scale, 100.0),
+        (RED, middles(markers, 0.8, CAMERA, pose), 0.8 * scale, 100.0),
+        (DARK, middles(corners, 2.0, CAMERA, pose), 2 * scale, 100.0),
     )
 
 
@@ -109,23 +95,6 @@ def test_displacements_are_differences_of_the_means_at_rest(listed: ListedDiscs)
     assert "the camera file has no covariance" in tracking.warnings[0]
 
 
-def test_the_plane_is_that_of_the_fiducials_in_all_frames_at_rest(listed: ListedDiscs) -> None:
-    """Discs are 0.04 pixels off at the start and as much the other way at the end: the mean is exact."""
-    pictures = pressed(listed)
-    for number in (*range(3), *range(5, 8)):
-        listed.pictures[number][1][1].centres[:, 0] += 0.04 if number < 3 else -0.04
-    tracking = track(film(pictures), SCENE)
-    np.testing.assert_allclose(tracking.plane.pixels(MARKERS), seen(MARKERS, POSE), atol=5e-3)
-
-
-def test_without_a_camera_a_film_may_have_any_size(listed: ListedDiscs) -> None:
-    listed.size = (1300, 740)
-    tracking = track(film(pressed(listed)), replace(SCENE, camera=None))
-    np.testing.assert_allclose(tracking.observations("a film").displacements, PRESSED, atol=1e-3)
-    (said,) = tracking.warnings
-    assert "no camera" in said
-
-
 def test_markers_at_the_fiducials_height_are_told_from_those_nearer_by_their_scale(listed) -> None:
     high = Workspace(fiducials=SPACE.fiducials, marker_plane=0.5)
     known = replace(CAMERA, covariance=tuple(map(tuple, (1e-6 * np.eye(9)).tolist())))
@@ -146,9 +115,11 @@ def test_a_camera_that_moved_is_undone_with_a_warning(listed: ListedDiscs) -> No
     tracking = track(film(pressed(listed, pose=NUDGED)), SCENE)
     np.testing.assert_allclose(tracking.observations("a film").displacements, PRESSED, atol=5e-3)
     assert tracking.final_plane is not None
-    np.testing.assert_allclose(tracking.final_plane.pixels(MARKERS), seen(MARKERS, NUDGED), atol=0.02)
-    np.testing.assert_allclose(tracking.plane.pixels(MARKERS), seen(MARKERS, POSE), atol=0.02)
-    shift = np.median(np.linalg.norm(seen(SPACE.points, NUDGED) - seen(SPACE.points, POSE), axis=1))
+    np.testing.assert_allclose(tracking.final_plane.pixels(MARKERS), seen(MARKERS, CAMERA, NUDGED), atol=0.02)
+    np.testing.assert_allclose(tracking.plane.pixels(MARKERS), seen(MARKERS, CAMERA, POSE), atol=0.02)
+    shift = np.median(
+        np.linalg.norm(seen(SPACE.points, CAMERA, NUDGED) - seen(SPACE.points, CAMERA, POSE), axis=1)
+    )
     assert shift > 0.5
     assert f"moved by {shift:.2f} pixels" in tracking.warnings[1]
 

@@ -16,10 +16,8 @@ from tests.vision.end_to_end.test_track import (
     SHARES,
     SPACE,
     film,
-    middles,
-    seen,
 )
-from tests.vision.tracking.listed_discs import ListedDiscs
+from tests.vision.tracking.listed_discs import ListedDiscs, middles, seen
 from vision.discs.colour import DARK
 from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
@@ -34,8 +32,13 @@ def at_height(listed: ListedDiscs, height: float, *, moved: float = 0.0):
     return film(
         [
             listed.picture(
-                (RED, seen(MARKERS + share * PRESSED + moved, POSE, height), 0.8 * scale * nearer, 100.0),
-                (DARK, middles(SPACE.points, 2.0, POSE), 2 * scale, 100.0),
+                (
+                    RED,
+                    seen(MARKERS + share * PRESSED + moved, CAMERA, POSE, height),
+                    0.8 * scale * nearer,
+                    100.0,
+                ),
+                (DARK, middles(SPACE.points, 2.0, CAMERA, POSE), 2 * scale, 100.0),
             )
             for share in SHARES
         ]
@@ -55,7 +58,7 @@ def sheet(height: float) -> FilmedScene:
         # the sheet was forgotten
         (12.0, 0.0, SCENE, "nearer to the camera than the fiducials by about 12 mm"),
         (20.0, 0.0, SCENE, "nearer to the camera than the fiducials by about 20 mm"),
-        (-15.0, 0.0, SCENE, "farther from the camera than the fiducials by about 15 mm"),
+        (-15.0, 0.0, SCENE, "farther from the camera than the fiducials by about -15 mm"),
         (20.0, 0.0, replace(SCENE, camera=None), "times as far apart"),
         (25.0, 0.0, sheet(5.0), "by about 25 mm, not 5 mm above them"),
         (0.0, 11.0, SCENE, "beside them"),

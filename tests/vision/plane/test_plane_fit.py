@@ -15,7 +15,7 @@ from tests.vision.fingers import MARKERS as FRONT
 from tests.vision.fingers import PRESSED
 from vision.calibration.camera import Camera
 from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.marker_plane import HOMOGRAPHY, SIMILARITY, MarkerPlane
+from vision.tracking.marker_plane import SIMILARITY, MarkerPlane
 from vision.tracking.plane_fit import camera_plane, homography_plane, plane_of_markers, similarity_plane
 from vision.tracking.workspace import default_workspace
 
@@ -62,14 +62,6 @@ def test_a_fit_is_that_of_weighted_least_squares(kind: str, count: int) -> None:
     assert np.linalg.norm(slopes @ step) < 1e-3
     away = plane.points(pixels) - POINTS
     assert plane.residual == pytest.approx(np.sqrt((away**2).sum() / 7), rel=1e-12)
-
-
-@pytest.mark.parametrize("height", [0.0, 7.5])
-def test_a_calibrated_camera_gives_the_pose_and_the_plane_at_a_height(height: float) -> None:
-    plane = camera_plane(CAMERA, POINTS, seen(POINTS), NOISE, height=height)
-    np.testing.assert_allclose(plane.pixels(MARKERS), seen(MARKERS, height=height), atol=1e-4)
-    np.testing.assert_allclose(plane.parameters[6:], CAMERA.intrinsics)
-    assert camera_plane(CAMERA, POINTS, seen(POINTS), NOISE).projection.height == 0
 
 
 def slopes_by_refits(kind: str, count: int, pixels: FloatArray) -> FloatArray:
@@ -170,12 +162,6 @@ def test_a_similarity_starts_from_any_turn_and_scale() -> None:
         np.testing.assert_allclose(
             similarity_plane(POINTS, exact, NOISE).parameters, [a, b, -50, 700], rtol=1e-6
         )
-
-
-def test_a_homography_is_scaled_to_a_last_entry_of_one() -> None:
-    entries = np.array([8.0, 1.0, 100.0, 0.5, -7.0, 700.0, 1e-3, -5e-4])
-    exact = HOMOGRAPHY.pixels(POINTS, entries)
-    np.testing.assert_allclose(homography_plane(POINTS, exact, NOISE).parameters, entries, rtol=1e-6)
 
 
 def test_a_plane_of_markers_bends_by_what_the_similarity_leaves() -> None:

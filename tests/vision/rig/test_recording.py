@@ -129,15 +129,6 @@ def test_a_cable_hides_the_share_of_a_marker_that_it_is_told_to(bench):
     assert seen(1) == pytest.approx(0, abs=0.005)
 
 
-def test_what_hides_a_marker_is_in_the_picture_and_in_the_truth(bench):
-    cover = cable(bench.mesh.markers[2], 0.8, 1.0)
-    recording = film(bench, occluders=lambda frame: [cover] if frame == 1 else [])
-    (clear, free), (covered, hidden) = recording.frame(0), recording.frame(1)
-    assert free.seen == pytest.approx(np.ones(9), abs=1e-9)
-    assert hidden.seen[2] == pytest.approx(0, abs=0.01)
-    assert np.abs(covered.astype(int) - clear).max() > 60
-
-
 @pytest.mark.parametrize("codec", list(FILES))
 def test_a_recording_is_read_back(codec, bench, tmp_path):
     recording = film(bench)

@@ -7,7 +7,7 @@ from geometry.arrays import FloatArray
 from tests.fingers import beam
 from vision.calibration.camera import Camera
 from vision.discs.disc_detector import DiscDetections
-from vision.tracking.camera_motion import CameraMotion, find_camera_motion
+from vision.tracking.camera_motion import find_camera_motion
 from vision.tracking.scene import FilmedScene
 from vision.tracking.workspace import Workspace
 
@@ -115,10 +115,3 @@ def test_a_lens_that_is_not_known_cancels_however_well_the_ends_are_known() -> N
     motion = find_camera_motion(SCENE, discs(bent), after)
     undone = motion.undone(discs(BETWEEN + shift))
     np.testing.assert_allclose(undone.centres, BETWEEN, atol=1e-5)
-
-
-def test_a_static_camera_leaves_the_discs_as_they_are() -> None:
-    final = discs(BETWEEN)
-    static = CameraMotion(0.1, None)
-    assert static.undone(final) is final
-    assert static.deviation == 0

@@ -1,7 +1,7 @@
 """Data association against all joint hypotheses, one by one, and the covariances against closed forms."""
 
 from itertools import product
-from math import exp, log, pi, radians, sqrt
+from math import exp, log, pi, radians
 
 import numpy as np
 import pytest
@@ -105,31 +105,6 @@ def test_many_markers_among_many_false_detections():
     found = np.concatenate([false, np.add(expected[::-1], (0.1, -0.1))])
     names = associate_markers(found, expected, np.zeros((1, 2, 60, 60)))
     assert names.tolist() == list(range(359, 299, -1))
-
-
-@pytest.mark.parametrize("variance", [0.0, 1.0])
-def test_one_detection_is_taken_up_to_the_distance_at_which_it_is_sure(variance):
-    """r / (r + 1 - SEEN) = SURE, with r the density of the detection over that of false ones."""
-    spread = variance + NOISE**2
-    least = SURE / (1 - SURE) * (1 - SEEN)
-    farthest = sqrt(2 * spread * log(SEEN / FALSE_DENSITY / (2 * pi * spread) / least))
-    assert farthest < GATE * sqrt(spread)
-    fields = np.full((1, 2, 1, 1), variance)
-    for factor, name in ((1 - 1e-6, 0), (1 + 1e-6, -1)):
-        found = np.array([[3.0, -2.0 + factor * farthest]])
-        assert associate_markers(found, np.array([[3.0, -2.0]]), fields).tolist() == [name]
-
-
-@pytest.mark.parametrize(("deviations", "name"), [(5.0 + 1e-6, 0), (5.0 - 1e-6, -1)])
-def test_a_marker_beyond_the_gate_is_no_rival(deviations, name):
-    """A detection 3.5 standard deviations from one marker is sure only if no other marker can be it."""
-    near, far = 3.5 * NOISE, deviations * NOISE
-    rival = SEEN / FALSE_DENSITY / (2 * pi * NOISE**2) * exp(-(5.0**2) / 2)
-    own = SEEN / FALSE_DENSITY / (2 * pi * NOISE**2) * exp(-(3.5**2) / 2)
-    assert own / (own + 0.1) > SURE > own / (own + 0.1 + rival)
-    expected = np.array([[-near, 0.0], [far, 0.0]])
-    found = np.array([[0.0, 0.0]])
-    assert associate_markers(found, expected, np.zeros((1, 2, 2, 2))).tolist() == [name, -1]
 
 
 def test_distances_from_a_round_base():

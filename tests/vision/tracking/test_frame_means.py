@@ -82,17 +82,6 @@ def test_a_disc_is_known_from_a_fifth_of_the_frames_on(frames: int, shown: int, 
         np.testing.assert_array_equal(np.isfinite(part.reshape(3, -1)).all(axis=1), [True, known, True])
 
 
-def test_of_frames_in_which_a_disc_was_hidden_the_others_count() -> None:
-    errors = series([1.0, 2.0, 4.0, 5.0], 2)
-    errors[2:, 0] = np.nan
-    frames = frames_of(errors)
-    frames[0].radii[:], frames[0].contrasts[:] = 6.0, 50.0
-    mean = mean_detections(frames, "precise")
-    np.testing.assert_allclose(mean.centres[:, 0], [100 + 1.5 * DEVIATION, 100 + 3 * DEVIATION], rtol=1e-12)
-    np.testing.assert_allclose(mean.radii, [7.0, 7.5])
-    np.testing.assert_allclose(mean.contrasts, [75.0, 87.5])
-
-
 def test_discs_that_no_frame_shows_are_not_known() -> None:
     mean = mean_detections(frames_of(np.full((4, 2, 2), np.nan)), "precise")
     assert [part.shape for part in mean] == [(2, 2), (2, 2, 2), (2,), (2,)]
@@ -122,15 +111,6 @@ def test_what_the_frames_do_not_scatter_is_common_to_them(size: float) -> None:
     found = shares(frames_of(series([size, -size] * 3, 5)))
     scatter = 12 * size**2 / chi2.median(10) + np.sqrt(2) * chance(5, 6)
     np.testing.assert_allclose(found, 1 - scatter * (1 - 1 / 6), rtol=1e-9)
-
-
-def test_the_scatter_of_a_disc_that_is_known_worse_is_over_its_noise_alone() -> None:
-    """Of variances four times the median 1.3 / 4 are noise; the squares are as 1, 4, 9, 4 and 4."""
-    sizes = np.array([0.1, 0.2, 0.3, 0.2, 0.2])
-    found = shares(frames_of(series([1.0, -1.0] * 3, 5) * sizes[:, None], sizes=(1.0, 1.0, 1.0, 4.0, 4.0)))
-    scatter = 12 * 0.3**2 / chi2.median(10) + np.sqrt(2) * chance(5, 6)  # 4 / 0.325 is more than 9
-    noise = np.array([1, 1, 1, 1.3 / 4, 1.3 / 4])
-    np.testing.assert_allclose(found, 1 - noise * scatter * (1 - 1 / 6), rtol=1e-9)
 
 
 @pytest.mark.parametrize("count", [6, 12])

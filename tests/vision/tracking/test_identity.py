@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from tests.vision.fingers import MARKERS, PRESSED, pressed
+from tests.vision.fingers import MARKERS, pressed
 from vision.tracking.data_association import (
     NOISE,
     associate_markers,
     rest_covariances,
     step_covariances,
-    with_predictions,
 )
 
 FRONT = MARKERS["front"]
@@ -51,35 +50,6 @@ def test_no_jump_swaps_or_invents_markers(layout, least):
         assert ((names == truth) | (names == -1)).all(), case
         named, shown = named + (names >= 0).sum(), shown + (truth >= 0).sum()
     assert named >= least * shown
-
-
-def test_markers_that_were_hidden_in_a_jump_are_mostly_named_in_the_next_frame():
-    generator = np.random.default_rng(2)
-    before = after = 0
-    for case in range(100):
-        start, step = a_jump(generator, "joints")
-        hidden = generator.choice(9, 3, replace=False)
-        first = names_after(step, layout="joints", hidden=hidden, start=start, seed=case)
-        known = np.where((first >= 0)[:, None], start + step - MARKERS["joints"], np.nan)
-        expected = MARKERS["joints"] + with_predictions(MARKERS["joints"], MARKERS["joints"][:, 0], known)
-        names = names_after(start + step - expected, layout="joints", start=expected, seed=case)
-        assert ((names == np.arange(9)) | (names == -1)).all()
-        before, after = before + (first >= 0).sum(), after + (names >= 0).sum()
-    assert before > 0.6 * 900  # of 0.67 that are shown
-    assert after > 0.87 * 900  # of all, for nothing is hidden any more
-
-
-@pytest.mark.parametrize("first", range(7))
-def test_three_hidden_neighbours_are_missing_and_the_others_keep_their_names(first):
-    hidden = np.arange(first, first + 3)
-    expected = np.where(np.isin(np.arange(9), hidden), -1, np.arange(9))
-    np.testing.assert_array_equal(names_after(np.array(PRESSED["front"])[1] / 12, hidden=hidden), expected)
-
-
-def test_what_moves_with_the_finger_is_told_from_what_lies_still():
-    step = np.array(PRESSED["front"])[0] * 0.8
-    names = names_after(step, hidden=[4], false=[FRONT[4] + np.array([0, 12])])
-    np.testing.assert_array_equal(names, [0, 1, 2, 3, -1, 5, 6, 7, 8])
 
 
 def test_at_rest_markers_are_named_within_a_millimetre_and_a_degree_and_not_at_another_place():
