@@ -192,17 +192,8 @@ def test_derivatives_of_an_irregular_disc_are_differences():
     x, y = (part.ravel() for part in np.meshgrid(line, line))
     away = np.hypot(x, y) > 3  # the waves have no direction in the middle
     _, derivatives = disc_image(start.astype(np.float32), x, y)
-    for column in (
-        0,
-        1,
-        RADIUS,
-        COUNT,
-        COUNT + 5,
-        HALO - 1,
-        HALO,
-        *GLARE,
-        *range(COUNT + OUTLINE, start.shape[1]),
-    ):
+    columns = [0, 1, RADIUS, COUNT, COUNT + 5, HALO - 1, HALO, *GLARE]
+    for column in (*columns, *range(COUNT + OUTLINE, start.shape[1])):
         step = 1e-2 if column in (0, 1, RADIUS) else 1e-3
         ends = []
         for sign in (1, -1):

@@ -105,19 +105,6 @@ def test_nothing_lies_on_a_fiducial_and_all_are_in_the_picture(name: str) -> Non
     assert all(abs(area(shape.edges)) > 0 for shape in shapes)
 
 
-def test_the_clamp_holds_every_part_of_the_base() -> None:
-    for name, count in (("csiro", 2), ("ring", 1), ("default", 1)):
-        film = recording(name)
-        section = film.bench.finger.section
-        blocks = film.bench._clamps
-        assert len(blocks) == count
-        for block, (loop, which) in zip(blocks, section.named("base"), strict=True):
-            low, high = block.reshape(-1, 2).min(axis=0), block.reshape(-1, 2).max(axis=0)
-            points = loop.along(which, np.linspace(0, 1, 9))
-            assert (points > low - 1e-9).all()
-            assert (points < high + 1e-9).all()
-
-
 def test_the_blade_stands_on_a_curved_front_along_its_normal() -> None:
     finger = ring().at_contact(32.0)  # where the ring slopes
     mesh = build_mesh(finger, MeshSettings(size=2.0))

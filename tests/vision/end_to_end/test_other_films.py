@@ -43,6 +43,7 @@ def without_fiducials(turns=0, design=DESIGN):
     return [np.rot90(painted_over(image, fiducials()), turns) for image in images(design=design)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("layout", "turns"), [("joints", 3), ("front", 1), ("front", 2)])
 def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_up(layout, turns):
     """Markers at the joints show the way up themselves; a row looks the same from both ends."""

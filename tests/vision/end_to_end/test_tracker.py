@@ -109,6 +109,7 @@ def test_a_marker_that_jumps_partly_behind_a_cable_is_found():
     assert observations.standard_deviations[4].max() > 2 * observations.standard_deviations.mean()
 
 
+@pytest.mark.slow
 def test_a_patch_a_little_lighter_than_the_wall_is_no_marker():
     _, truth = recording().frame(0)
     x, y = truth.pixels[4]
@@ -132,8 +133,3 @@ def test_grey_images_do_as_well():
         "rig"
     )
     assert error_of(observations) < 0.01
-
-
-def test_two_pictures_are_enough():
-    observations = tracked([images()[0], images()[-1]]).observations("rig")
-    assert error_of(observations) < 0.015

@@ -82,14 +82,11 @@ def test_the_sheet_is_in_true_scale_with_white_space_around_the_discs_and_a_rule
     discs = root.findall(f".//{SVG}circle")
     assert {disc.attrib["r"] for disc in discs} == {"3"}
     assert [(float(disc.attrib["cx"]), float(disc.attrib["cy"])) for disc in discs] == list(corners)
-    ruler, words = root.find(f".//{SVG}line"), root.find(f".//{SVG}text")
-    assert ruler is not None
-    assert words is not None
+    (ruler,), (words,) = root.findall(f".//{SVG}line"), root.findall(f".//{SVG}text")
     assert [float(ruler.attrib[end]) for end in ("x1", "x2")] == [25, 75]
     (height,) = {float(ruler.attrib[end]) for end in ("y1", "y2")}
     assert -35 < height < -22 - 3 - 5, "between the discs and the edge"
     assert -float(words.attrib["y"]) == height + 1, "1 mm above it"
-    polygon = root.find(f".//{SVG}polygon")
-    assert polygon is not None
+    (polygon,) = root.findall(f".//{SVG}polygon")
     points = [tuple(map(float, point.split(","))) for point in polygon.attrib["points"].split()]
     assert set(points) == {(0, -10), (100, -10), (100, 0), (0, 0)}

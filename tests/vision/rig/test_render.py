@@ -117,17 +117,6 @@ def test_the_lens_blurs_the_light_that_the_lamp_throws_on_the_scene():
     assert found == pytest.approx(-slope * (blur**2 + 1 / 12) / (1 + slope * middle), rel=0.03)
 
 
-def test_the_same_seed_and_frame_give_the_same_picture_and_others_do_not():
-    scene, noisy = Scene((0.6,) * 3, []), Exposure(noise=4)
-
-    def picture(seed, frame):
-        return render(scene, PINHOLE, ABOVE, noisy, seed=seed, frame=frame)
-
-    np.testing.assert_array_equal(picture(1, 2), picture(1, 2))
-    for other in ((1, 3), (2, 2), (2, 1)):
-        assert (picture(1, 2) != picture(*other)).mean() > 0.5
-
-
 def test_a_monochrome_picture_has_the_luma_of_the_colours():
     scene = Scene((0.2, 0.4, 0.8), [])
     grey = render(scene, PINHOLE, ABOVE, Exposure(**{**PLAIN.model_dump(), "monochrome": True}))

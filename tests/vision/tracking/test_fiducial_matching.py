@@ -114,14 +114,6 @@ def test_the_better_of_two_matches_with_as_many_fiducials_is_taken() -> None:
     assert names(both[::-1], of(FIVE)) == [9, 8, 7, 6, 5]
 
 
-@pytest.mark.parametrize(("nearer", "name"), [(0.75, 5), (0.65, 6)])
-def test_the_difference_of_the_radii_counts_as_much_as_a_distance(nearer: float, name: int) -> None:
-    """A disc 1 mm away, and one of 1.7 mm in place of 2 mm of radius on the other side."""
-    places = np.concatenate([of(FIVE).points, SIX[5] + np.array([[1.0, 0], [-nearer, 0]])])
-    found = names(seen(places), of(SIX), np.array([1, 1, 1, 1, 1, 1, 0.85]))
-    assert found == [0, 1, 2, 3, 4, name]
-
-
 @pytest.mark.parametrize(("others", "searched"), [(11, True), (12, False)])
 def test_sixteen_discs_of_one_size_are_searched(others: int, searched: bool) -> None:
     false = np.random.default_rng(7).uniform(-150, -20, (others, 2))

@@ -234,11 +234,3 @@ def test_a_fiducial_is_known_within_its_radius_of_where_it_was(listed: ListedDis
     assert gone is not None
     assert gone.centres.shape == (5, 2)
     assert found(gone) == []
-
-
-def test_a_false_disc_beside_a_marker_takes_no_name(listed: ListedDiscs) -> None:
-    tracker = FrameTracker(SCENE, shown(listed))
-    false = [(52.5, 8.0), (30.0, -18.0)]
-    seen = tracker.see(shown(listed, MARKERS + BENT, hidden=[5], false=false))
-    assert found(seen.markers) == [0, 1, 2, 3, 4, 6]
-    np.testing.assert_allclose(seen.places[[0, 6]], (MARKERS + BENT)[[0, 6]], atol=1e-9)
