@@ -1,6 +1,6 @@
 """Names of the refused expressions of `vision`."""
 
-# ruff: noqa: F401
+# ruff: noqa: F401 (the expressions use the names)
 
 import json
 from dataclasses import replace

@@ -50,6 +50,7 @@ def test_centres_are_those_of_the_dots_not_of_their_images(board, negative):
         assert np.sqrt(np.mean(errors**2)) < 0.03  # 0.1 at the centres of the images
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("board", [CIRCLES, SHIFTED])
 def test_a_grid_of_dots_calibrates(board):
     rng, views = np.random.default_rng(1), {}

@@ -60,7 +60,7 @@ def assert_covered(discs: FittedDiscs, errors: np.ndarray) -> None:
         (DiscImage(), 2.0),
         (DiscImage(blur=1.5), 6.0),  # adverse
         (DiscImage(radius=3.5), 2.0),
-        (DiscImage(radius=30.0, centre=(45, 45), size=(91, 91)), 2.0),
+        pytest.param(DiscImage(radius=30.0, centre=(45, 45), size=(91, 91)), 2.0, marks=pytest.mark.slow),
         (DiscImage(stretch=1.16, turn=0.7), 2.0),  # a strain of 10 %
         (DiscImage(gradient=(0.015, -0.01)), 2.0),  # light that changes by 30 % over the disc
         (DiscImage(light=40, dark=200), 2.0),
@@ -152,6 +152,7 @@ def test_a_disc_that_is_partly_hidden_is_found_by_its_arc(image):
     assert discs.seen[found].max() < 0.9
 
 
+@pytest.mark.slow
 def test_a_disc_of_which_a_quarter_is_hidden_is_not_taken_for_a_printed_dot():
     """Two of 300 were, half a pixel astray, when a glare stood for the light beyond the occluder."""
     picture, centres = sheet(scattered(DiscImage(edges=(Edge(0.0, 24.0, 120.0, occludes=True),)), 300))
@@ -169,7 +170,7 @@ def test_noise_that_a_codec_correlates_is_accounted_for():
     assert 0.8 < np.sqrt((scores**2).mean()) < 1.3  # 1.48 if the noise were taken for white
 
 
-@pytest.mark.parametrize("radii", [None, 6.0])
+@pytest.mark.parametrize("radii", [pytest.param(None, marks=pytest.mark.slow), 6.0])
 def test_no_picture_is_too_odd(radii):
     rng = np.random.default_rng(2)
     squares = np.kron(rng.integers(0, 2, (20, 20)) * 255, np.ones((11, 11)))

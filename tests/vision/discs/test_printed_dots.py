@@ -97,7 +97,14 @@ def test_no_plain_centroid_is_more_accurate(radius, changes):
     assert rms(errors[discs.found]) < 1.2 * rms(plain)
 
 
-@pytest.mark.parametrize(("radius", "period"), [(4.0, 2.4), (12.0, 3.2), (4.0, 8.0)])
+@pytest.mark.parametrize(
+    ("radius", "period"),
+    [
+        pytest.param(4.0, 2.4, marks=pytest.mark.slow),
+        pytest.param(12.0, 3.2, marks=pytest.mark.slow),
+        (4.0, 8.0),
+    ],
+)
 def test_the_layers_of_a_print_are_told_from_the_edges_of_its_dots(radius, period, monkeypatch):
     """0.3 to 0.6 times the error of a plain centroid; 0.4 to 2 times with the layers left in."""
     monkeypatch.setattr(printed_dots, "LAYER", period)
@@ -121,7 +128,7 @@ def test_walls_that_join_beside_a_marker_are_no_layers(frame, monkeypatch):
     assert (found.centres == without.centres).all()
 
 
-@pytest.mark.parametrize("radius", [4.0, 12.0])
+@pytest.mark.parametrize("radius", [4.0, pytest.param(12.0, marks=pytest.mark.slow)])
 def test_a_glare_does_not_move_the_dots_that_it_falls_on(radius):
     """1.1 times the error in even light; 2.5 to 6 times where glare is taken for light that dots swallow."""
     dots = PrintedDots(radius, 0.03, count=96, seed=5, exposure=exposure(glare=60.0))
@@ -223,6 +230,7 @@ def test_specks_cover_the_share_that_the_bench_is_told(coarse_mesh):
     assert not replace(bench, mottle=0.0).specks(rest)
 
 
+@pytest.mark.slow
 def test_a_film_of_printed_dots_is_tracked_to_thousandths_of_a_millimetre():
     recording = films.recording()
     mesh = finger_mesh(films.DESIGN, settings=MeshSettings(size=1.0))

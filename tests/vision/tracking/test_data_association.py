@@ -125,13 +125,13 @@ def test_distances_from_a_round_base():
 
 POINTS = np.array([[0.0, 1.0], [20.0, -3.0], [45.0, -8.0], [50.0, -1.0]])
 REACH = np.array([0.5, 21.0, 40.0, 50.0])
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(400)
 
 
 def walk(first: float, second: float) -> float:
     """Covariance of the integrals, from 0 to two places, of a random walk: the integral of min(s, t)."""
-    points, weights = np.polynomial.legendre.leggauss(400)
-    s, t = (0.5 * place * (points + 1) for place in (first, second))
-    whole = 0.25 * first * second * weights @ np.minimum(s[:, None], t) @ weights
+    s, t = (0.5 * place * (NODES + 1) for place in (first, second))
+    whole = 0.25 * first * second * WEIGHTS @ np.minimum(s[:, None], t) @ WEIGHTS
     return float(whole)
 
 
