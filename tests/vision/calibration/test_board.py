@@ -20,6 +20,8 @@ def test_corners_are_found_where_they_are():
     exact = exact[:, :2] / exact[:, 2:]
     error = min(np.abs(order - exact).max() for order in (found, found[::-1]))  # a board has no up
     assert error < 0.02  # 0.06 without the fit of `vision.calibration.corner_refinement`
+    assert Board(6, 4, 10.0).find(image) is None
+    assert Board(6, 4, 10.0).suggest(image) == "5x4"
 
 
 def test_corners_of_a_large_image_are_sought_in_a_smaller_one():
@@ -49,9 +51,3 @@ def test_false_corners_of_the_exhaustive_search_are_refused():
     flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
     assert cv2.findChessboardCornersSB(image, (9, 6), flags=flags)[0]
     assert BOARD.find(image) is None
-
-
-def test_another_size_is_guessed():
-    image = drawn(SMALL, np.linalg.inv(TO_PIXELS), (360, 260))
-    assert Board(6, 4, 10.0).find(image) is None
-    assert Board(6, 4, 10.0).suggest(image) == "5x4"

@@ -155,6 +155,7 @@ def test_the_intervals_of_dots_hold(radius, changes):
     assert 0.89 < covered(discs, errors) < 0.99  # 192 coordinates, each deviation of 0.95 is 0.016
 
 
+@pytest.mark.slow
 def test_specks_far_from_the_edge_do_not_make_a_dot_uncertain():
     """1.5 times the error; 3.2 times if all pixels within two of the edge count alike."""
     discs, errors, _ = measured(PrintedDots(12.0, 0.03, mottle=0.1, count=96, seed=5))

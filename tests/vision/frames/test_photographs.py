@@ -30,10 +30,6 @@ def test_photographs_are_grey(folder):
     assert np.unique(image).tolist() == [11]  # 0.114 of blue
 
 
-def test_a_photograph_is_left_out_by_its_name(folder):
-    assert names([folder], without=["2.png", str(folder / "10.png")]) == ["1.png"]
-
-
 def test_a_video_gives_frames_spread_evenly(tmp_path):
     with video_writer(tmp_path / "board.mkv", (32, 24), 30) as write:
         for number in range(130):
