@@ -49,7 +49,7 @@ def test_a_part_of_the_board_is_enough():
     np.testing.assert_allclose(found[seen], exact[seen], rtol=0, atol=0.06)
 
 
-@pytest.mark.parametrize("angles", [(55, 10, 30), (10, -55, 80)])
+@pytest.mark.parametrize("angles", [(55, 10, 30), pytest.param((10, -55, 80), marks=pytest.mark.slow)])
 def test_a_far_board_is_found_where_single_markers_are_not(angles):
     """Of the tilted board 12 corners or none were found without another look for the markers missed."""
     image, exact = picture(angles, distance=500.0)
@@ -67,7 +67,7 @@ def test_boards_of_the_layout_before_opencv_4_6_are_found():
     np.testing.assert_allclose(found, expected, rtol=0, atol=0.01)
 
 
-@pytest.mark.parametrize("angles", TILTS)
+@pytest.mark.parametrize("angles", [TILTS[0], pytest.param(TILTS[1], marks=pytest.mark.slow)])
 def test_a_board_printed_white_on_black_is_found(angles):
     image, exact = picture(angles)
     found = CHARUCO.find(255 - image)
