@@ -184,7 +184,7 @@ def test_a_view_that_is_no_image_of_a_board_is_left_out_with_the_reason():
     assert found.camera.fx == pytest.approx(CAMERA.fx, rel=0.003)
 
 
-@pytest.mark.parametrize("noise", [0.05, 0.5])
+@pytest.mark.parametrize("noise", [0.05, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_boards_that_are_never_tilted_do_not_determine_the_camera(noise):
     rng = np.random.default_rng(6)
     flat = {}

@@ -85,6 +85,7 @@ def test_a_marker_behind_a_cable_is_missing_and_no_other_takes_its_name():
     assert any("reported missing: marker 5" in warning for warning in tracking.warnings)
 
 
+@pytest.mark.slow
 def test_markers_that_were_lost_are_found_in_the_next_frame_that_shows_them():
     blurred = [cv2.blur(image, (200, 200)) for image in images()[:3]]
     tracking = tracked([*images()[:3], *blurred, *images()[3:]])
@@ -94,6 +95,7 @@ def test_markers_that_were_lost_are_found_in_the_next_frame_that_shows_them():
     assert error_of(tracking.observations("rig")) < 0.01
 
 
+@pytest.mark.slow
 def test_a_marker_that_jumps_partly_behind_a_cable_is_found():
     film = recording()
     film = replace(

@@ -83,6 +83,7 @@ def test_the_middle_of_a_disc_that_bends_is_the_mean_over_the_disc(usual_mesh):
     np.testing.assert_allclose(truth.discs[:8, 0], truth.world[:8, 0], atol=5e-5)
 
 
+@pytest.mark.slow
 def test_motion_blur_is_the_mean_of_what_is_seen_while_the_shutter_is_open(bench):
     sharp = Exposure(noise=0, blur=0.7)
     recording = film(bench, exposure=sharp, motion=Motion(rest=1, moving=1, held=1, shutter=0.8))
