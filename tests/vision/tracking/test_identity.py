@@ -5,7 +5,6 @@ import pytest
 
 from tests.vision.fingers import MARKERS, pressed
 from vision.tracking.data_association import (
-    NOISE,
     associate_markers,
     rest_covariances,
     step_covariances,
@@ -58,11 +57,3 @@ def test_at_rest_markers_are_named_within_a_millimetre_and_a_degree_and_not_at_a
         associate_markers(near[::-1], FRONT, rest_covariances(FRONT)), np.arange(9)[::-1]
     )
     assert (associate_markers(FRONT + np.array([0, 12]), FRONT, rest_covariances(FRONT)) == -1).all()
-
-
-def test_covariances_are_positive():
-    for layout in MARKERS.values():
-        for field in np.concatenate(
-            [step_covariances(layout, layout[:, 0]).reshape(-1, 9, 9), rest_covariances(layout)[0]]
-        ):
-            assert np.linalg.eigvalsh(field + NOISE**2 * np.eye(9)).min() > NOISE**2 / 2
