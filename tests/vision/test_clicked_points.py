@@ -27,9 +27,9 @@ def found(rest, pressed, **settings):
     return clicked_points(rest, pressed, MARKERS, marker_radius=0.5, source="clicks", **settings)
 
 
-@pytest.mark.parametrize("flip", [True, False])
-def test_pictures_of_one_camera_give_the_displacements(flip):
-    result = found(picture(MARKERS, 0.2, flip=flip), picture(MARKERS + MOVED, 0.2, flip=flip))
+@pytest.mark.parametrize(("flip", "given"), [(True, {}), (False, {"scale": (0.2, 0.2)})])
+def test_pictures_of_one_camera_give_the_displacements(flip, given):
+    result = found(picture(MARKERS, 0.2, flip=flip), picture(MARKERS + MOVED, 0.2, flip=flip), **given)
     assert result.mirrored == flip
     assert result.scales == pytest.approx((0.2, 0.2))
     np.testing.assert_allclose(result.observations.displacements, MOVED, atol=1e-9)

@@ -1,13 +1,15 @@
 """The finger on the bench: what is drawn is what the truth says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from geometry.finger.design import Design
-from vision.rig.bench import Bench
+from vision.rig.bench import FINGER, Bench
 from vision.rig.print_layers import DIRECTION, PERIOD, PrintLayers
 from vision.rig.render import mean_light, pixel_coverage
-from vision.rig.shapes import Scene
+from vision.rig.shapes import Scene, area
 from vision.rig.virtual_camera import default_camera, viewing_pose
 from vision.tracking.workspace import default_workspace
 
@@ -41,6 +43,12 @@ def test_every_marker_is_drawn_where_the_truth_says_it_is(bench):
         found = np.array([(x * dark)[window].sum(), (y * dark)[window].sum()]) / mass
         # Of the picture of a disc that bends, the middle is near that of the disc only.
         np.testing.assert_allclose(found, centre, rtol=0, atol=0.02)
+
+
+def test_every_other_layer_covers_half_of_the_finger(bench):
+    shapes = replace(bench, layers=0.2).scene(bent(bench.mesh)).shapes
+    body, dark = (shape for shape in shapes if shape.colour in (FINGER, tuple(0.8 * np.array(FINGER))))
+    assert area(dark.edges) == pytest.approx(area(body.edges) / 2, rel=0.01)  # 250 layers end anywhere
 
 
 def test_layers_at_rest_are_stripes(bench):
