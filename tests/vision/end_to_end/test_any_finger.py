@@ -67,7 +67,7 @@ def recording(name: str) -> Recording:
         camera=camera,
         pose=viewing_pose(camera, workspace, tilt=3.0),
         exposure=Exposure(noise=2),
-        motion=Motion(rest=2, moving=1, held=2),
+        motion=Motion(rest=3, moving=3, held=3),
     )
 
 
