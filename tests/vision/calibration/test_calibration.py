@@ -91,6 +91,7 @@ def test_a_fisheye_is_recovered_and_proposed():
     assert brown.held_out_rms > 2 * error
 
 
+@pytest.mark.slow
 def test_a_board_that_is_first_taken_to_be_tilted_the_other_way_does_not_spoil_the_fit(monkeypatch):
     """The fit ended in another minimum, with residuals of 0.34 px instead of 0.29."""
     rng, count, first_guess = np.random.default_rng(2), 12, lens_fit._first_poses

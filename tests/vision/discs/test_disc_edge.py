@@ -161,6 +161,7 @@ def test_a_disc_of_which_a_quarter_is_hidden_is_not_taken_for_a_printed_dot():
     assert np.abs(discs.centres - centres).max() < 0.2  # five of their standard deviations, 0.04
 
 
+@pytest.mark.slow
 def test_noise_that_a_codec_correlates_is_accounted_for():
     picture, centres = sheet(scattered(DiscImage(), 240))
     _, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 60])
@@ -182,6 +183,7 @@ def test_no_picture_is_too_odd(radii):
         assert discs.found.mean() < 0.05  # of white noise, chance makes a disc
 
 
+@pytest.mark.slow
 def test_guesses_where_little_agrees_are_not_found_and_stop_no_other():
     """On the edges of walls and between them, where a marker was before it jumped."""
     image = np.full((240, 320), 150, dtype=np.uint8)

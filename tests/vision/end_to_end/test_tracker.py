@@ -124,12 +124,6 @@ def test_a_patch_a_little_lighter_than_the_wall_is_no_marker():
     assert error_of(observations) < 0.015
 
 
-def test_a_camera_may_be_turned_if_the_fiducials_are_seen():
-    tracking = tracked([np.rot90(image) for image in images()], camera=None)
-    assert error_of(tracking.observations("rig")) < 0.2  # the lens is not undone
-    assert any("no camera" in warning for warning in tracking.warnings)
-
-
 def test_grey_images_do_as_well():
     observations = tracked([cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images()]).observations(
         "rig"
