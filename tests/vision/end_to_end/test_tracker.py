@@ -76,6 +76,7 @@ def test_the_papers_pipeline_is_an_order_of_magnitude_worse():
     np.testing.assert_array_equal(observations.points, MARKERS)
 
 
+@pytest.mark.slow
 def test_a_marker_behind_a_cable_is_missing_and_no_other_takes_its_name():
     tracking = tracked(images(hidden=4))
     observations = tracking.observations("rig")
