@@ -27,9 +27,9 @@ def found(rest, pressed, **settings):
     return clicked_points(rest, pressed, MARKERS, marker_radius=0.5, source="clicks", **settings)
 
 
-@pytest.mark.parametrize("flip", [True, False])
-def test_pictures_of_one_camera_give_the_displacements(flip):
-    result = found(picture(MARKERS, 0.2, flip=flip), picture(MARKERS + MOVED, 0.2, flip=flip))
+@pytest.mark.parametrize(("flip", "given"), [(True, {}), (False, {"scale": (0.2, 0.2)})])
+def test_pictures_of_one_camera_give_the_displacements(flip, given):
+    result = found(picture(MARKERS, 0.2, flip=flip), picture(MARKERS + MOVED, 0.2, flip=flip), **given)
     assert result.mirrored == flip
     assert result.scales == pytest.approx((0.2, 0.2))
     np.testing.assert_allclose(result.observations.displacements, MOVED, atol=1e-9)
@@ -47,12 +47,6 @@ def test_each_picture_has_the_scale_of_the_lengths_along_the_walls():
     own, moved = (np.linalg.norm(np.diff(each[order], axis=0), axis=1).sum() for each in (MARKERS, bent))
     assert found(rest, pressed, scale="lengths").scales == pytest.approx((0.2, 0.25 * own / moved))
     shift = result.observations.displacements - (turned - MARKERS)
-    np.testing.assert_allclose(shift, np.broadcast_to(shift[0], shift.shape), atol=1e-9)  # of the origin
-
-
-def test_given_scales_are_taken():
-    result = found(picture(MARKERS, 0.2), picture(MARKERS + MOVED, 0.25), scale=(0.2, 0.25))
-    shift = result.observations.displacements - MOVED
     np.testing.assert_allclose(shift, np.broadcast_to(shift[0], shift.shape), atol=1e-9)  # of the origin
 
 
@@ -110,38 +104,6 @@ def test_numbered_points_are_those_of_their_number(tmp_path):
     np.testing.assert_allclose(found(*lists).observations.displacements, MOVED, atol=1e-9)
     with pytest.raises(UserError, match="numbered in one picture only: 0, 1, 2"):
         found(lists[0], picture(MARKERS, 0.2))
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("u,v\n1,2\n", "the header must name the columns x and y, and may name point; it has 'u', 'v'"),
-        ("", "it is empty"),
-        ("x,y\n1,2\n3,4\n", "has 2 points; give at least 3"),
-        ("x,y\n1,2\n3,four\n5,6\n", "line 3: '3,four' has no number"),
-        ("# a\nx,y\n1,2\n3\n5,6\n", "line 4: '3' has no number"),
-        ("x,y\n1,2\n3,nan\n5,6\n", "line 3: '3,nan' has a number that is not finite"),
-    ],
-)
-def test_a_bad_list_is_one_line(tmp_path, text, said):
-    path = tmp_path / "rest.csv"
-    path.write_text(text)
-    with pytest.raises(UserError, match=said):
-        read_clicks(path)
-
-
-def test_points_of_another_finger_are_refused():
-    other = np.random.default_rng(1).uniform(0, 50, MARKERS.shape)
-    with pytest.raises(UserError, match="do not lie as the markers do: at best"):
-        found(picture(other, 0.2), picture(other, 0.2))
-    with pytest.raises(UserError, match="8 points at rest, 9 pressed, 9 markers on the drawing"):
-        found(picture(MARKERS[1:], 0.2), picture(MARKERS, 0.2))
-
-
-def test_points_on_one_line_do_not_tell_the_mirror_image():
-    line = np.column_stack([np.arange(10.0, 60, 10), np.full(5, -1.0)])
-    with pytest.raises(UserError, match="their mirror image fit the drawing alike"):
-        clicked_points(picture(line, 0.2), picture(line, 0.2), line, marker_radius=0.5, source="clicks")
 
 
 TRACKPY = "frame,particle,x,y,mass\n" + "\n".join(

@@ -2,15 +2,11 @@
 
 import cv2
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.errors import UserError
 from tests.vision.calibration.chessboards import BOARD, drawn, through_fisheye
 from vision.calibration.camera import Pose
-from vision.calibration.charuco import CharucoBoard, parse_board
 from vision.calibration.chessboard import Board
-from vision.frames.sources import photographs
 
 SMALL = Board(5, 4, 10.0)
 TO_PIXELS = np.array([[4.2, 0.7, 90.0], [-0.5, 3.9, 75.0], [1e-3, -6e-4, 1.0]])
@@ -24,6 +20,8 @@ def test_corners_are_found_where_they_are():
     exact = exact[:, :2] / exact[:, 2:]
     error = min(np.abs(order - exact).max() for order in (found, found[::-1]))  # a board has no up
     assert error < 0.02  # 0.06 without the fit of `vision.calibration.corner_refinement`
+    assert Board(6, 4, 10.0).find(image) is None
+    assert Board(6, 4, 10.0).suggest(image) == "5x4"
 
 
 def test_corners_of_a_large_image_are_sought_in_a_smaller_one():
@@ -53,77 +51,3 @@ def test_false_corners_of_the_exhaustive_search_are_refused():
     flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
     assert cv2.findChessboardCornersSB(image, (9, 6), flags=flags)[0]
     assert BOARD.find(image) is None
-
-
-def test_another_size_is_guessed():
-    image = drawn(SMALL, np.linalg.inv(TO_PIXELS), (360, 260))
-    assert Board(6, 4, 10.0).find(image) is None
-    assert Board(6, 4, 10.0).suggest(image) == "5x4"
-
-
-def test_an_empty_picture_shows_no_board():
-    assert SMALL.find(np.full((200, 300), 128, dtype=np.uint8)) is None
-
-
-def test_corners_lie_a_square_apart():
-    assert SMALL.corners[[0, 1, 5]].tolist() == [[0, 0, 0], [10, 0, 0], [0, 10, 0]]
-
-
-def test_a_board_is_read_from_text():
-    assert parse_board(" 9X6", 25) == Board(9, 6, 25)
-    charuco = CharucoBoard(7, 5, 20, 15, "4X4_50")
-    assert parse_board("ChArUco:8x6", 20, marker=15, dictionary="dict_4x4_50") == charuco
-
-
-@pytest.mark.parametrize(
-    ("size", "square", "message"),
-    [
-        ("9", 25, "cannot read the board '9'"),
-        ("9x-6", 25, "cannot read the board"),
-        ("9x2", 25, "a board of 9x2 inner corners; either side"),
-        ("9x600", 25, "a board of 9x600 inner corners"),
-        ("9x6", 0, "a square of 0 mm; its side must be 0.2 to 1000 mm$"),
-        ("9x6", 0.025, "a square of 0.025 mm; .*; this looks like metres, give mm"),
-        ("9x6", float("nan"), "a square of nan mm"),
-    ],
-)
-def test_an_impossible_board_is_refused(size, square, message):
-    with pytest.raises(UserError, match=message):
-        parse_board(size, square)
-
-
-@pytest.mark.parametrize(
-    ("text", "options", "message"),
-    [
-        ("9x6", {"marker": 15}, "the board 9x6 has no markers; .* give charuco:9x6"),
-        ("charuco:8x6", {}, "has markers; give their side in mm"),
-        ("charuco:3x6", {"marker": 15}, "a board of 2x5 inner corners"),
-        ("charuco:8x6", {"marker": 20}, "a marker of 20 mm in a square of 20 mm"),
-        (
-            "charuco:8x6",
-            {"marker": 15, "dictionary": "4X4"},
-            "no dictionary .* called '4X4'; there are: 4X",
-        ),
-        (
-            "charuco:12x9",
-            {"marker": 15, "dictionary": "4X4_50"},
-            "has 54 markers, but the dictionary only",
-        ),
-    ],
-)
-def test_an_impossible_charuco_board_is_refused(text, options, message):
-    with pytest.raises(UserError, match=message):
-        parse_board(text, 20, **options)
-
-
-@pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n"])
-def test_what_is_no_picture_is_one_line(content, tmp_path):
-    path = tmp_path / "photo.png"
-    path.write_bytes(content)
-    with pytest.raises(UserError, match=r"cannot read the picture .*photo\.png: it"):
-        list(photographs([path]))
-
-
-def test_an_absent_picture_is_one_line(tmp_path):
-    with pytest.raises(UserError, match="No such file"):
-        list(photographs([tmp_path / "absent.png"]))

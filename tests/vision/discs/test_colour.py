@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from tests.vision.discs.dots import dots
 from vision.discs.colour import DARK, ColourRange, Darker, read_colour
 
@@ -75,20 +74,3 @@ def test_dark_is_what_is_darker_than_around_it_whatever_the_light(grey):
 def test_a_colour_is_read_from_text_and_written_as_text(text, colour):
     assert read_colour(text) == colour
     assert read_colour(str(colour)) == colour
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "cannot read the colour ''"),
-        ("red", "cannot read the colour 'red'; give dark"),
-        ("20:60", "cannot read"),
-        ("20,60:40,80:1,2:3,4", "cannot read"),
-        ("dark:x", "cannot read"),
-        ("60,20", r"a range of L\* from 60 to 20"),
-        ("dark:0", "a contrast of 0"),
-    ],
-)
-def test_what_is_no_colour_is_one_line(text, message):
-    with pytest.raises(UserError, match=message):
-        read_colour(text)

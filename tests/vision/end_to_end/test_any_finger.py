@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.finger.presets import load_design
@@ -26,7 +25,6 @@ from vision.tracking.data_association import (
     distance_from_base,
     step_covariances,
 )
-from vision.tracking.layout_matching import match_layout
 from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 from vision.tracking.workspace import default_workspace
@@ -85,6 +83,7 @@ def error(name: str) -> float:
     return float(np.linalg.norm(wrong, axis=1).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["csiro", "ring"])
 def test_any_finger_is_tracked_as_accurately_as_the_default_one(name: str) -> None:
     """In proportion to the size of a pixel, about 0.1 mm: hundredths of it."""
@@ -104,26 +103,6 @@ def test_nothing_lies_on_a_fiducial_and_all_are_in_the_picture(name: str) -> Non
         away = np.linalg.norm(along.reshape(-1, 1, 2) - fiducials, axis=2)
         assert away.min() > radius
     assert all(abs(area(shape.edges)) > 0 for shape in shapes)
-
-
-def test_a_fiducial_makes_room_for_the_indenter_wherever_it_presses() -> None:
-    for position in (12.0, 35.0, 60.0, 63.0, 66.0):
-        points = default_workspace(Design(contact_position=position)).points
-        front = points[points[:, 1] > 0]
-        assert np.abs(front[:, 0] - position).min() > 7
-
-
-def test_the_clamp_holds_every_part_of_the_base() -> None:
-    for name, count in (("csiro", 2), ("ring", 1), ("default", 1)):
-        film = recording(name)
-        section = film.bench.finger.section
-        blocks = film.bench._clamps
-        assert len(blocks) == count
-        for block, (loop, which) in zip(blocks, section.named("base"), strict=True):
-            low, high = block.reshape(-1, 2).min(axis=0), block.reshape(-1, 2).max(axis=0)
-            points = loop.along(which, np.linspace(0, 1, 9))
-            assert (points > low - 1e-9).all()
-            assert (points < high + 1e-9).all()
 
 
 def test_the_blade_stands_on_a_curved_front_along_its_normal() -> None:
@@ -154,15 +133,3 @@ def test_markers_on_both_sides_of_a_ring_keep_their_names_though_they_are_equall
         assert ((names < 0) | (order[names] == np.arange(len(points)))).all()  # missing rather than swapped
         named += int((names >= 0).sum())
     assert named > 0.93 * 100 * len(points)
-
-
-def test_without_fiducials_markers_that_look_the_same_when_turned_are_refused() -> None:
-    """With fiducials the frame is theirs, and a marker is named by its place."""
-    angles = 2 * np.pi * np.arange(8) / 8
-    even = 28 * np.column_stack([np.cos(angles), np.sin(angles)])
-    pixels = 10 * even * (1, -1) + 400
-    with pytest.raises(UserError, match="look the same after a turn by 45 degrees"):
-        match_layout(pixels, np.full(8, 8.0), even, 1.6)
-    uneven = even * (1.0, 0.9) + np.arange(8)[:, None]
-    pixels = 10 * uneven * (1, -1) + 400
-    np.testing.assert_array_equal(match_layout(pixels, np.full(8, 8.0), uneven, 1.6), np.arange(8))

@@ -16,10 +16,8 @@ from tests.vision.end_to_end.test_track import (
     SHARES,
     SPACE,
     film,
-    middles,
-    seen,
 )
-from tests.vision.tracking.listed_discs import ListedDiscs
+from tests.vision.tracking.listed_discs import ListedDiscs, middles, seen
 from vision.discs.colour import DARK
 from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
@@ -34,8 +32,13 @@ def at_height(listed: ListedDiscs, height: float, *, moved: float = 0.0):
     return film(
         [
             listed.picture(
-                (RED, seen(MARKERS + share * PRESSED + moved, POSE, height), 0.8 * scale * nearer, 100.0),
-                (DARK, middles(SPACE.points, 2.0, POSE), 2 * scale, 100.0),
+                (
+                    RED,
+                    seen(MARKERS + share * PRESSED + moved, CAMERA, POSE, height),
+                    0.8 * scale * nearer,
+                    100.0,
+                ),
+                (DARK, middles(SPACE.points, 2.0, CAMERA, POSE), 2 * scale, 100.0),
             )
             for share in SHARES
         ]
@@ -46,46 +49,27 @@ def sheet(height: float) -> FilmedScene:
     return replace(SCENE, workspace=SPACE.model_copy(update={"marker_plane": height}))
 
 
-@pytest.mark.parametrize("height", [12.0, 20.0])
-@pytest.mark.parametrize("method", ["precise", "hough"])
-def test_a_sheet_below_the_markers_needs_a_camera(listed: ListedDiscs, height, method) -> None:
-    said = (
-        rf"0 of 7 markers .*; the workspace has them {height:g} mm nearer to the camera .*: give its file, or"
-    )
+@pytest.mark.parametrize(
+    ("height", "moved", "scene", "said"),
+    [
+        # the workspace has the sheet below the markers, and no camera is known
+        (12.0, 0.0, replace(sheet(12.0), camera=None), "12 mm nearer to the camera"),
+        (20.0, 0.0, replace(sheet(20.0), camera=None, method="hough"), "20 mm nearer to the camera"),
+        # the sheet was forgotten
+        (12.0, 0.0, SCENE, "nearer to the camera than the fiducials by about 12 mm"),
+        (20.0, 0.0, SCENE, "nearer to the camera than the fiducials by about 20 mm"),
+        (-15.0, 0.0, SCENE, "farther from the camera than the fiducials by about -15 mm"),
+        (20.0, 0.0, replace(SCENE, camera=None), "times as far apart"),
+        (25.0, 0.0, sheet(5.0), "by about 25 mm, not 5 mm above them"),
+        (0.0, 11.0, SCENE, "beside them"),
+        (0.0, 0.0, replace(SCENE, colour=replace(RED, low=(0.0, 0.0, 0.0))), "colour"),  # no marker is found
+    ],
+)
+def test_markers_that_are_not_where_they_are_expected_are_told_their_plane(
+    listed: ListedDiscs, height, moved, scene, said
+) -> None:
     with pytest.raises(UserError, match=said):
-        track(at_height(listed, height), replace(sheet(height), camera=None, method=method))
-
-
-@pytest.mark.parametrize("height", [12.0, 20.0, -15.0])
-def test_a_forgotten_sheet_is_guessed_with_its_height(listed: ListedDiscs, height) -> None:
-    with pytest.raises(UserError, match=r"give a workspace with that marker_plane") as error:
-        track(at_height(listed, height), SCENE)
-    side = "nearer to" if height > 0 else "farther from"
-    assert f"they seem to be {side} the camera than the fiducials by about {height:.0f} mm" in str(
-        error.value
-    )
-    with pytest.raises(
-        UserError, match=r"times as far apart: .* give the camera's file and a workspace with"
-    ):
-        track(at_height(listed, height), replace(SCENE, camera=None))
-
-
-def test_a_wrong_height_is_corrected(listed: ListedDiscs) -> None:
-    said = r"nearer to the camera than the fiducials by about 25 mm, not 5 mm above them"
-    with pytest.raises(UserError, match=said):
-        track(at_height(listed, 25.0), sheet(5.0))
-
-
-def test_markers_beside_their_places_are_no_question_of_the_plane(listed: ListedDiscs) -> None:
-    with pytest.raises(UserError, match="discs lie as the markers do, but beside them"):
-        track(at_height(listed, 0.0, moved=11.0), SCENE)
-
-
-def test_without_markers_colour_and_plane_are_named(listed: ListedDiscs) -> None:
-    with pytest.raises(
-        UserError, match=r"markers' colour; if markers are nearer to the camera .* give the camera"
-    ):
-        track(at_height(listed, 0.0), replace(SCENE, colour=replace(RED, low=(0.0, 0.0, 0.0))))
+        track(at_height(listed, height, moved=moved), scene)
 
 
 def test_hough_takes_the_sheet_with_a_camera(listed: ListedDiscs) -> None:

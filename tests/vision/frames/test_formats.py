@@ -7,20 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from geometry.errors import UserError
 from vision.frames.formats import pages
 from vision.frames.sources import open_frames, photographs
 
 LEVELS = (10, 40, 70, 100, 130, 160)
-
-
-def box(brand: bytes, *others: bytes) -> bytes:
-    """The start of a file of ISO's base media format."""
-    body = b"ftyp" + brand + bytes(4) + b"".join(others)
-    return (len(body) + 4).to_bytes(4, "big") + body + bytes(200)
-
-
-HEIC, AVIF = box(b"heic", b"mif1", b"heic"), box(b"avif", b"mif1", b"miaf")
 
 
 def stack(path: Path, *, colour: bool = False, levels=LEVELS, **options) -> Path:
@@ -87,78 +77,7 @@ def test_a_smaller_copy_is_no_page(tmp_path):
     assert list(pages(path.read_bytes(), "a")) == [0]
 
 
-def test_pages_of_another_size_are_named(tmp_path):
-    images = [Image.fromarray(np.full(shape, 70, np.uint8)) for shape in ((12, 16), (6, 8))]
-    images[0].save(tmp_path / "two.tif", save_all=True, append_images=images[1:])
-    with pytest.raises(UserError, match=r"two.tif:0 has 16x12 pixels and two.tif:1 8x6"):
-        seen(tmp_path / "two.tif")
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (
-            lambda path: stack(path, tiffinfo={270: "ImageJ=1.53t\nimages=9000\n"}),
-            "6 of its 9000 pages",
-        ),
-        (lambda path: path.write_bytes(stack(path).read_bytes()[:-150]), "of its pages can be|is damaged"),
-        (
-            lambda path: path.write_bytes(stack(path, format="PNG").read_bytes()[:-60]),
-            "its end is missing",
-        ),
-    ],
-)
-def test_a_stack_that_lacks_pages_is_named(tmp_path, make, said):
-    path = tmp_path / "stack.tif"
-    make(path)
-    with pytest.raises(UserError, match=f"stack.tif: .*({said})"):
-        seen(path)
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "said"),
-    [
-        ("IMG_1.HEIC", HEIC, "HEIC is not read; convert it to JPEG"),
-        ("IMG_1.heif", box(b"mif1", b"heic"), "HEIC is not read"),
-        ("IMG_1.jpg", HEIC, "HEIC is not read"),  # renamed
-        ("a.avif", AVIF, "AVIF is not read"),
-        ("a.png", box(b"mif1", b"avif"), "AVIF is not read"),
-        ("a.jxl", b"\xff\x0a" + bytes(50), "JPEG XL is not read"),
-        ("DSC_1.NEF", b"MM\0*" + bytes(50), "raw photographs are not read; convert it to TIFF"),
-        ("a.dng", b"II*\0" + bytes(50), "raw photographs are not read"),
-        ("a.cr3", box(b"crx "), "raw photographs are not read"),
-    ],
-)
-def test_a_format_that_is_not_read_is_named_alone_and_among_others(tmp_path, name, content, said):
-    path = tmp_path / name
-    path.write_bytes(content)
-    done, jpeg = cv2.imencode(".jpg", np.full((12, 16), 70, np.uint8))
-    assert done
-    (tmp_path / "other.jpg").write_bytes(jpeg.tobytes())
-    for source in (path, tmp_path):
-        for reading in (seen, lambda source: list(photographs([source]))):
-            with pytest.raises(UserError, match=said) as error:
-                reading(source)
-            assert name in str(error.value)
-            assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("name", ["a.webp", "a.png", "a.apng"])
-def test_an_animation_is_never_one_picture(tmp_path, name):
-    path = stack(tmp_path / name, format="WEBP" if name == "a.webp" else "PNG")
-    for reading in (seen, lambda source: list(photographs([source]))):
-        with pytest.raises(UserError, match=rf"{name}: it has 6 frames, not one; make a video of it"):
-            reading(path)
-
-
 def test_a_header_that_promises_frames_without_end_takes_no_memory(tmp_path):
     content = stack(tmp_path / "a.png", format="PNG").read_bytes()
     at = content.index(b"acTL") + 4
     assert len(pages(content[:at] + b"\xff" * 4 + content[at + 4 :], "a")) == 2**32 - 1
-
-
-def test_a_film_among_pictures_is_named(tmp_path):
-    stack(tmp_path / "a.gif")
-    stack(tmp_path / "b.tif", levels=(70,))
-    with pytest.raises(UserError, match=r"holds a.gif: a GIF is a film of its own"):
-        seen(tmp_path)

@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from vision.frames.sources import FRAMES_OF_A_VIDEO, photographs
 from vision.frames.video import video_writer
 
@@ -29,15 +28,6 @@ def test_photographs_are_grey(folder):
     (_, image), *_ = photographs([folder / "10.png"])
     assert image.shape == (20, 30)
     assert np.unique(image).tolist() == [11]  # 0.114 of blue
-
-
-def test_a_photograph_is_left_out_by_its_name(folder):
-    assert names([folder], without=["2.png", str(folder / "10.png")]) == ["1.png"]
-
-
-def test_leaving_out_what_is_not_there_is_one_line(folder):
-    with pytest.raises(UserError, match=r"there is no photograph 3\.png to leave out"):
-        names([folder], without=["3.png"])
 
 
 def test_a_video_gives_frames_spread_evenly(tmp_path):

@@ -52,22 +52,6 @@ def slopes_of(function: Callable[[FloatArray], FloatArray], place: FloatArray) -
     return np.column_stack(columns)
 
 
-def test_a_similarity_is_the_papers_linear_transform() -> None:
-    found = SIMILARITY.pixels(POINTS, np.array([6.0, -2.0, 300.0, 400.0]))
-    x, y = POINTS.T
-    np.testing.assert_allclose(
-        found, np.column_stack([6 * x - 2 * y + 300, -2 * x - 6 * y + 400]), rtol=1e-14
-    )
-
-
-def test_a_homography_divides_by_the_depth() -> None:
-    found = plane("homography").pixels(POINTS)
-    depth = 1 + 1e-3 * POINTS[:, 0] - 5e-4 * POINTS[:, 1]
-    x, y = POINTS.T
-    np.testing.assert_allclose(found[:, 0], (8 * x + y + 100) / depth, rtol=1e-14)
-    np.testing.assert_allclose(found[:, 1], (0.5 * x - 7 * y + 700) / depth, rtol=1e-14)
-
-
 @pytest.mark.parametrize("height", [0.0, 4.0, -6.0])
 def test_a_camera_sees_the_plane_at_its_height_as_opencv_does(height: float) -> None:
     raised = np.column_stack([POINTS, np.full(4, height)])
@@ -166,13 +150,3 @@ def test_the_covariance_of_displacements_is_propagated_from_parameters_and_pixel
         whole[rows, rows] = own
     covariance = found.displacement_covariance(POINTS, final, *noise)
     np.testing.assert_allclose(covariance, slopes @ whole @ slopes.T, rtol=1e-3, atol=1e-8)
-
-
-def test_a_bending_plane_adds_a_share_of_every_displacement() -> None:
-    final = POINTS + np.array([[3.0, -4], [0, 0], [0, -5], [6, 8]])
-    none = np.zeros((4, 2, 2))
-    straight, bent = (
-        plane("similarity", **changes).displacement_covariance(POINTS, final, none, none)
-        for changes in ({}, {"bending": 0.1})
-    )
-    np.testing.assert_allclose(bent - straight, np.diag([0.25, 0.25, 0, 0, 0.25, 0.25, 1, 1]), atol=1e-12)

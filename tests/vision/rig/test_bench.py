@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from geometry.errors import ShapeError
 from geometry.finger.design import Design
 from vision.rig.bench import FINGER, Bench
 from vision.rig.print_layers import DIRECTION, PERIOD, PrintLayers
@@ -47,16 +45,10 @@ def test_every_marker_is_drawn_where_the_truth_says_it_is(bench):
         np.testing.assert_allclose(found, centre, rtol=0, atol=0.02)
 
 
-def test_every_other_layer_covers_half_of_the_finger_and_moves_with_it(bench):
-    layered = replace(bench, layers=0.2)
-    for displacement in (np.zeros_like(bench.mesh.points), bent(bench.mesh)):
-        body, dark = (
-            shape.edges
-            for shape in layered.scene(displacement).shapes
-            if shape.colour in (FINGER, tuple(0.8 * np.array(FINGER)))
-        )
-        assert area(dark) == pytest.approx(area(body) / 2, rel=0.01)  # 250 layers end anywhere
-        assert bench.scene(displacement).shapes[-10].edges.shape == body.shape
+def test_every_other_layer_covers_half_of_the_finger(bench):
+    shapes = replace(bench, layers=0.2).scene(bent(bench.mesh)).shapes
+    body, dark = (shape for shape in shapes if shape.colour in (FINGER, tuple(0.8 * np.array(FINGER))))
+    assert area(dark.edges) == pytest.approx(area(body.edges) / 2, rel=0.01)  # 250 layers end anywhere
 
 
 def test_layers_at_rest_are_stripes(bench):
@@ -90,33 +82,3 @@ def test_the_indenter_stands_on_the_contact(bench):
     foot = indenter.edges[indenter.edges[:, 0, 1] <= -2.0, 0]
     left, right = np.add(Design().contact_ends, 0.5)
     np.testing.assert_allclose([foot[:, 0].min(), foot[:, 0].max()], [left, right], atol=1e-9)
-
-
-def test_displacements_of_another_mesh_are_refused(bench):
-    with pytest.raises(ShapeError, match="displacement must have shape"):
-        bench.scene(np.zeros((7, 2)))
-
-
-@pytest.mark.parametrize("turn", [20, 90, 200])
-def test_a_turned_camera_still_sees_all_fiducials(turn):
-    pose = viewing_pose(CAMERA, WORKSPACE, tilt=5, turn=turn)
-    seen = CAMERA.project(np.column_stack([WORKSPACE.points, np.zeros(7)]), pose)
-    assert ((seen > 20) & (seen < (1260, 700))).all()
-
-
-@pytest.mark.parametrize("tilt", [0.0, 3.0, 10.0])
-def test_the_view_shows_all_fiducials_upright_at_the_tilt(tilt):
-    pose = viewing_pose(CAMERA, WORKSPACE, tilt=tilt)
-    seen = CAMERA.project(np.column_stack([WORKSPACE.points, np.zeros(7)]), pose)
-    assert ((seen > 30) & (seen < (1250, 690))).all()
-    origin, right, up, near = CAMERA.project([[45, -15, 0], [46, -15, 0], [45, -14, 0], [45, -15, 1]], pose)
-    assert right[0] - origin[0] == pytest.approx(9.5, abs=0.2)
-    assert origin[1] - up[1] == pytest.approx(9.5, abs=0.2)
-    axis = np.subtract(*_in_camera(pose))
-    assert np.degrees(np.arccos(-axis[2])) == pytest.approx(tilt, abs=1e-5)
-    np.testing.assert_allclose(origin, near, atol=0.1 + 0.2 * tilt)
-
-
-def _in_camera(pose):
-    """Where the camera has the points (0, 0, 1) and (0, 0, 0)."""
-    return Rotation.from_rotvec(pose.rotation).apply(np.eye(3)[2]) + pose.translation, pose.translation

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from vision.rig.motion import Motion
 
 
@@ -26,13 +25,6 @@ def test_the_load_grows_at_constant_speed_between():
     assert 0 < means[0] < means[-1] < 1
 
 
-def test_an_exposure_is_seen_in_equal_parts():
-    motion = Motion(rest=3, moving=7, held=4, shutter=0.5)
-    np.testing.assert_allclose(
-        motion.exposed(5, 4), motion.load(5 + 0.5 * np.array([0.125, 0.375, 0.625, 0.875]))
-    )
-
-
 def test_a_rolling_shutter_opens_later_for_lower_rows():
     motion = Motion(rest=3, moving=7, held=4, shutter=0.25, rolling=0.5)
     loads = motion.exposed(5, 300)
@@ -41,11 +33,3 @@ def test_a_rolling_shutter_opens_later_for_lower_rows():
     np.testing.assert_allclose(seen, motion.load(5 + 0.5 * rows + 0.125), atol=1e-3)
     assert motion.travel(5) == pytest.approx(0.75 / 7.75)
     np.testing.assert_allclose(motion.open_at(4, rows).sum(axis=0), 1)
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"), [({"rest": 0}, "rest = 0 frames is outside"), ({"shutter": 1}, "shutter = 1")]
-)
-def test_a_motion_that_cannot_be_filmed_is_refused(settings, said):
-    with pytest.raises(UserError, match=said):
-        Motion(**settings)

@@ -83,6 +83,7 @@ def test_the_middle_of_a_disc_that_bends_is_the_mean_over_the_disc(usual_mesh):
     np.testing.assert_allclose(truth.discs[:8, 0], truth.world[:8, 0], atol=5e-5)
 
 
+@pytest.mark.slow
 def test_motion_blur_is_the_mean_of_what_is_seen_while_the_shutter_is_open(bench):
     sharp = Exposure(noise=0, blur=0.7)
     recording = film(bench, exposure=sharp, motion=Motion(rest=1, moving=1, held=1, shutter=0.8))
@@ -127,15 +128,6 @@ def test_a_cable_hides_the_share_of_a_marker_that_it_is_told_to(bench):
     # The segment of a circle that is a quarter of the diameter high, in closed form.
     assert seen(0.25) == pytest.approx(1 - (np.arccos(0.5) - 0.5 * np.sqrt(0.75)) / np.pi, abs=0.01)
     assert seen(1) == pytest.approx(0, abs=0.005)
-
-
-def test_what_hides_a_marker_is_in_the_picture_and_in_the_truth(bench):
-    cover = cable(bench.mesh.markers[2], 0.8, 1.0)
-    recording = film(bench, occluders=lambda frame: [cover] if frame == 1 else [])
-    (clear, free), (covered, hidden) = recording.frame(0), recording.frame(1)
-    assert free.seen == pytest.approx(np.ones(9), abs=1e-9)
-    assert hidden.seen[2] == pytest.approx(0, abs=0.01)
-    assert np.abs(covered.astype(int) - clear).max() > 60
 
 
 @pytest.mark.parametrize("codec", list(FILES))

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from scipy.special import erf
 
-from geometry.errors import UserError
 from vision.calibration.camera import Camera, Pose
 from vision.rig.exposure import Exposure
-from vision.rig.render import mean_light, noise_of, render
+from vision.rig.render import mean_light, render
 from vision.rig.shapes import Scene, Shape, circle, closed, rectangle
 
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -41,7 +41,7 @@ def test_a_rectangle_seen_askew_through_a_lens_is_what_rays_from_the_pixels_meet
     y = (np.arange(40)[:, None] + offsets).ravel()
     pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     plain = (LENS.undistort(pixels) - (LENS.cx, LENS.cy)) / (LENS.fx, LENS.fy)
-    rotation = _matrix(TILTED.rotation)
+    rotation = Rotation.from_rotvec(TILTED.rotation).as_matrix()
     rays = np.column_stack([plain, np.ones(len(plain))]) @ rotation
     eye = -rotation.T @ TILTED.translation
     met = eye + rays * ((z - eye[2]) / rays[:, 2])[:, None]
@@ -117,41 +117,8 @@ def test_the_lens_blurs_the_light_that_the_lamp_throws_on_the_scene():
     assert found == pytest.approx(-slope * (blur**2 + 1 / 12) / (1 + slope * middle), rel=0.03)
 
 
-def test_the_same_seed_and_frame_give_the_same_picture_and_others_do_not():
-    scene, noisy = Scene((0.6,) * 3, []), Exposure(noise=4)
-
-    def picture(seed, frame):
-        return render(scene, PINHOLE, ABOVE, noisy, seed=seed, frame=frame)
-
-    np.testing.assert_array_equal(picture(1, 2), picture(1, 2))
-    for other in ((1, 3), (2, 2), (2, 1)):
-        assert (picture(1, 2) != picture(*other)).mean() > 0.5
-
-
 def test_a_monochrome_picture_has_the_luma_of_the_colours():
     scene = Scene((0.2, 0.4, 0.8), [])
     grey = render(scene, PINHOLE, ABOVE, Exposure(**{**PLAIN.model_dump(), "monochrome": True}))
     assert grey.shape == (80, 120)
     assert (grey == np.rint(200 * (0.114 * 0.2 + 0.587 * 0.4 + 0.299 * 0.8))).all()
-
-
-def test_light_without_noise_is_developed_without_random_numbers():
-    rng = noise_of(0, 0)
-    PLAIN.develop(np.zeros((2, 3, 3), dtype=np.float32), rng)
-    assert rng.random() == noise_of(0, 0).random()
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [({"noise": -1}, "noise"), ({"blur": "much"}, "blur"), ({"nosie": 1}, "did you mean noise")],
-)
-def test_a_wrong_setting_is_told_in_one_line(settings, said):
-    with pytest.raises(UserError, match=said):
-        Exposure(**settings)
-
-
-def _matrix(vector):
-    angle = np.linalg.norm(vector)
-    x, y, z = vector / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross

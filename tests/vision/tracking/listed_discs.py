@@ -7,12 +7,29 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import FloatArray
+from vision.calibration.camera import Camera, Pose
 from vision.discs.colour import Colour
 from vision.discs.disc_detector import DetectionMethod, DiscDetections
 from vision.frames.frame import Image
 
 NOISE = 0.05
 """Standard deviation of a coordinate, pixels."""
+
+
+def seen(points: FloatArray, camera: Camera, pose: Pose, height: float = 0.0) -> FloatArray:
+    """Pixels of points of the finger's plane, mm, at a height."""
+    return camera.project(np.column_stack([points, np.full(len(points), height)]), pose)
+
+
+def middles(points: FloatArray, radius: float, camera: Camera, pose: Pose, height: float = 0.0) -> FloatArray:
+    """Centroids of the images of circles, by polygons of many corners."""
+    angles = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    around = points[:, None] + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    pixels = seen(around.reshape(-1, 2), camera, pose, height)
+    x, y = pixels.reshape(len(points), -1, 2).transpose(2, 0, 1)
+    turns = x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)
+    parts = [((of + np.roll(of, -1, axis=1)) * turns).sum(axis=1) for of in (x, y)]
+    return np.column_stack(parts) / (3 * turns.sum(axis=1))[:, None]
 
 
 class Request(NamedTuple):

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from tests.fingers import beam
 from vision.calibration.camera import Camera
 from vision.discs.disc_detector import DiscDetections
-from vision.tracking.camera_motion import CameraMotion, find_camera_motion
+from vision.tracking.camera_motion import find_camera_motion
 from vision.tracking.scene import FilmedScene
 from vision.tracking.workspace import Workspace
 
@@ -116,15 +115,3 @@ def test_a_lens_that_is_not_known_cancels_however_well_the_ends_are_known() -> N
     motion = find_camera_motion(SCENE, discs(bent), after)
     undone = motion.undone(discs(BETWEEN + shift))
     np.testing.assert_allclose(undone.centres, BETWEEN, atol=1e-5)
-
-
-def test_a_static_camera_leaves_the_discs_as_they_are() -> None:
-    final = discs(BETWEEN)
-    static = CameraMotion(0.1, None)
-    assert static.undone(final) is final
-    assert static.deviation == 0
-
-
-def test_no_fiducial_at_both_ends_is_one_line() -> None:
-    with pytest.raises(UserError, match="no fiducial is seen in the end where it was at the start"):
-        find_camera_motion(SCENE, discs(START, hidden=(0, 1, 2)), discs(START, hidden=(3, 4, 5)))

@@ -1,14 +1,13 @@
 """Limits of what counts as a fiducial: distance, size, obliqueness, number; layouts of few discs."""
 
-from itertools import combinations, permutations
+from itertools import permutations
 
-import cv2
 import numpy as np
 import pytest
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.tracking.fiducial_matching import FiducialMatch, UnseenError, identify_fiducials
+from vision.tracking.fiducial_matching import UnseenError, identify_fiducials
 from vision.tracking.workspace import Workspace
 
 SCALE = 6.0
@@ -36,14 +35,6 @@ def names(
     return identify_fiducials(pixels, radii, workspace).tolist()
 
 
-@pytest.mark.parametrize("turn", [0, 63, 180, 250])
-@pytest.mark.parametrize("tilt", [0.0, 0.4, -0.5])
-def test_fiducials_are_known_however_the_camera_is_held(turn: int, tilt: float) -> None:
-    order = np.random.default_rng(turn).permutation(5)
-    found = names(seen(of(FIVE).points, turn=turn, tilt=tilt)[order], of(FIVE))
-    assert order[found].tolist() == list(range(5))
-
-
 def test_the_order_of_the_discs_is_of_no_account() -> None:
     """All orders of four discs, which fit in any turn: only one has the right sizes."""
     workspace = of(FIVE[:4])
@@ -67,15 +58,6 @@ def test_a_disc_of_another_size_is_no_fiducial(size: float, name: int) -> None:
     assert names(seen(of(SIX).points), of(SIX), np.array([1, 1, 1, 1, 1, size])) == [0, 1, 2, 3, 4, name]
 
 
-@pytest.mark.parametrize(("size", "fits"), [(1.28, True), (1.32, False), (0.78, True), (0.76, False)])
-def test_discs_are_as_large_as_the_workspace_has_them(size: float, fits: bool) -> None:
-    if fits:
-        assert names(seen(of(FIVE).points), of(FIVE), size) == list(range(5))
-    else:
-        with pytest.raises(UnseenError, match=r"at best \d fit, and 5 must"):
-            names(seen(of(FIVE).points), of(FIVE), size)
-
-
 def test_the_size_counts_where_the_fiducial_is() -> None:
     """A plane so oblique that its far discs are seen at three quarters of the near ones' size."""
     places, step = of(FIVE).points, 1e-4
@@ -87,33 +69,30 @@ def test_the_size_counts_where_the_fiducial_is() -> None:
 
 
 @pytest.mark.parametrize(
-    ("stretch", "fits"), [(1.55, True), (1.65, False), (1 / 1.55, True), (1 / 1.65, False)]
+    ("pixels", "sizes", "fits"),
+    [
+        *((seen(of(FIVE).points), size, 0.77 < size < 1.3) for size in (1.28, 1.32, 0.78, 0.76)),
+        # seen at 50 degrees one direction is 1.6 times as long as the other; size is the root of the area
+        *(
+            (seen(of(FIVE).points, stretch, turn=30), stretch**0.5, 1 / 1.6 < stretch < 1.6)
+            for stretch in (1.55, 1.65, 1 / 1.55, 1 / 1.65)
+        ),
+    ],
 )
-def test_a_plane_is_not_seen_more_obliquely_than_at_50_degrees(stretch: float, fits: bool) -> None:
-    """There one direction is 1.6 times as long as the other; size is the root of the area."""
-    pixels = seen(of(FIVE).points, stretch, turn=30)
+def test_a_layout_has_the_size_of_the_workspace_and_is_not_too_oblique(pixels, sizes, fits) -> None:
     if fits:
-        assert names(pixels, of(FIVE), stretch**0.5) == list(range(5))
+        assert names(pixels, of(FIVE), sizes) == list(range(5))
     else:
         with pytest.raises(UnseenError):
-            names(pixels, of(FIVE), stretch**0.5)
+            names(pixels, of(FIVE), sizes)
 
 
-@pytest.mark.parametrize(("shown", "enough"), [(5, True), (4, False)])
-def test_five_fiducials_must_be_seen(shown: int, enough: bool) -> None:
-    pixels = seen(of(SIX).points, tilt=0.3)[:shown]
-    if enough:
-        assert names(pixels, of(SIX)) == [0, 1, 2, 3, 4, -1]
-    else:
-        with pytest.raises(UnseenError, match="6 fiducials cannot be made out among 4 discs: at best 4 fit"):
-            names(pixels, of(SIX))
-
-
-def test_of_four_fiducials_all_must_be_seen() -> None:
-    workspace = of(FIVE[:4])
-    assert names(seen(workspace.points), workspace) == [0, 1, 2, 3]
-    with pytest.raises(UnseenError, match="at best 0 fit, and 4 must"):
-        names(seen(workspace.points)[:3], workspace)
+@pytest.mark.parametrize(("fiducials", "least"), [(SIX, 5), (FIVE[:4], 4)])
+def test_five_fiducials_must_be_seen_or_all_of_four(fiducials, least) -> None:
+    pixels, absent = seen(of(fiducials).points, tilt=0.3), len(fiducials) - least
+    assert names(pixels[:least], of(fiducials)) == [*range(least), *[-1] * absent]
+    with pytest.raises(UnseenError):
+        names(pixels[: least - 1], of(fiducials))
 
 
 def test_a_mirrored_image_is_told_from_one_that_is_not() -> None:
@@ -135,36 +114,6 @@ def test_the_better_of_two_matches_with_as_many_fiducials_is_taken() -> None:
     assert names(both[::-1], of(FIVE)) == [9, 8, 7, 6, 5]
 
 
-@pytest.mark.parametrize(("nearer", "name"), [(0.75, 5), (0.65, 6)])
-def test_the_difference_of_the_radii_counts_as_much_as_a_distance(nearer: float, name: int) -> None:
-    """A disc 1 mm away, and one of 1.7 mm in place of 2 mm of radius on the other side."""
-    places = np.concatenate([of(FIVE).points, SIX[5] + np.array([[1.0, 0], [-nearer, 0]])])
-    found = names(seen(places), of(SIX), np.array([1, 1, 1, 1, 1, 1, 0.85]))
-    assert found == [0, 1, 2, 3, 4, name]
-
-
-@pytest.mark.parametrize(("first", "second"), [(1.2, 0.6), (1.0, 0.6)])
-def test_of_two_layouts_the_one_with_the_smaller_residual_is_taken(first: float, second: float) -> None:
-    """In one the first fiducial is off, in the other the last one; each by its best four, by OpenCV."""
-    places, way = of(FIVE).points, np.array([1, -1]) / np.sqrt(2)
-    copies = [places.copy(), places.copy()]
-    copies[0][0] += first * way
-    copies[1][4] -= second * way
-    pixels = [seen(copies[0]), seen(copies[1] - (0, 130))]
-    least = []
-    for copy in pixels:
-        missed = []
-        for four in map(list, combinations(range(5), 4)):
-            back = cv2.getPerspectiveTransform(copy[four].astype(np.float32), places[four].astype(np.float32))
-            missed.append(
-                np.linalg.norm(cv2.perspectiveTransform(copy[None], back)[0] - places, axis=1).sum()
-            )
-        least.append(min(missed))
-    assert abs(least[0] - least[1]) > 0.05
-    expected = [0, 1, 2, 3, 4] if least[0] < least[1] else [5, 6, 7, 8, 9]
-    assert names(np.concatenate(pixels), of(FIVE)) == expected
-
-
 @pytest.mark.parametrize(("others", "searched"), [(11, True), (12, False)])
 def test_sixteen_discs_of_one_size_are_searched(others: int, searched: bool) -> None:
     false = np.random.default_rng(7).uniform(-150, -20, (others, 2))
@@ -172,7 +121,7 @@ def test_sixteen_discs_of_one_size_are_searched(others: int, searched: bool) -> 
     if searched:
         assert names(pixels, of(FIVE)) == [0, 1, 2, 3, 4]
     else:
-        with pytest.raises(UnseenError, match="among 17 discs: at best 0 fit"):
+        with pytest.raises(UnseenError, match="at best 0 fit"):
             names(pixels, of(FIVE))
 
 
@@ -190,7 +139,3 @@ def test_fiducials_of_which_three_are_on_a_line_are_known_by_the_others() -> Non
         assert names(seen(rows.points, turn=turn, tilt=0.3), rows) == list(range(5))
         noisy = seen(rows.points, turn=turn) + np.random.default_rng(turn).normal(0, 0.2, (5, 2))
         assert names(noisy, rows) == list(range(5))
-
-
-def test_the_number_found_is_that_of_the_fiducials_with_a_disc() -> None:
-    assert FiducialMatch(np.array([3, -1, 0, -1]), 0.1).found == 2

@@ -66,29 +66,7 @@ def test_a_disc_is_no_marker_farther_away_than_a_share_of_the_spacing(share, nam
     assert names(seen(places), UNEVEN) == [0, 1, 2, name, 4, 5, 6]
 
 
-def test_of_two_discs_the_nearer_one_is_the_marker() -> None:
-    places = np.concatenate([UNEVEN, UNEVEN[3:4] + np.array([0.6, 0.0])])
-    assert names(seen(places), UNEVEN) == list(range(7))
-    assert names(seen(places)[::-1], UNEVEN) == [7 - number for number in range(7)]
-
-
-def test_the_similarity_with_small_residuals_is_taken_among_those_with_as_many_markers() -> None:
-    """Six discs fit exactly if the seventh, 1 mm off, is none of the two that define the similarity."""
-    places = UNEVEN.copy()
-    places[0] += (0.0, 1.0)
-    assert names(seen(places), UNEVEN) == list(range(7))
-    extra = np.concatenate([places, UNEVEN[6:] + 0.9])
-    assert names(seen(extra), UNEVEN) == list(range(7))
-
-
 SHIFTS = np.array([[0, 1.0], [1, 0], [0, -1], [-1, 0], [0.6, 0.8], [-0.8, 0.6], [0.8, -0.6]])
-
-
-def test_of_two_layouts_the_one_that_fits_better_is_taken() -> None:
-    """A second copy below whose discs are half a millimetre off."""
-    both = np.concatenate([UNEVEN + 0.5 * SHIFTS - (0, 30), UNEVEN])
-    assert names(seen(both), UNEVEN) == [7, 8, 9, 10, 11, 12, 13]
-    assert names(seen(both)[::-1], UNEVEN) == [6, 5, 4, 3, 2, 1, 0]
 
 
 @pytest.mark.parametrize(("shown", "chosen"), [(4, [0, 1, 2, 3, 4, -1, 6]), (5, [7, 8, 9, 10, 11, -1, -1])])
@@ -96,12 +74,6 @@ def test_a_marker_far_off_counts_less_than_an_exact_one_and_more_than_none(shown
     """Six that are a millimetre off (one is beyond the gate) outweigh four that are exact, and not five."""
     both = np.concatenate([UNEVEN + SHIFTS - (0, 30), UNEVEN[:shown]])
     assert names(seen(both), UNEVEN) == chosen
-
-
-def test_a_row_that_is_not_quite_even_is_a_row() -> None:
-    """The turn that puts it on itself within the gate is by 179.8 degrees."""
-    row = np.array([[0.0, 0], [10, 0.1], [20, 0], [30, 0], [40, 0.2]])
-    assert names(seen(row), row) == list(range(5))
 
 
 @pytest.mark.parametrize("turn", [0, 40, -89, 91, 180, 269])
@@ -123,15 +95,6 @@ def test_that_x_runs_to_the_right_outweighs_one_marker_and_not_two(single: int, 
     assert found == ([*own, *range(6, 6 + single)] if turned else [*other, -1])
 
 
-@pytest.mark.parametrize("count", [3, 4, 5, 6, 12])
-def test_markers_that_look_the_same_after_a_turn_are_refused(count: int) -> None:
-    """A regular polygon and its middle, by the smallest turn."""
-    angles = 2 * np.pi * np.arange(count) / count + 0.3
-    polygon = np.concatenate([20 * np.column_stack([np.cos(angles), np.sin(angles)]), np.zeros((1, 2))])
-    with pytest.raises(UserError, match=f"the same after a turn by {360 / count:.0f} degrees"):
-        names(seen(polygon + 50), polygon + 50)
-
-
 @pytest.mark.parametrize(("away", "refused"), [(1.6, True), (3.0, False)])
 def test_what_differs_by_more_than_the_gate_does_not_look_the_same(away: float, refused: bool) -> None:
     """A square of 14.1 mm with one corner off: 0.15 of the smallest distance is 2.1 mm."""
@@ -149,11 +112,5 @@ def test_what_differs_by_more_than_the_gate_does_not_look_the_same(away: float, 
 def test_half_of_the_markers_and_three_must_be_seen(count: int, least: int) -> None:
     markers = UNEVEN[:count]
     assert (np.array(names(seen(markers)[:least], markers)) >= 0).sum() == least
-    with pytest.raises(UserError, match=f"neither .* can be made out among {least - 1} discs"):
+    with pytest.raises(UserError, match="can be made out"):
         names(seen(markers)[: least - 1], markers)
-
-
-@pytest.mark.parametrize("count", [0, 1])
-def test_no_pair_of_discs_is_no_layout(count: int) -> None:
-    with pytest.raises(UserError, match=f"among {count} discs"):
-        names(seen(UNEVEN)[:count], UNEVEN)

@@ -3,10 +3,8 @@
 from typing import Any
 
 import numpy as np
-import pytest
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from tests.fingers import beam
 from vision.discs.disc_detector import DiscDetections
 from vision.tracking.marker_plane import SIMILARITY, MarkerPlane
@@ -48,10 +46,6 @@ def tracking(**changes: Any) -> Tracking:
     return Tracking(**values | changes)
 
 
-def test_a_marker_is_visible_if_it_was_seen_at_both_ends() -> None:
-    assert tracking().visible.tolist() == SEEN.tolist()
-
-
 def test_positions_are_in_the_fingers_frame() -> None:
     found = tracking()
     np.testing.assert_allclose(found.positions[0, SEEN], PLACED[SEEN], rtol=1e-12)
@@ -90,19 +84,3 @@ def test_the_papers_linear_map_does_not_find_places() -> None:
     observed = tracking(method="hough").observations("a film")
     np.testing.assert_array_equal(observed.points, MARKERS)
     np.testing.assert_allclose(observed.displacements[SEEN], MOVED[SEEN], atol=1e-12)
-
-
-def test_no_marker_at_both_ends_is_one_line() -> None:
-    nothing = discs(MARKERS, 0, 0.01).numbered(np.full(COUNT, -1))
-    with pytest.raises(UserError, match="no marker was seen both before and after the motion"):
-        tracking(final=nothing).observations("a film")
-
-
-def test_a_marker_outside_the_finger_is_told_with_its_number_and_places() -> None:
-    """The beam ends at x = 100; its fifth marker is at (65, -3)."""
-    places = PLACED.copy()
-    places[4] = (101.0, -3.0)
-    with pytest.raises(
-        UserError, match=r"marker 5 was seen at \(101.00, -3.00\) mm, outside .* has it at \(65.00, -3.00\)"
-    ):
-        tracking(initial=discs(places, 2, 0.01)).observations("a film")
