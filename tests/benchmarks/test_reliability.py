@@ -147,10 +147,7 @@ def test_a_command_that_is_killed_goes_on_to_the_same_numbers(tmp_path: Path) ->
     )
     environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)],
-        env=environment,
-        capture_output=True,
-        text=True,
+        [sys.executable, "-c", code, str(tmp_path)], env=environment, capture_output=True, text=True
     )
     if "the system refuses seccomp filters" in done.stderr:
         pytest.skip("the system refuses seccomp filters")

@@ -46,9 +46,9 @@ class Field(Bending):
 
 @dataclass
 class Beam:
-    """A solver whose answer is changed by a function."""
+    """A solver whose answer is changed by a function, or has other fields."""
 
-    fault: Callable[[Solution], Any] = lambda solution: solution
+    fault: Callable[[Solution], Any] | dict[str, Any]
     name: str = "beam"
     laws: tuple[str, ...] = ("linear",)
     loads: tuple[str, ...] = ("mean",)
@@ -58,7 +58,8 @@ class Beam:
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         status = Status(True, "by a formula")
-        return self.fault(Solution("beam", problem, Bending(), 1.0, np.zeros(2), status, {"seconds": 0.0}))
+        solution = Solution("beam", problem, Bending(), 1.0, np.zeros(2), status, {"seconds": 0.0})
+        return replace(solution, **self.fault) if isinstance(self.fault, dict) else self.fault(solution)
 
 
 def spoilt(array: Any) -> Any:

@@ -95,10 +95,7 @@ def test_linear_solvers_refuse_a_cylinder(coarse_mesh):
         ({"kind": "cylinder", "radius": 5.0, "displacement": (None, -1.0)}, "as friction lets it"),
         ({"kind": "cylinder", "radius": 5.0, "displacement": (0.0, 0.0)}, "does not move"),
         ({"kind": "mean", "friction": 0.5}, "friction belongs to the load cylinder"),
-        (
-            {"kind": "cylinder", "radius": 5.0, "friction": 50.0},
-            "friction = 50 is outside its range, 0 to 5",
-        ),
+        ({"kind": "cylinder", "radius": 5.0, "friction": 50.0}, "friction = 50 is outside its range, 0 to 5"),
     ],
 )
 def test_a_cylinder_that_makes_no_sense_is_refused(values, said):

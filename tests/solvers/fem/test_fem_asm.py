@@ -71,12 +71,7 @@ def dense(problem, solver):
             hold([row], axis, to, solver.contact_deviation**2 / solver.scale)
     bordered = np.array(conditions)
     diagonal = misfit.weights.ravel()
-    matrix = np.block(
-        [
-            [stiffness + at.T * diagonal @ at, bordered.T],
-            [bordered, -np.diag(slacks)],
-        ]
-    )
+    matrix = np.block([[stiffness + at.T * diagonal @ at, bordered.T], [bordered, -np.diag(slacks)]])
     right = np.concatenate([at.T @ (diagonal * misfit.observed.ravel()), values])
     nodal = np.linalg.solve(matrix, right)[:size]
     reaction = (stiffness @ nodal - at.T @ (diagonal * (misfit.observed.ravel() - at @ nodal))).reshape(-1, 2)

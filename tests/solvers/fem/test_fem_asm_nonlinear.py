@@ -41,8 +41,7 @@ def bent() -> Problem:
 
 
 @pytest.mark.parametrize(
-    ("kind", "law"),
-    [("mean", "neo-hookean"), ("point", "st-venant-kirchhoff"), ("patch", "neo-hookean")],
+    ("kind", "law"), [("mean", "neo-hookean"), ("point", "st-venant-kirchhoff"), ("patch", "neo-hookean")]
 )
 def test_weak_weights_give_fem_nonlinear(kind, law):
     problem = pulled(Load(kind=kind, displacement=(None, -3.0)), law=law)

@@ -189,10 +189,7 @@ def test_mass_and_break_are_of_the_substance() -> None:
     [
         (float("nan"), ""),
         (0.4, ""),
-        (
-            0.6,
-            "60% of the material's strain at break: a printed part breaks earlier than",
-        ),
+        (0.6, "60% of the material's strain at break: a printed part breaks earlier than"),
         (1.2, "120% of the material's strain at break: it breaks."),
     ],
 )

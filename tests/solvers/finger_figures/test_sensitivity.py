@@ -37,11 +37,7 @@ def solved(problem: Problem) -> dict[str, float]:
 @pytest.mark.parametrize(
     ("law", "load", "names"),
     [
-        (
-            "linear",
-            Load(stroke=4.0),
-            ("height", "poisson", "direction"),
-        ),
+        ("linear", Load(stroke=4.0), ("height", "poisson", "direction")),
         ("neo-hookean", Load(stroke=4.0), ("rib_thickness", "contact_position")),
         ("neo-hookean", Load("patch", stroke=4.0, direction=10.0), ("front_thickness", "direction")),
         ("neo-hookean", Load("cylinder", stroke=4.0, radius=6.0), ("back_thickness", "radius")),

@@ -69,10 +69,7 @@ def test_a_test_is_read_with_the_units_of_its_columns(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (
-            "force,stress_MPa\n1,2\n",
-            "a column strain or strain_percent or strain_% is needed",
-        ),
+        ("force,stress_MPa\n1,2\n", "a column strain or strain_percent or strain_% is needed"),
         ("strain,stress_MPa\n0.1,1\n0.2,x\n0.3,2\n", "stress_MPa of row 2 is 'x', which is no number"),
         ("strain,stress_MPa\n0,0\n0.2,1\n", "three points or more"),
         ("", "is no table of a tensile test"),

@@ -12,13 +12,7 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import pressed_network
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
-from solvers.pinn.finite_basis.pressed_network import (
-    PENETRATION,
-    UPDATES,
-    Minimum,
-    PressedNetwork,
-    Tangent,
-)
+from solvers.pinn.finite_basis.pressed_network import PENETRATION, UPDATES, Minimum, PressedNetwork, Tangent
 from solvers.pinn.finite_basis.solver import estimated_error
 from solvers.problem import Load, Material, Problem
 
