@@ -35,23 +35,6 @@ def test_four_factors_a_decade_from_a_billionth_to_a_thousand():
     np.testing.assert_allclose(FACTORS, np.geomspace(1e-9, 1e3, 49), rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"weights": "heavy"}, "weights must be paper or precision, got 'heavy'"),
-        ({"choose": "best"}, "choose must be given or left-out or evidence, got 'best'"),
-        ({"asm_weight": -1.0}, "asm_weight must be zero or more, got -1.0"),
-        ({"scale": np.inf}, "scale must be zero or more, got inf"),
-        ({"marker_radius": np.nan}, "marker_radius must be zero or more, got nan"),
-        ({"contact_deviation": -0.1}, "contact_deviation must be zero or more, got -0.1"),
-        ({"choose": "evidence"}, "choose=evidence needs weights=precision"),
-    ],
-)
-def test_what_is_out_of_range_is_told_with_the_solvers_name(settings, said):
-    with pytest.raises(UserError, match=f"a-solver: {said}"):
-        replace(PAPER, **settings)
-
-
 def test_limits_are_in_range():
     MarkerWeighting(solver_name="s", asm_weight=0.0, scale=0.0, marker_radius=0.0, contact_deviation=0.0)
     replace(PRECISE, choose="evidence")

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.energy_and_force import energy_and_force, harmonic_slope, section_slope
 from solvers.problem import Load, Material, Problem, contact_functional
@@ -169,16 +168,6 @@ def test_sections_by_x_are_taken_where_they_separate_base_and_contact():
         problem = problem_of(body, COARSE)
         slope = section_slope(problem, problem.mesh.at_centroids())
         assert (np.abs(slope[:, 1]).max() == 0) == linear, body
-
-
-def test_a_contact_over_a_gap_of_the_front_is_refused():
-    mesh = body_mesh("beam", COARSE)
-    x = mesh.points[mesh.boundary("front")].mean(axis=1)[:, 0]
-    front = mesh.boundary("front")[np.abs(x - 30) > 1]
-    gapped = replace(mesh, boundaries={**mesh.boundaries, "front": front})
-    Problem(gapped, load=Load(position=20.0))
-    with pytest.raises(UserError, match=r"not all on the front face, which has a gap at x = 28\.7"):
-        Problem(gapped, load=Load(position=30.0))
 
 
 @pytest.mark.parametrize("body", ["ring", "arch"])

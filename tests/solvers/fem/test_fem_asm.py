@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from solvers.assimilation.marker_weighting import FACTORS
 from solvers.assimilation.misfit import MarkerSettings, misfit_of
 from solvers.fem.assimilating import FemAsmSolver
@@ -162,18 +161,6 @@ def test_without_markers_it_is_fem(coarse_mesh):
     assert solution.field.values.tolist() == FemSolver().solve(problem).field.values.tolist()
     assert solution.solver == "fem-asm"
     assert solution.left_out is None
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"degree": 3}, "degree 1 and 2, not 3"),
-        ({"weights": "equal"}, "fem-asm: weights must be paper or precision"),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(settings, said):
-    with pytest.raises(UserError, match=said):
-        FemAsmSolver(**settings)
 
 
 @pytest.mark.parametrize("deviation", [0.0, 1.0])

@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.physics import Load, Material
 from solvers.problem import Problem
-from solvers.registry import make_solver
-from solvers.solver import UnsupportedProblemError
 
 SOFT, STIFF = (10.0, 0.3), (200.0, 0.3)
 
@@ -95,18 +92,8 @@ def test_parts_of_the_bodys_own_material_change_nothing(solver, coarse_mesh):
     np.testing.assert_allclose(*(each.state(centroids).von_mises for each in (one, other)), rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["fem-3d", "fem-id", "fem-asm", "pinn-std", "gp", "statfem"])
-def test_other_solvers_refuse_parts_in_one_line(name, coarse_mesh):
-    parted = replace(coarse_mesh, moduli=np.zeros((len(coarse_mesh.triangles), 2)))
-    solver = make_solver(name)
-    with pytest.raises(UnsupportedProblemError, match="takes a body of one material"):
-        solver.solve(Problem(parted, Material(law=solver.laws[0])))
-
-
 def test_moduli_are_a_part_of_the_mesh(coarse_mesh, tmp_path):
     parted = replace(coarse_mesh, moduli=np.tile(STIFF, (len(coarse_mesh.triangles), 1)))
     assert parted.digest != coarse_mesh.digest
     parted.save(tmp_path / "mesh.npz")
     np.testing.assert_array_equal(TriangleMesh.load(tmp_path / "mesh.npz").moduli, parted.moduli)
-    with pytest.raises(UserError, match="shape"):
-        replace(coarse_mesh, moduli=np.ones((3, 2)))

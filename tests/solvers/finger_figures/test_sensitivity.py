@@ -14,7 +14,6 @@ from solvers.finger_figures import figures_of
 from solvers.finger_figures.sensitivity import _parameters, sensitivity_of
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
-from solvers.solver import NoSolutionError
 from tests.solvers.conftest import SHORT
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
@@ -118,13 +117,3 @@ def test_the_mesh_follows_every_parameter_of_its_section(short_mesh):
     assert MovingMesh(mesh, design).of(design.replaced(fillet_radius=0.0)) is None
     with pytest.raises(pr.UserError, match="the mesh is not of the finger"):
         MovingMesh(short_mesh, design)
-
-
-def test_what_has_no_derivatives_is_refused(mesh):
-    rubbing = Load("cylinder", stroke=4.0, friction=0.3)
-    with pytest.raises(pr.UserError, match="without friction"):
-        sensitivity_of(Problem(mesh, Material(law="neo-hookean"), rubbing, None, SHORT))
-    with pytest.raises(pr.UserError, match="a cylinder needs a law of finite strain"):
-        sensitivity_of(Problem(mesh, Material(), Load("cylinder", stroke=4.0), None, SHORT))
-    with pytest.raises(NoSolutionError, match="stopped at"):
-        sensitivity_of(Problem(mesh, Material(law="neo-hookean"), Load(stroke=45.0), None, SHORT))

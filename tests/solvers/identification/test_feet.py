@@ -9,7 +9,6 @@ from solvers.fem.identification import FemIdSolver
 from solvers.identification.boundary import Feet
 from solvers.identification.model import EXACT, MarkerData, MarkerModel
 from solvers.identification.unknowns import DEFAULT, SHARE, Unknowns
-from solvers.pinn.identification.solver import PinnIdSolver
 from solvers.problem import Load, Material, Problem
 from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import observed_at
@@ -105,12 +104,6 @@ def test_a_foot_that_turned_is_found_where_the_markers_show_it(standing, pair):
     clicked = replace(seen, standard_deviations=np.full_like(shown, 0.3))
     vague = solver.solve(replace(standing, observations=clicked))
     assert "foot_1_give" in vague.status.message.split("NOT DETERMINED")[1]
-
-
-def test_the_network_is_held_at_both_feet(standing):
-    assert "feet" not in PinnIdSolver().unknowns
-    with pytest.raises(ValueError, match="pinn-id has no parameter 'feet'"):
-        _ = PinnIdSolver(parameters="normal_force,feet").unknowns
 
 
 @pytest.fixture(scope="module")

@@ -257,29 +257,6 @@ def test_without_markers_it_is_fem_nonlinear(problem):
     assert plain.solver == "fem-id"
 
 
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"parameters": "position,mass"}, "has no parameter 'mass'; it has position, width"),
-        ({"parameters": "position"}, "finds a force: give normal_force"),
-        ({"parameters": "normal_force,normal_force"}, "'normal_force' is there twice"),
-        ({"parameters": "normal_force,young"}, "cannot find young from displacements alone"),
-        ({"law": "hooke"}, "law must be evidence or given, got 'hooke'"),
-        ({"prior": 0.0}, "prior must be positive"),
-        ({"reaction": 0.0}, "a force other than zero"),
-        ({"marker_radius": -1.0}, "marker_radius must be zero or more"),
-        ({"degree": 3}, "degree 1 and 2, not 3"),
-        ({"parameters": " , "}, "finds a force: give normal_force"),
-        ({"reaction": -1.0, "reaction_error": np.nan}, "reaction_error must be positive"),
-        ({"model": "fem"}, "the linear model is gone; leave out model for finite strain, or take fem-asm"),
-        ({"model": "pinn-std"}, "model must be fem-nonlinear, got 'pinn-std'"),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(settings, said):
-    with pytest.raises(UserError, match=said):
-        FemIdSolver(**settings)
-
-
 def under(problem, loads):
     """Observations of a finger under several tractions: place, width, force along x and y, N/mm."""
     model = model_of(problem, DEFAULT)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -134,17 +133,3 @@ def test_a_refit_of_first_order_is_a_fit_for_what_a_marker_left_out_changes(prob
     np.testing.assert_allclose(predicted[0], predicted[1], atol=0.5 * NOISE)
     np.testing.assert_allclose(found.left_out[1], predicted[1], atol=0.5 * NOISE)
     assert quick.stats["seconds"] < 0.2 * whole.stats["seconds"]
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"spacing": 0.0}, "the spacing must be positive, got 0.0"),
-        ({"seed": -1}, "the seed must be zero or more, got -1"),
-        ({"parameters": "position"}, "pinn-id finds a force: give normal_force"),
-        ({"prior": 0.0}, "pinn-id: prior must be positive"),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(settings, said):
-    with pytest.raises(UserError, match=said):
-        PinnIdSolver(**settings)

@@ -7,7 +7,6 @@ import pytest
 import torch
 
 from compare.evaluation.truths import virtual_experiment
-from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
 from solvers.fem.assimilating import FemAsmSolver
@@ -16,8 +15,6 @@ from solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalAsmSolver,
 from solvers.pinn.paper.solver import PaperPinnAsmSolver
 from solvers.pinn.paper.trained_field import MlpField
 from solvers.problem import Load, Material, Problem, contact_functional
-from solvers.registry import PRESETS, make_solver
-from solvers.solver import TrainedSolver, Traits
 from tests.solvers.conftest import bar_mesh
 from tests.solvers.pinn.autograd_reference import PlainPinn
 
@@ -203,16 +200,6 @@ def test_a_contact_that_is_not_certain_is_one_on_springs(problem):
     assert max(distances(certain, exact, problem)) > 0.02
 
 
-def test_a_patch_is_certain(problem):
-    with pytest.raises(UserError, match="pinn-asm: every point of a patch moves as prescribed"):
-        PinnAsmSolver(contact_deviation=1.0).solve(replace(problem, load=Load(kind="patch")))
-
-
-def test_no_weights_are_chosen_at_finite_strain(bent):
-    with pytest.raises(UserError, match="choose=left-out is for the linear law; take given"):
-        PinnAsmSolver(choose="left-out").solve(bent)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", [PinnAsmSolver, PinnLocalAsmSolver])
 def test_simulated_markers_are_met_as_by_finite_elements(usual_mesh, solver):
@@ -312,32 +299,3 @@ def test_the_papers_loss_is_energy_plus_misfit_over_the_area(problem, settings):
         for size in (1e-3, 5e-4)
     ]
     assert rest[0] / rest[1] == pytest.approx(4, rel=0.05)
-
-
-def test_they_say_that_they_assimilate():
-    for name, said in (("pinn-asm", True), ("pinn-std", False)):
-        presets = [make_solver(name, preset=preset) for preset in PRESETS[name]]
-        assert [Traits.of(each).assimilates for each in presets] == [said] * 4
-
-
-def test_the_papers_preset_is_trained_and_takes_the_centres():
-    solver = make_solver("pinn-asm", preset="paper")
-    assert isinstance(solver, TrainedSolver)
-    assert solver.assimilates
-    assert solver.settings()["marker_radius"] == 0
-    assert make_solver("pinn-asm").settings()["marker_radius"] is None
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"asm_weight": -1.0}, "asm_weight must be zero or more, got -1"),
-        ({"preset": "paper", "asm_weight": -1.0}, "asm_weight must be zero or more, got -1"),
-        ({"contact_deviation": -1.0}, "contact_deviation must be zero or more, got -1"),
-        ({"choose": "evidence"}, "choose=evidence needs weights=precision"),
-        ({"steepness": 0.0}, "steepness must be positive, got 0"),
-    ],
-)
-def test_bad_settings_are_refused(settings, said):
-    with pytest.raises(UserError, match=f"pinn-asm: {said}"):
-        make_solver("pinn-asm", **settings)

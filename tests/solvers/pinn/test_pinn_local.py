@@ -10,7 +10,7 @@ import torch
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.mesh.boundary import boundary_widths, mean_thickness, re_entrant_points, singular_points
+from geometry.mesh.boundary import boundary_widths, re_entrant_points, singular_points
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers import stability
@@ -59,11 +59,6 @@ def test_singular_points_are_the_cells_corners_and_the_bases_ends(coarse_mesh):
     assert len(found) == 5 * 4 + 2
     for corner in ([2.0, -2.0], [70.0, -2.0], [0.0, 0.0], [0.0, -30.0]):
         assert np.linalg.norm(found - corner, axis=1).min() < 1e-9
-
-
-def test_mean_thickness_of_a_long_bar_is_its_height():
-    mesh = bar_mesh(400.0, 2.0, 200, 2, contact=(0.0, 4.0))
-    assert mean_thickness(mesh) == pytest.approx(2 * 400 * 2 / (2 * 402), rel=1e-12)
 
 
 def test_widths_are_those_of_walls_and_of_narrower_cavities(coarse_mesh):
@@ -337,16 +332,3 @@ def test_too_few_windows_are_reported_as_not_converged(usual_mesh):
     solution = PinnLocalSolver(wall_spacing=1.2, corner_spacing=0.5, neurons=2).solve(Problem(usual_mesh))
     assert not solution.status.converged
     assert "take a smaller spacing" in solution.status.message
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"neurons": 1}, "neurons >= 2"),  # one neuron and a constant cannot follow a linear field
-        ({"wall_spacing": 0.0}, "wall_spacing must be positive, got 0"),
-        ({"coarser": 1.0}, "coarser > 1"),  # two equal levels would always agree
-    ],
-)
-def test_bad_settings_are_refused(settings, message):
-    with pytest.raises(UserError, match=message):
-        PinnLocalSolver(**settings)

@@ -6,7 +6,6 @@ import pytest
 from solvers.pinn.paper.solver import PaperPinnSolver
 from solvers.pinn.threading import torch_threads
 from solvers.problem import Load, Material, Problem
-from solvers.solver import TrainedSolver
 from tests.solvers.conftest import bar_mesh
 from tests.solvers.pinn.autograd_reference import PlainPinn
 
@@ -46,8 +45,3 @@ def test_first_epochs_of_every_variant(coarse_mesh, settings, material, load):
     for epoch in range(5):
         ours = [history[name][epoch] for name in ("PDE", "BC", "total")]
         np.testing.assert_allclose(ours, plain.step(), rtol=1e-10)
-
-
-def test_it_is_a_trained_solver():
-    assert isinstance(PaperPinnSolver(), TrainedSolver)
-    assert PaperPinnSolver().settings()["preset"] == "paper"

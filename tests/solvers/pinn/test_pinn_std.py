@@ -5,7 +5,6 @@ import pytest
 import torch
 
 from geometry.cache import finger_mesh
-from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
@@ -183,16 +182,3 @@ def test_too_few_encoders_are_reported_as_not_converged(short_mesh):
 def test_point_load_of_the_paper_is_met(short_mesh):
     solution = PinnStdSolver(**QUICK).solve(Problem(short_mesh, load=Load(kind="point")))
     np.testing.assert_allclose(solution.displacement([[20.0, 0.0]]), [[0.0, -10.0]], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"neurons": 1}, "neurons >= 2"),  # a neuron and a constant cannot follow a linear field
-        ({"seed": -1}, "seed >= 0"),  # NumPy's generators refuse it with a traceback
-        ({"gate_width": -1.0}, "gate_width must be positive, got -1"),
-    ],
-)
-def test_bad_settings_are_refused(settings, message):
-    with pytest.raises(UserError, match=message):
-        PinnStdSolver(**settings)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from geometry.errors import UserError
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
@@ -171,12 +170,3 @@ def test_neurons_that_turn_a_point_inside_out_are_left_out(bent, monkeypatch):
     monkeypatch.setattr(ConstrainedNetwork, "step_from", leap)
     drawn = PinnLocalSolver(**SMALL, growth=0.8).solve(bent)
     assert TrainedPinnSolver(**STEPS).solve(bent).energy == pytest.approx(drawn.energy, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [({"steps": 0}, "steps"), ({"radius": 1.0}, "overlap"), ({"neurons": 1}, "neurons")],
-)
-def test_settings_without_sense_are_refused(settings, message):
-    with pytest.raises(UserError, match=message):
-        TrainedPinnSolver(**settings)

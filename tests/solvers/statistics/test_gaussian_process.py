@@ -10,7 +10,6 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from geometry.errors import UserError
 from solvers.problem import Load, Problem
-from solvers.registry import make_solver
 from solvers.statistics.gaussian_process import GaussianProcessSolver
 from solvers.statistics.kernel_field import SMOOTHNESS
 from tests.solvers.conftest import check_gradient, observed_at
@@ -145,8 +144,3 @@ def test_the_evidence_is_that_of_the_normal_distribution(problem, kernel):
         covariance += np.diag(observations.standard_deviations[seen, axis] ** 2)
         expected += multivariate_normal.logpdf(observations.displacements[seen, axis], cov=covariance)
     assert solution.stats["log_evidence"] == pytest.approx(expected, abs=1e-4)
-
-
-def test_an_unknown_kernel_is_refused():
-    with pytest.raises(UserError, match=r"kernel.*matern32"):
-        make_solver("gp", kernel="cubic")

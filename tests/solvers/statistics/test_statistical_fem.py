@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from geometry.errors import UserError
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
@@ -148,12 +147,6 @@ def test_without_markers_it_is_fem(coarse_mesh):
     solution = StatFemSolver().solve(problem)
     assert solution.field.values.tolist() == FemSolver().solve(problem).field.values.tolist()
     assert (solution.solver, solution.left_out) == ("statfem", None)
-
-
-@pytest.mark.parametrize("settings", [{"degree": 0}, {"stroke_deviation": -1.0}])
-def test_settings_that_make_no_sense_are_refused(settings):
-    with pytest.raises(UserError, match="statfem"):
-        StatFemSolver(**settings)
 
 
 def test_at_finite_strain_its_own_model_is_reproduced(coarse_mesh):

@@ -8,8 +8,6 @@ import pytest
 from compare.crossval.true_fields import FieldSampler
 from compare.evaluation.certification import with_certificates
 from compare.evaluation.evaluation import Evaluation
-from compare.report.text import certificate_sentences
-from geometry.errors import UserError
 from solvers.extrusion import ExtrudedSpace
 from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -150,21 +148,12 @@ def test_force_is_the_slope_of_the_energy(wedge):
     assert abs(force[0]) < 1e-8  # u is free
 
 
-def test_a_finger_of_other_depth_is_stiffer_where_it_is_deeper(wedge):
-    forces = [
-        Fem3dSolver(layers=2).solve(Problem(replace(wedge, depth=depth), load=SLIDING)).reaction[1]
-        for depth in (2.0, 20.0)
-    ]
-    assert forces[1] < 1.05 * forces[0] < 0
-
-
 def test_plane_strain_does_not_certify_it(wedge):
     problem = Problem(wedge, load=Load(displacement=(0.0, -2.0)))
     evaluation = Evaluation.of(Fem3dSolver(layers=1).solve(problem), wedge)
     (judged,) = with_certificates([evaluation], problem)
     assert judged.converged
     assert judged.certificate is None
-    assert "three dimensions" in certificate_sentences(judged)
 
 
 def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
@@ -175,24 +164,6 @@ def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
     np.testing.assert_array_equal(sampled.state(solution.problem).von_mises, expected)
     plane = State.from_gradient(sampled.gradient[:, :2, :2], solution.problem).von_mises
     assert np.abs(plane - expected).max() > 0.01 * expected.max()
-
-
-@pytest.mark.parametrize(
-    ("settings", "text"),
-    [
-        ({"layers": 0}, "at least 1 layer"),
-        ({"grading": 0.0}, "0 < grading <= 1"),  # a layer without thickness
-        ({"grading": 2.0}, "0 < grading <= 1"),  # thicker where the stress changes
-        ({"face": "top"}, "side, middle"),
-        ({"sides": "loose"}, "free, held"),
-        ({"linear_solver": "fast"}, "auto, direct, iterative"),
-        ({"max_step": 0.0}, "min_step <= max_step"),
-        ({"tolerance": 1e30}, r"0 < tolerance <= 0.001, not 1e\+30"),  # the linear guess would do
-    ],
-)
-def test_wrong_settings_are_refused(settings, text):
-    with pytest.raises(UserError, match=text):
-        Fem3dSolver(**settings)
 
 
 @pytest.mark.mpi
@@ -220,9 +191,7 @@ def test_multigrid_finds_what_factors_find(wedge, law, load):
     )
     assert iterative.status.converged
     assert iterative.stats["iterations"] > 0
-    assert iterative.energy == pytest.approx(
-        direct.energy, rel=1e-7
-    )  # Newton's criterion is 1e-8 of the force
+    assert iterative.energy == pytest.approx(direct.energy, rel=1e-7)  # Newton's is 1e-8 of the force
     gap = iterative.displacement(wedge.markers) - direct.displacement(wedge.markers)
     assert np.abs(gap).max() < 1e-5  # mm
 
@@ -251,15 +220,7 @@ def test_an_indefinite_matrix_is_solved_by_minres(wedge):
         ("auto", 10.0, True),  # they do not, but coarser matrices do
         ("direct", 40.0, False),
         ("iterative", 40.0, True),
-        ("auto", 2.0, "fewer layers"),  # not even multigrid fits
-        ("direct", 10.0, "linear_solver=iterative"),
     ],
 )
-def test_the_linear_solver_is_chosen_by_memory_or_the_advice_given(asked, free, iterative):
-    if isinstance(iterative, str):
-        with pytest.raises(UserError, match=iterative):
-            affordable(1_000_000, 13, asked, free)
-        return
-    cost = affordable(1_000_000, 13, asked, free)
-    assert cost.iterative is iterative
-    assert cost.words.startswith("1,000,000 unknowns")
+def test_the_linear_solver_is_chosen_by_memory(asked, free, iterative):
+    assert affordable(1_000_000, 13, asked, free).iterative is iterative
