@@ -10,19 +10,10 @@ import pytest
 from benchmarks.results.default_time import StageTime
 
 ROOT = Path(__file__).parents[2]
+SETTINGS = ("pinn-std.preset=fast", "pinn-std.wall_spacing=1.8", "pinn-std.corner_spacing=0.1")
 RUN = [
-    "compare",
-    "--quiet",
-    "--solvers",
-    "fem,pinn-std",
-    "--mesh-size",
-    "2",
-    "--solver-set",
-    "pinn-std.preset=fast",
-    "--solver-set",
-    "pinn-std.wall_spacing=1.8",
-    "--solver-set",
-    "pinn-std.corner_spacing=0.1",
+    *("compare", "--quiet", "--solvers", "fem,pinn-std", "--mesh-size", "2"),
+    *(word for setting in SETTINGS for word in ("--solver-set", setting)),
     "--out",
 ]
 

@@ -7,6 +7,6 @@ from benchmarks.reliability.inputs import tried
 
 @pytest.mark.usefixtures("few_elements")
 def test_random_input_gives_a_result_or_one_line() -> None:
-    found = tried(60)
+    found = tried(24)
     assert not found.wrong
-    assert found.states["done"] >= 5
+    assert found.states["done"] >= 2

@@ -69,12 +69,10 @@ def ended(solution: Solution) -> None:
 
 def test_a_marker_that_was_seen_has_a_prediction_without_it(coarse_mesh: TriangleMesh) -> None:
     """Else its mean error would be no number."""
-    left_out = np.zeros((9, 2))
+    still, left_out = np.zeros((2, 9, 2))
     left_out[3] = np.nan
     beam = Beam({"left_out": left_out, "solver": "fem"})
-    unseen, seen = (
-        observed_at(coarse_mesh.markers, 0 * left_out, 0.0, np.arange(9) != row) for row in (3, 4)
-    )
+    unseen, seen = (observed_at(coarse_mesh.markers, still, 0.0, np.arange(9) != row) for row in (3, 4))
     assert solved(beam, Problem(coarse_mesh, observations=unseen)).solver == "beam"
     with pytest.raises(UserError, match="left_out that is not finite everywhere"):
         solved(beam, Problem(coarse_mesh, observations=seen))

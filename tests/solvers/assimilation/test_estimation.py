@@ -11,7 +11,6 @@ from scipy.optimize import least_squares
 from scipy.stats import binom, chi2, lognorm, norm, t
 
 from geometry.arrays import FloatArray
-from solvers.assimilation import estimation
 from solvers.assimilation.estimation import (
     Estimate,
     Parameter,
@@ -136,14 +135,6 @@ def test_bounds_hold(slopes):
 LENGTH = Parameter("length", "mm", 3.0, 0.5)
 FACTOR = Parameter("factor", "", 2.0, 0.25, logarithmic=True)
 ONE = Parameter("one", "", 0.0, 1.0)
-
-
-def test_what_is_not_given_is_as_documented() -> None:
-    """Levels, rounds and steps of every published estimate."""
-    assert (estimation.LEVEL, estimation.MIN_RESOLUTION) == (0.95, 0.5)
-    assert (estimation.MAX_ROUNDS, estimation.INFLATION_CHANGE) == (8, 0.01)
-    assert (estimation.MAX_STEPS, estimation.COST_CHANGE) == (12, 1e-4)
-    assert (ONE.low, ONE.high, ONE.logarithmic) == (-inf, inf, False)
 
 
 @pytest.mark.parametrize("z", [-2.0, 0.0, 1.3])

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from geometry.arrays import FloatArray
-from solvers.assimilation.marker_forces import MarkerForces, residual_phrase, root_mean_square
+from solvers.assimilation.marker_forces import MarkerForces
 
 MARKERS, UNKNOWNS = 3, 9
 
@@ -58,12 +58,6 @@ def test_the_fit_is_the_minimiser_of_energy_plus_misfit(springs: Springs, factor
     assert fit.forces.shape == fit.residual.shape == fit.residual_without.shape == (MARKERS, 2)
 
 
-def test_the_weights_count_once_if_no_factor_is_given(springs: Springs) -> None:
-    forces = springs.forces()
-    np.testing.assert_array_equal(forces.fit().residual, forces.fit(1.0).residual)
-    assert forces.log_evidence(0.3) == forces.log_evidence(0.3, 1.0)
-
-
 @pytest.mark.parametrize("factor", [0.2, 30.0])
 def test_what_is_left_out_is_what_a_fit_to_the_others_misses(springs: Springs, factor: float) -> None:
     left_out = springs.forces().fit(factor).residual_without
@@ -93,12 +87,3 @@ def test_a_direction_in_which_nothing_gives_way_stays_as_it_is() -> None:
     stiff = np.array([2.0, -1.0, 0.0, 0.0])
     forces = MarkerForces(compliance, np.ones((2, 2)), stiff.reshape(2, 2))
     np.testing.assert_allclose(forces.fit(1e14).residual.ravel(), stiff, atol=0.05)
-
-
-def test_the_residuals_in_words(springs: Springs) -> None:
-    assert root_mean_square(np.array([[3.0, 4.0], [0.0, 0.0]])) == 2.5
-    said = "root mean square residual at the markers: 2.5 mm in the fit, 0.012 mm when they are left out"
-    three = np.array([[3.0, 4.0], [0.0, 0.0]])
-    assert residual_phrase(three, np.full((3, 2), 0.0123)) == said
-    fit = springs.forces().fit()
-    assert fit.phrase == residual_phrase(fit.residual, fit.residual_without)

@@ -31,16 +31,6 @@ def problem(coarse_mesh) -> Problem:
     return Problem(coarse_mesh, observations=observed_at(coarse_mesh.markers, moved, 0.02))
 
 
-def test_four_factors_a_decade_from_a_billionth_to_a_thousand():
-    np.testing.assert_allclose(FACTORS, np.geomspace(1e-9, 1e3, 49), rtol=1e-12)
-
-
-def test_limits_are_in_range():
-    MarkerWeighting(solver_name="s", asm_weight=0.0, scale=0.0, marker_radius=0.0, contact_deviation=0.0)
-    replace(PRECISE, choose="evidence")
-    replace(PAPER, choose="left-out")
-
-
 def test_the_compliance_of_the_contact_is_its_variance_over_the_scale():
     assert replace(PRECISE, contact_deviation=0.3).slack == pytest.approx(0.09 / 0.3)
     assert PAPER.slack == 0

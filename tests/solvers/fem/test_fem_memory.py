@@ -50,10 +50,6 @@ def test_every_object_of_petsc_is_destroyed(name, law, kind):
     )
     assert done.returncode == 0, done.stderr
     table = done.stdout.partition("Object Type")[2].partition("===")[0]
-    counts = {
-        kind.strip(): (int(a), int(b)) for kind, a, b in re.findall(r"^ *(.+?) +(\d+) +(\d+)$", table, re.M)
-    }
-    assert counts["Vector"][0] > 0
-    assert {
-        kind: made - gone for kind, (made, gone) in counts.items() if made != gone and kind != "Viewer"
-    } == {}
+    counts = re.findall(r"^ *(.+?) +(\d+) +(\d+)$", table, re.M)
+    assert "Vector" in {kind for kind, *_ in counts}
+    assert [row for row in counts if row[1] != row[2] and row[0] != "Viewer"] == []

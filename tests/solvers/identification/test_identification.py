@@ -19,6 +19,8 @@ from solvers.problem import Load
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.twins import NOISE, TRUE, marked, model_of, twin
 
+FORCE = "position,normal_force,tangential_force"
+
 
 def test_a_twin_is_found_with_its_law(identified):
     """Each within three of its standard deviations, by the law that made it."""
@@ -138,28 +140,16 @@ def test_the_field_and_its_deviations_hold_the_truth(identified, problem):
     """Of the body's points, 95 % are asked for; one draw of the noise moves all of them together."""
     _, true, solution = identified
     location = body_quadrature(problem.mesh).location
-    drawn = LagrangeSpace(problem.mesh, 1).shape_functions(location) @ true.state
-    walls = WallsOf(true, solution)
-    off = np.abs(walls.in_space(location, drawn) - solution.displacement_in_space(location))
+    # The truth's displacement is where its material is, to first order as the field has it.
+    space, member = LagrangeSpace(problem.mesh, 1), solution.field.members[0]
+    gradients = np.stack([d @ true.state for d in space.shape_gradients(location)], axis=-1)
+    shifts = member.found.walls.shifts(location, true.hypothesis.changes)
+    drawn = space.shape_functions(location) @ true.state - np.einsum("nij,nj->ni", gradients, shifts)
+    exact = true.motion.moved(location.points + drawn) - location.points
+    off = np.abs(exact - solution.displacement_in_space(location))
     deviation = solution.field.standard_deviation(location)
     assert (off < 2 * deviation).mean() > 0.8
     assert 0 < deviation.max() < 0.2
-
-
-class WallsOf:
-    """The truth's displacement where its material is, to first order as the field has it."""
-
-    def __init__(self, true, solution):
-        self._true, self._walls = true, solution.field.members[0].found.walls
-        self._space = solution.field.members[0].model.body.space
-
-    def in_space(self, location, drawn):
-        gradients = np.stack([d @ self._true.state for d in self._space.shape_gradients(location)], axis=-1)
-        shifts = self._walls.shifts(location, self._true.hypothesis.changes)
-        return (
-            self._true.motion.moved(location.points + drawn - np.einsum("nij,nj->ni", gradients, shifts))
-            - location.points
-        )
 
 
 def test_the_stress_deviation_is_that_of_refits(problem):
@@ -169,13 +159,9 @@ def test_the_stress_deviation_is_that_of_refits(problem):
     """
     centroids = problem.mesh.at_centroids()
     found, stated = [], []
-    solver = FemIdSolver(
-        degree=1, law="given", parameters="position,normal_force,tangential_force", prior=9.0
-    )
-    refit = None
+    refit = FemIdSolver(degree=1, law="given", parameters=FORCE, prior=9.0).refitter(problem)
     for seed in range(12):
         observed, _ = twin(problem, "neo-hookean", {"normal_force": 0.18}, seed=seed)
-        refit = refit or solver.refitter(problem)
         solution = refit(observed)
         found.append(solution.state(centroids).von_mises)
         stated.append(solution.field.von_mises_deviation(centroids))
@@ -199,9 +185,7 @@ def test_a_marker_left_out_in_closed_form_is_nearly_that_of_a_refit(identified, 
     refit = FemIdSolver(degree=1).refitter(problem)
     refit(observed)
     for marker in (0, 4, 8):
-        visible = np.ones(9, dtype=bool)
-        visible[marker] = False
-        again = refit(replace(observed, visible=visible))
+        again = refit(replace(observed, visible=np.arange(9) != marker))
         there = again.displacement_in_space(problem.mesh.markers[[marker]])[0]
         # The closed form is of first order, and it takes the mean over the marker's disc.
         np.testing.assert_allclose(solution.left_out[marker], there, atol=0.5 * NOISE)
@@ -211,10 +195,8 @@ def test_a_reaction_finds_young(problem):
     """Twice as stiff under twice the force: the markers are the same, and the force tells."""
     observed, true = twin(problem, "neo-hookean", {"normal_force": 0.18})
     twice = 2 * true.hypothesis.force[1]
-    names = "position,normal_force,tangential_force,young"
-    solver = FemIdSolver(
-        degree=1, law="given", parameters=names, reaction=twice, reaction_error=0.01, prior=3.0
-    )
+    known = {"parameters": f"{FORCE},young", "reaction": twice, "reaction_error": 0.01, "prior": 3.0}
+    solver = FemIdSolver(degree=1, law="given", **known)
     solution = solver.solve(replace(problem, observations=observed))
     assert solution.stats["young"] == pytest.approx(2 * 11.4, rel=0.05)
     assert solution.reaction[1] == pytest.approx(twice, rel=0.02)
@@ -253,7 +235,6 @@ def test_without_markers_it_is_fem_nonlinear(problem):
     small = replace(problem, load=Load(displacement=(0.0, -1.0)))
     plain = FemIdSolver(degree=1).solve(small)
     np.testing.assert_array_equal(plain.field.values, FemNonlinearSolver(degree=1).solve(small).field.values)
-    assert plain.status.message.startswith("without markers, this is fem-nonlinear: all of the load applied")
     assert plain.solver == "fem-id"
 
 
@@ -278,7 +259,6 @@ def test_two_contacts_are_said_to_be_something_else(problem):
     solver = FemIdSolver(degree=1, law="given")
     solution = solver.solve(under(problem, [(20, 4, 0, -0.15), (55, 4, 0, -0.1)]))
     assert solution.stats["inflation"] > 3
-    assert "no values of these parameters explain them" in solution.status.message
     assert any("TIMES AS FAR FROM ANY FINGER" in said for said in solution.status.warnings)
     assert solution.stats["force_low"] < 0.25 < solution.stats["force_high"]
     assert solution.stats["force_high"] - solution.stats["force_low"] > 0.05

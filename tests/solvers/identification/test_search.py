@@ -65,9 +65,8 @@ def test_a_wrong_marker_is_found_and_not_used(identified, problem):
     observed, true, right = identified
     moved = observed.displacements.copy()
     moved[5] += [1.6, -1.2]
-    solution = FemIdSolver(degree=1).solve(
-        replace(problem, observations=replace(observed, displacements=moved))
-    )
+    seen = replace(observed, displacements=moved)
+    solution = FemIdSolver(degree=1).solve(replace(problem, observations=seen))
     assert "MARKER 6 of those seen CONTRADICTS the others by 2 mm: not used" in solution.status.message
     assert solution.stats["inflation"] == 1
     assert solution.stats["force"] == pytest.approx(right.stats["force"], rel=0.1)
@@ -167,9 +166,8 @@ def test_a_wide_contact_is_searched_with_its_width_held(identified, problem, mon
 
     monkeypatch.setattr(LawFits, "fit", fit)
     moved = identified[0].displacements + 0.1 * np.random.default_rng(1).normal(size=(9, 2))
-    FemIdSolver(degree=1, law="given").solve(
-        replace(problem, observations=replace(identified[0], displacements=moved))
-    )
+    seen = replace(identified[0], displacements=moved)
+    FemIdSolver(degree=1, law="given").solve(replace(problem, observations=seen))
     assert tuple(asked[:2]) == WIDE
 
 
