@@ -124,11 +124,6 @@ def test_a_recorded_path_gives_the_force_on_the_way() -> None:
         alone.force_at(5.0)
 
 
-def test_a_plane_body_has_no_figures() -> None:
-    with pytest.raises(ValueError, match="a finger with a depth"):
-        figures_of(FemSolver(estimate=False).solve(replace(PROBLEM, finger=None)))
-
-
 def test_walls_and_gaps_of_a_finger_with_known_ones() -> None:
     thin = Design(rib_thickness=1.2, back_thickness=3.0, rib_angle=0.0)
     assert thinnest_wall(thin.section) == pytest.approx(1.2, abs=1e-6)

@@ -9,8 +9,7 @@ import torch
 
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.boundary import boundary_widths, re_entrant_points, singular_points
+from geometry.mesh.boundary import boundary_widths, singular_points
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers import stability
@@ -75,15 +74,6 @@ def test_there_is_a_third_level_only_where_two_are_not_enough(coarse_mesh):
         for tolerance in (1e-9, 1.0)
     ]
     assert levels == [3, 2]
-
-
-@pytest.mark.slow
-def test_points_of_a_fillet_are_no_sharp_corners():
-    mesh = finger_mesh(Design(fillet_radius=1.0), settings=MeshSettings(size=0.5))
-    sharp, round_, radius = re_entrant_points(mesh)
-    assert len(sharp) == 2, "the ends of the base"
-    assert len(round_) >= 5 * 4 * 3
-    assert radius == pytest.approx(1.0, rel=0.1)
 
 
 def test_cut_triangles_keep_the_area_and_meet_the_spacing(coarse_mesh, spacing):
@@ -230,21 +220,6 @@ def test_a_window_without_quadrature_points_does_no_harm(coarse_mesh):
     found = hessian.factorised(1e-12).solve(np.ones((1, 2 * basis.windows.count * basis.per_window)))
     assert hessian.size == basis.windows.count > len(energy.patches[0].near)
     assert np.isfinite(found).all()
-
-
-@pytest.mark.slow
-def test_displacement_and_stress_are_those_of_finite_elements():
-    """Against quadratic elements graded to 0.002 mm at the corners; 0.02 % and 1.7 % in stress are usual."""
-    mesh = finger_mesh(Design())
-    graded = finger_mesh(Design(), settings=MeshSettings(corner_size=0.002))
-    network, reference = PinnLocalSolver().solve(Problem(mesh)), FemSolver().solve(Problem(graded))
-    displacement, stress = distances(network, reference)
-    assert displacement < 0.002
-    assert stress < 0.02
-    assert network.status.converged, network.status.message
-    assert network.energy == pytest.approx(reference.energy, rel=0.005)
-    assert network.energy > reference.energy
-    assert np.abs(network.displacement(mesh.markers) - reference.displacement(mesh.markers)).mean() < 0.01
 
 
 FAST = PinnLocalSolver(wall_spacing=0.8, corner_spacing=0.05, neurons=4)
