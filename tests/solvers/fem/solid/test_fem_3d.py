@@ -20,7 +20,7 @@ from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import bar_mesh, beam_compliance
 from tests.solvers.fem.test_fem_ranks import reported
 
-SLIDING = Load(kind="patch", displacement=(None, -4.0))
+SLIDING, FINITE = Load(kind="patch", displacement=(None, -4.0)), ("neo-hookean", "st-venant-kirchhoff")
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +78,7 @@ def test_pure_bending_is_exact():
         np.testing.assert_allclose(state.von_mises, np.abs(expected), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_narrow_beam_bends_with_youngs_modulus():
     """Tip force of Timoshenko's beam; the modulus of plane strain would be a tenth larger."""
     mesh = replace(bar_mesh(40.0, 4.0, 40, 4, contact=(38.0, 40.0)), depth=2.0)
@@ -87,7 +88,7 @@ def test_a_narrow_beam_bends_with_youngs_modulus():
     assert solution.reaction[1] == pytest.approx(force, rel=0.01)  # the clamp stiffens it a little
 
 
-@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
+@pytest.mark.parametrize("law", ["linear", *(pytest.param(law, marks=pytest.mark.slow) for law in FINITE)])
 def test_held_side_faces_make_plane_strain(wedge, law):
     problem = Problem(wedge, Material(law=law), SLIDING)
     solid = Fem3dSolver(sides="held", layers=2).solve(problem)
@@ -99,6 +100,7 @@ def test_held_side_faces_make_plane_strain(wedge, law):
     assert np.abs(gap).max() < 0.005
 
 
+@pytest.mark.slow
 def test_a_cylinder_between_held_side_faces_presses_as_in_the_plane(wedge):
     load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -2.0))
     problem = Problem(wedge, Material(law="neo-hookean"), load)
@@ -124,6 +126,7 @@ def test_a_thin_finger_is_in_plane_stress(wedge):
     assert np.linalg.norm(ours - theirs) < 0.05 * np.linalg.norm(theirs)
 
 
+@pytest.mark.slow
 def test_the_side_face_carries_no_traction():
     """Beside clamp and patch of a deep ring; 0.12 is the elements', and 0.09 with those of 1 mm."""
     mesh = replace(body_mesh("ring", 1.5), depth=20.0)
@@ -135,6 +138,7 @@ def test_the_side_face_carries_no_traction():
     assert across["side"] < 0.2 * across["middle"]
 
 
+@pytest.mark.slow
 def test_force_is_the_slope_of_the_energy(wedge):
     """Of three equilibria at finite strain, by a central difference."""
     energies = []
@@ -166,6 +170,7 @@ def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
     assert np.abs(plane - expected).max() > 0.01 * expected.max()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_two_ranks_find_what_one_finds(start_ranks, wedge, tmp_path):
     wedge.save(tmp_path / "mesh.npz")

@@ -46,6 +46,7 @@ def test_a_bar_bends_sideways_as_timoshenkos(depth):
     assert 1 / found.sideways == pytest.approx(bending + (HEIGHT / 2) ** 2 * twisting, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_stiffness_does_not_depend_on_law_load_or_linear_solver():
     problem = bar(4.0)
     given = Fem3dSolver(layers=1, lateral=True).solve(problem).lateral
