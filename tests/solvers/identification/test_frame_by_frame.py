@@ -143,6 +143,7 @@ def test_markers_that_no_force_explains_are_told(drawn_path, tracker_of):
     assert found.high - found.low > 3 * (plain.high - plain.low)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["neo-hookean", "st-venant-kirchhoff"])
 def test_the_law_is_that_of_the_finger(problem, law):
     own = replace(problem, material=Material(law=law))

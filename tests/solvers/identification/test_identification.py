@@ -36,6 +36,7 @@ def test_a_twin_is_found_with_its_law(identified):
     np.testing.assert_allclose(solution.reaction, true.hypothesis.force, rtol=0.1, atol=0.02)
 
 
+@pytest.mark.slow
 def test_markers_that_are_well_known_tell_the_law_that_is_less_expected(problem):
     observed, true = twin(problem, "st-venant-kirchhoff", {"normal_force": 0.24}, noise=1e-3)
     solution = sought(problem, replace(observed, standard_deviations=np.full((9, 2), 1e-3)))
