@@ -60,7 +60,15 @@ ACCURACY = {
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training."""
 
 
-@pytest.fixture(scope="module", params=NAMES)
+SLOW = ("fem-3d", "pinn-std local", "pinn-asm local", "pinn-id")
+"""Solvers that have a quicker one of their kind beside them."""
+
+
+def case(name: str, *given: str):
+    return pytest.param(name, *given, marks=[pytest.mark.slow] * (name in SLOW))
+
+
+@pytest.fixture(scope="module", params=[case(name) for name in NAMES])
 def solver(request, plugin_folder):
     sys.path.insert(0, str(plugin_folder))
     yield make_solver(request.param.partition(" ")[0], **QUICK.get(request.param, {}))
@@ -88,7 +96,9 @@ def test_every_registered_solver_is_in_this_suite(plugin_folder, monkeypatch):
 
 @pytest.mark.parametrize(
     ("solver", "kind"),
-    [(name, kind) for name, kind in PAIRS if kind in LOADS[name] and kind != "cylinder"],  # test_cylinder.py
+    [
+        case(*each) for each in PAIRS if each[1] in LOADS[each[0]] and each[1] != "cylinder"
+    ],  # it has tests
     indirect=["solver"],
 )
 def test_every_load_that_the_solver_has_is_met_and_the_base_is_at_rest(solver, short_mesh, kind):
@@ -168,7 +178,7 @@ def test_settings_are_json_and_status_is_a_sentence(solver, solution):
 
 
 @pytest.mark.parametrize(
-    ("solver", "kind"), [(name, kind) for name, kind in PAIRS if kind not in LOADS[name]], indirect=["solver"]
+    ("solver", "kind"), [case(*each) for each in PAIRS if each[1] not in LOADS[each[0]]], indirect=["solver"]
 )
 def test_a_load_that_the_solver_does_not_have_is_refused(solver, short_mesh, kind):
     load = Load(kind=kind, radius=5.0 if kind == "cylinder" else None, displacement=(0.0, -2.0))
