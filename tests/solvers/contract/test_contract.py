@@ -96,9 +96,7 @@ def test_every_registered_solver_is_in_this_suite(plugin_folder, monkeypatch):
 
 @pytest.mark.parametrize(
     ("solver", "kind"),
-    [
-        case(*each) for each in PAIRS if each[1] in LOADS[each[0]] and each[1] != "cylinder"
-    ],  # it has tests
+    [case(*each) for each in PAIRS if each[1] in LOADS[each[0]] and each[1] != "cylinder"],  # it has tests
     indirect=["solver"],
 )
 def test_every_load_that_the_solver_has_is_met_and_the_base_is_at_rest(solver, short_mesh, kind):
