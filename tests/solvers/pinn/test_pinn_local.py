@@ -34,6 +34,9 @@ from solvers.solution import State
 from tests.solvers.conftest import SHORT, bar_mesh, distances
 
 
+OTHERS = ("linear", "st-venant-kirchhoff")
+
+
 @pytest.fixture(scope="module")
 def spacing(coarse_mesh) -> PointSpacing:
     return PointSpacing.of(Problem(coarse_mesh), wall=0.5, corner=0.05, growth=0.3)
@@ -138,7 +141,9 @@ def test_patches_hold_every_point_once(coarse_mesh):
     assert max(len(patch) for patch in patches) <= PATCH
 
 
-@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
+@pytest.mark.parametrize(
+    "law", ["neo-hookean", *(pytest.param(law, marks=pytest.mark.slow) for law in OTHERS)]
+)
 def test_hessian_is_the_derivative_of_the_slope_and_that_of_the_energy(basis, coarse_mesh, law):
     """Differences in one direction, of the energy that the law's density gives at the quadrature points."""
     rule = body_quadrature(coarse_mesh, 2)
