@@ -33,7 +33,6 @@ from solvers.problem import Load, Material, Problem
 from solvers.solution import State
 from tests.solvers.conftest import SHORT, bar_mesh, distances
 
-
 OTHERS = ("linear", "st-venant-kirchhoff")
 
 
