@@ -117,7 +117,7 @@ def test_slopes_by_walls_and_moduli_are_those_of_differences(body, state, change
         expected = slope(lambda moved: body.linearised(state, LAME, moved).force, changes, one)
         np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
     constants = np.array(LAME)
-    for found, one in zip(moduli, np.diag(constants), strict=True):
+    for found, one in zip(moduli, np.diag(constants)[:2], strict=True):
         expected = slope(
             lambda lame: body.linearised(state, LAME._make(lame), changes).force, constants, one, 1e-4
         )
