@@ -12,6 +12,7 @@ def test_random_input_gives_a_result_or_one_line() -> None:
     assert found.states["done"] >= 2
 
 
+@pytest.mark.slow
 def test_random_drawings_are_read_as_they_were_drawn() -> None:
     """To 1e-6 of their area."""
     counts, wrong = drawings.tried(32)

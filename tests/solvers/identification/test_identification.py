@@ -86,6 +86,7 @@ def test_the_frame_of_the_pressed_picture_is_found(problem, turned, known):
     assert in_picture.max() < 2 * NOISE < of_finger.max()
 
 
+@pytest.mark.slow
 def test_a_picture_in_another_frame_than_is_said_is_freed(problem, turned):
     """The result does not count as converged."""
     observed, _, moved, shown = turned
@@ -143,6 +144,7 @@ def test_the_field_and_its_deviations_hold_the_truth(identified, problem):
     assert 0 < deviation.max() < 0.2
 
 
+@pytest.mark.slow
 def test_the_stress_deviation_is_that_of_refits(problem):
     """Over 12 draws of the noise, the scatter of the von Mises stress is the stated one within its own.
 

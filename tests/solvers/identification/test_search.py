@@ -50,6 +50,7 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     assert force.position.low < min(places) < max(places) < force.position.high
 
 
+@pytest.mark.slow
 def test_displacements_of_a_wrong_scale_are_noticed(fine_problem):
     """No load and no walls move the markers in that pattern; below that, walls make up for a scale."""
     observed, true = twin(fine_problem, "neo-hookean", TRUE, noise=3e-3)
@@ -149,6 +150,7 @@ def test_a_law_without_an_equilibrium_where_another_one_has_it_is_left_out_at_on
     assert len(asked) <= 3
 
 
+@pytest.mark.slow
 def test_a_wide_contact_is_searched_with_its_width_held(identified, problem, monkeypatch):
     """Everything else goes first to where the wide contact explains the markers, then all of it."""
     asked, known = [], LawFits.fit
@@ -187,6 +189,7 @@ def test_no_load_is_no_force(problem):
     assert "NOT DETERMINED by the markers, but held by its prior: position" in solution.status.message
 
 
+@pytest.mark.slow
 def test_on_a_fine_mesh_the_unknowns_are_sought_on_a_coarse_one(monkeypatch):
     """The result is that of the fine mesh, of which few systems are solved."""
     design = Design()
