@@ -1,8 +1,6 @@
 """Faults at changes of files: where they strike, and what a command makes of some of them."""
 
-import os
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -124,34 +122,3 @@ def test_kept_trials_are_those_of_the_same_file_by_whatever_number(tmp_path: Pat
 
 def test_the_page_is_that_of_the_kept_trials() -> None:
     assert PAGE.read_text(encoding="utf-8").splitlines()[8:] == page(kept_rows(ROWS, Row)).splitlines()[8:]
-
-
-@pytest.mark.slow
-def test_a_command_that_is_killed_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
-    """Where the new result takes its name; in a program of its own, because this one has threads."""
-    code = (
-        "from pathlib import Path\n"
-        "import sys\n"
-        "from compare.pipeline import pipeline\n"
-        "pipeline.draw_all = lambda *_: []\n"  # most of the time of a small run
-        "from benchmarks.reliability.faults import copied, filled, trial, undisturbed\n"
-        "from benchmarks.reliability.jobs import JOBS\n"
-        "from benchmarks.reliability.supervision import Fault\n"
-        "job, folder = JOBS[1], Path(sys.argv[1])\n"
-        "with filled(folder) as cache:\n"
-        "    expected = undisturbed(job, folder / 'job', cache)\n"
-        "    renames = [at for at, each in enumerate(expected.points) if each.call.startswith('rename')]\n"
-        "    place = copied(expected, folder / 'job')\n"
-        "    found = trial(job, expected, Fault('kill', renames[-2]), place)\n"
-        "assert not found.faults, found\n"
-    )
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)],
-        env=environment,
-        capture_output=True,
-        text=True,
-    )
-    if "the system refuses seccomp filters" in done.stderr:
-        pytest.skip("the system refuses seccomp filters")
-    assert done.returncode == 0, done.stderr

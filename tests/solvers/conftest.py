@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
+from geometry.arrays import FloatArray
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
+from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -51,6 +53,13 @@ def observed_at(points, displacements, deviations, visible=None) -> Observations
     return Observations(points, displacements, deviations, visible, "by a test", True, 0.8)
 
 
+def hiding(problem: Problem, *markers: int) -> Problem:
+    """The problem as if some more of its markers had not been seen."""
+    observations = problem.observations
+    visible = observations.visible & ~np.isin(np.arange(len(observations.points)), markers)
+    return replace(problem, observations=replace(observations, visible=visible))
+
+
 def bar_mesh(
     length: float, height: float, columns: int, rows: int, *, contact: tuple[float, float]
 ) -> TriangleMesh:
@@ -84,6 +93,20 @@ def beam_compliance(material: Material, modulus: float, *, height: float, arm: f
     """Deflection of Timoshenko's cantilever under a unit force per depth at its arm, mm per N/mm."""
     shear = material.young / (2 * (1 + material.poisson))
     return arm**3 / (3 * modulus * height**3 / 12) + arm / (5 / 6 * shear * height)
+
+
+def distances(found: Solution, exact: Solution) -> tuple[float, float]:
+    """Relative L2 distances of displacement and von Mises stress over the body of the first solution."""
+    rule = body_quadrature(found.problem.mesh)
+    here = rule.location
+    there = here if exact.problem.mesh is found.problem.mesh else exact.problem.mesh.locate(here.points)
+    moved = found.displacement(here), exact.displacement(there)
+    stressed = found.state(here).von_mises[:, None], exact.state(there).von_mises[:, None]
+
+    def distance(own: FloatArray, other: FloatArray) -> float:
+        return float(np.sqrt((rule.weights @ (own - other) ** 2).sum() / (rule.weights @ other**2).sum()))
+
+    return distance(*moved), distance(*stressed)
 
 
 def check_gradient(solution: Solution, points: np.ndarray, tolerance: float = 1e-6) -> None:

@@ -191,9 +191,3 @@ def test_von_mises_stress_of_pulling_and_of_shearing_across():
     found = von_mises(states, stress_zz=states[:, 2, 2])
     np.testing.assert_allclose(found, [4.0, np.sqrt(3)])
     np.testing.assert_allclose(von_mises(np.zeros((1, 2, 2)), stress_zz=np.array([-4.0])), [4.0])
-
-
-@pytest.mark.parametrize("law", FINITE)
-def test_finite_strain_in_plane_stress_is_refused(law):
-    with pytest.raises(ValueError, match=f"the {law} law is given for plane strain only"):
-        Material(plane="stress", law=law)

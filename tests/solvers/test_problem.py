@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
+from geometry.finger.design import Design
 from geometry.registration import Registration
-from solvers.problem import Load, Material, Physics, Problem, contact_ends, contact_functional, contact_nodes
+from solvers.problem import Load, Material, Problem, contact_ends, contact_functional, contact_nodes
 from tests.solvers.conftest import observed_at
 
 
@@ -29,21 +29,18 @@ def test_the_point_load_is_at_the_contacts_middle_or_its_position(coarse_mesh, p
     assert weights.tolist() == [1.0]
 
 
-def test_the_digest_depends_on_how_well_the_pictures_are_known(coarse_mesh):
-    """Else a resumed run would take over the solution from before the file said so."""
-    seen = observed_at(coarse_mesh.markers, np.zeros((9, 2)), 0.01)
-    loose = Registration(turn=1.0)
-    kinds = [seen, replace(seen, pressed=loose), replace(seen, drawn=loose)]
-    assert len({Problem(coarse_mesh, observations=each).digest for each in kinds}) == 3
-
-
 def test_the_digest_depends_on_everything_that_defines_the_problem(coarse_mesh, medium_mesh):
+    seen = observed_at(coarse_mesh.markers, np.zeros((9, 2)), 0.01)
+    loose, drawn = (replace(seen, **{picture: Registration(turn=1.0)}) for picture in ("pressed", "drawn"))
     problems = [
         Problem(coarse_mesh),
         Problem(medium_mesh),
         Problem(coarse_mesh, Material(poisson=0.3)),
         Problem(coarse_mesh, load=Load(kind="point")),
         Problem(coarse_mesh, load=Load(displacement=(None, -10.0))),
+        Problem(coarse_mesh, finger=Design()),
+        Problem(coarse_mesh, finger=Design(front_thickness=2.2)),
+        *(Problem(coarse_mesh, observations=each) for each in (seen, loose, drawn)),
     ]
     assert len({problem.digest for problem in problems}) == len(problems)
     assert Problem(coarse_mesh).digest == problems[0].digest
@@ -67,52 +64,3 @@ def test_where_the_mesh_has_its_contact_the_position_changes_nothing(coarse_mesh
         given = contact_functional(Problem(coarse_mesh, load=Load(kind=kind, position=35.0)))
         for ours, theirs in zip(own, given, strict=True):
             np.testing.assert_allclose(ours, theirs, atol=1e-12)
-
-
-def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):
-    with pytest.raises(
-        UserError, match=r"from x = 88\.5 to 90\.5 mm is not on the front face, which runs from 0 to 90"
-    ):
-        Problem(coarse_mesh, load=Load(position=89.5))
-    with pytest.raises(UserError, match="mesh the finger with its contact_position there"):
-        Load(kind="patch", position=40.0)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Material(young=-1.0), r"young \(E\) = -1.0: input should be greater than 0"),
-        (lambda: Material(young=1e300), r"young \(E\) = 1e\+300: no solid has this Young's modulus"),
-        (lambda: Material(young=True), r"young \(E\) = 'true' is not a finite number; give one from"),
-        (
-            lambda: Material(young=np.ones(99)),
-            r"young \(E\) = array\(.* is not a finite number; give",
-        ),  # many lines
-        (lambda: Material(poisson=0.5), r"poisson \(nu\) = 0.5: .* less than 0.5"),  # incompressible
-        (lambda: Material(law="gent", plane="stress"), "the gent law is given for plane strain only"),
-        (lambda: Material(youngs=1), "unknown parameter 'youngs'; did you mean young"),
-        (lambda: Load(displacement=(0.0, float("nan"))), "displacement = nan is not a finite number$"),
-        (lambda: Load(displacement=(None, None)), "leaves both components free"),
-        (lambda: Load(displacement=(0.0, -1e-200)), "by less than 1e-09 mm, a hundredth of an atom's size"),
-        (
-            lambda: Load((0.0, -3.0)),
-            r"by name only \(kind, displacement, position, radius, friction\), not \(0.0, -3.0\)$",
-        ),
-        (lambda: Load(np.ones((9, 9))), r"Load takes values by name only .*, not array"),  # many lines
-        (lambda: Load(displacement=-3), "displacement = -3: give u and v in mm, such as"),
-        (lambda: Load(kind="magnet"), "kind = 'magnet': there are mean, point, patch, cylinder$"),
-        (lambda: Load(kind="cylinder", radius=0), "radius = 0: input should be greater than 0"),
-        (lambda: Load(position="middle"), "position = 'middle' is not a finite number$"),
-    ],
-)
-def test_impossible_materials_and_loads_are_one_line(make, message):
-    with pytest.raises(UserError, match=message) as refused:
-        make()
-    assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize("value", [[1.0], (1, 2), "ten", None, 1j])
-@pytest.mark.parametrize("name", ["stroke", "direction"])
-def test_a_travel_is_a_number(name: str, value: object) -> None:
-    with pytest.raises(UserError, match=f"{name} = .* is not a finite number"):
-        Physics(**{name: value})

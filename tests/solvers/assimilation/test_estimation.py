@@ -11,7 +11,6 @@ from scipy.optimize import least_squares
 from scipy.stats import binom, chi2, lognorm, norm, t
 
 from geometry.arrays import FloatArray
-from solvers.assimilation import estimation
 from solvers.assimilation.estimation import (
     Estimate,
     Parameter,
@@ -138,14 +137,6 @@ FACTOR = Parameter("factor", "", 2.0, 0.25, logarithmic=True)
 ONE = Parameter("one", "", 0.0, 1.0)
 
 
-def test_what_is_not_given_is_as_documented() -> None:
-    """Levels, rounds and steps of every published estimate."""
-    assert (estimation.LEVEL, estimation.MIN_RESOLUTION) == (0.95, 0.5)
-    assert (estimation.MAX_ROUNDS, estimation.INFLATION_CHANGE) == (8, 0.01)
-    assert (estimation.MAX_STEPS, estimation.COST_CHANGE) == (12, 1e-4)
-    assert (ONE.low, ONE.high, ONE.logarithmic) == (-inf, inf, False)
-
-
 @pytest.mark.parametrize("z", [-2.0, 0.0, 1.3])
 def test_a_value_is_at_the_priors_quantile(z: float) -> None:
     share = norm.cdf(z)
@@ -154,13 +145,9 @@ def test_a_value_is_at_the_priors_quantile(z: float) -> None:
 
 
 @pytest.mark.parametrize("parameter", [LENGTH, FACTOR])
-def test_the_derivative_is_that_of_differences(parameter: Parameter) -> None:
+def test_a_parameter_has_its_slope_and_at_its_bounds_their_values(parameter: Parameter) -> None:
     difference = (parameter.value(0.7 + 1e-6) - parameter.value(0.7 - 1e-6)) / 2e-6
     assert parameter.derivative(0.7) == pytest.approx(float(difference), rel=1e-8)
-
-
-@pytest.mark.parametrize("parameter", [LENGTH, FACTOR])
-def test_at_its_bounds_a_parameter_has_the_bounds_values(parameter: Parameter) -> None:
     low, high = replace(parameter, low=0.8, high=7.0).bounds
     np.testing.assert_allclose([parameter.value(low), parameter.value(high)], [0.8, 7.0], rtol=1e-12)
 
@@ -259,35 +246,23 @@ def searched(calls: list[float], low: float = -inf, high: float = inf, **setting
     return estimate(model, np.full(4, np.exp(-2.0)), np.full(4, 1e-3), [prior], **settings)
 
 
-def test_the_model_is_asked_once_for_every_place() -> None:
+@pytest.mark.parametrize(
+    ("start", "limits", "first"),
+    [
+        (None, {}, [0.0]),  # the prior's middle
+        (0.19, {}, [1.9]),  # where it is told to
+        (0.3, {"high": 2.5}, [3.0, 0.0]),  # where there is no prediction, at the prior's middle
+        (0.3, {"low": 1.5}, [3.0]),  # a Newton step from 3 leads to 1.28, and is taken back
+    ],
+)
+def test_the_search_begins_at_a_place_with_a_prediction_and_finds_the_value(start, limits, first) -> None:
     calls: list[float] = []
-    found = searched(calls)
+    found = searched(calls, **limits, start=None if start is None else np.array([start]))
+    assert calls[: len(first)] == pytest.approx(first)
     assert found.values == pytest.approx([2.0], abs=0.01)
     assert found.converged
-    assert found.evaluations == len(calls) == len(set(calls))
-
-
-def test_the_search_starts_where_it_is_told_to() -> None:
-    calls: list[float] = []
-    assert searched(calls, start=np.array([0.19])).values == pytest.approx([2.0], abs=0.01)
-    assert calls[0] == pytest.approx(1.9)
-    calls.clear()
-    searched(calls)
-    assert calls[0] == 0
-
-
-def test_where_there_is_no_prediction_the_search_starts_at_the_priors_middle() -> None:
-    calls: list[float] = []
-    found = searched(calls, high=2.5, start=np.array([0.3]))
-    assert calls[:2] == pytest.approx([3.0, 0.0])
-    assert found.values == pytest.approx([2.0], abs=0.01)
-
-
-def test_a_step_to_where_there_is_no_prediction_is_taken_back() -> None:
-    calls: list[float] = []
-    found = searched(calls, low=1.5, start=np.array([0.3]))  # a Newton step from 3 leads to 1.28
-    assert min(calls) < 1.5
-    assert found.values == pytest.approx([2.0], abs=0.01)
+    assert found.evaluations == len(calls) == len(set(calls)), "once for every place"
+    assert min(calls) < limits.get("low", np.inf)
 
 
 def test_a_search_that_ends_early_says_so() -> None:

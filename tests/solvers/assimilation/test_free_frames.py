@@ -9,7 +9,7 @@ from geometry.registration import FIXED, PARTS, Homography, Pictures, Registrati
 from solvers.assimilation.pictures import FreePictures
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
-from tests.solvers.conftest import observed_at
+from tests.solvers.conftest import hiding, observed_at
 from tests.solvers.contract.test_contract import QUICK
 
 KNOWN = Registration(turn=3.0, shift=0.3, scale=0.01, tilt=0.01)
@@ -97,18 +97,14 @@ def test_a_turned_picture_is_found(problem, solver):
 def test_deviations_in_the_picture_are_those_of_markers_left_out(problem, solver):
     """The frame's is part of them."""
     observed, _ = pictured(problem, OFF)
-    seen = observed.visible.copy()
-    seen[4] = False
-    found = make_solver(solver).solve(replace(problem, observations=replace(observed, visible=seen)))
+    hidden = hiding(replace(problem, observations=observed), 4)
+    found, seen = make_solver(solver).solve(hidden), hidden.observations.visible
     there = problem.mesh.locate(observed.points)
     shown = found.uncertainty.shown(there)
     framed = found.field.posterior
-    z, pictures = framed.frames[0], FreePictures.of(replace(observed, visible=seen))
-    place = replace(
-        pictures,
-        points=observed.points[[4]],
-        shown=found.shown(observed.points, found.displacement(there))[[4]],
-    )
+    z, pictures = framed.frames[0], FreePictures.of(hidden.observations)
+    seen_there = found.shown(observed.points, found.displacement(there))[[4]]
+    place = replace(pictures, points=observed.points[[4]], shown=seen_there)
     own_shapes = found.field._own(there)[:, [4]]
     _, variance = framed.at(observed.points[[4]], own_shapes, place.about(z).frames)
     np.testing.assert_allclose(shown[4] ** 2, variance[0], rtol=1e-6)
@@ -162,12 +158,10 @@ def test_the_frames_of_fem_asm_are_those_of_the_least_energy_plus_misfit(problem
 def test_a_marker_is_left_out_of_the_frames_as_well(problem):
     """As if it had not been seen, to first order in what it changes of the frames."""
     observed, _ = pictured(problem, OFF)
-    made = make_solver("fem-asm", weights="precision")
-    whole = made.solve(replace(problem, observations=observed))
+    made, given = make_solver("fem-asm", weights="precision"), replace(problem, observations=observed)
+    whole = made.solve(given)
     for marker in (0, 4, 8):
-        seen = observed.visible.copy()
-        seen[marker] = False
-        without = made.solve(replace(problem, observations=replace(observed, visible=seen)))
+        without = made.solve(hiding(given, marker))
         one = observed.points[[marker]]
         predicted = without.shown(one, without.displacement(one))[0]
         np.testing.assert_allclose(whole.left_out[marker], predicted, atol=0.02)

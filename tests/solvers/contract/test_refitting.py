@@ -60,6 +60,7 @@ def test_a_refit_is_a_solution(coarse_mesh, observed, name):
         np.testing.assert_allclose(found.reaction, expected.reaction, rtol=1e-5, atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fem-asm", "pinn-asm"])
 @pytest.mark.parametrize("change", ["points", "marker_radius"])
 def test_other_markers_are_solved_afresh(coarse_mesh, observed, name, change):

@@ -76,14 +76,9 @@ def refused() -> int:
     return 0
 
 
-def failing_on_rank_1() -> int:
-    on_all_ranks(partial(fail, 1), STIFF, print)
-    return 0
-
-
-def failing_on_rank_0() -> int:
-    on_all_ranks(partial(fail, 0), STIFF, print)
-    return 0
+failing_on_rank_0, failing_on_rank_1 = (
+    partial(on_all_ranks, partial(fail, rank), STIFF, print) for rank in (0, 1)
+)
 
 
 def faulty() -> int:

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.section import finger_section
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.adaptive_refinement import adapted, largest
 from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Problem
+from solvers.problem import Problem
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +37,6 @@ def test_the_tolerance_is_reached_and_true(adaptation, exact):
     last = adaptation.rounds[-1].at_markers
     assert last <= 1e-3
     assert off(adaptation.mesh, exact)[0] < 2e-3
-    assert f"known to {last:.2g} mm (asked for: 0.001 mm)" in adaptation.message
 
 
 def test_it_beats_uniform_refinement(adaptation, medium_mesh, exact):
@@ -53,13 +51,9 @@ def test_rounds_are_recorded_from_the_first_mesh_on(adaptation, coarse_mesh):
     first, last = adaptation.rounds[0], adaptation.rounds[-1]
     assert (first.triangles, first.nodes) == (len(coarse_mesh.triangles), len(coarse_mesh.points))
     assert (last.triangles, last.nodes) == (len(adaptation.mesh.triangles), len(adaptation.mesh.points))
-    assert [step.triangles for step in adaptation.rounds] == sorted(
-        step.triangles for step in adaptation.rounds
-    )
-
-
-def test_it_is_the_same_every_time(adaptation, coarse_mesh):
-    assert adapted(Problem(coarse_mesh), 1e-3).mesh.digest == adaptation.mesh.digest
+    counts = [step.triangles for step in adaptation.rounds]
+    assert counts == sorted(counts)
+    assert adapted(Problem(coarse_mesh), 1e-3).mesh.digest == adaptation.mesh.digest, "it repeats"
 
 
 def test_a_mesh_that_is_fine_enough_stays_as_it_is(medium_mesh):
@@ -73,8 +67,6 @@ def test_a_cap_ends_it_and_it_says_so(coarse_mesh, cap):
     adaptation = adapted(Problem(coarse_mesh), 1e-6, **cap)
     assert not adaptation.reached
     assert len(adaptation.mesh.triangles) <= 4500
-    said = f"not to the 1e-06 mm asked for: refinement stopped at {len(adaptation.mesh.triangles)} triangles"
-    assert said in adaptation.message
 
 
 @pytest.mark.slow
@@ -85,20 +77,6 @@ def test_fillets_get_rounder():
     adaptation = adapted(Problem(mesh), 3e-4, section=section)
     assert adaptation.reached
     assert section.area < adaptation.mesh.areas.sum() < mesh.areas.sum() - 1e-3
-
-
-@pytest.mark.parametrize(
-    ("tolerance", "kind", "message"),
-    [
-        (0.0, "mean", "above 0 mm"),
-        (-1.0, "mean", "above 0 mm"),
-        (float("nan"), "mean", "above 0 mm"),
-        (1e-3, "point", "no limit under refinement"),
-    ],
-)
-def test_what_has_no_meaning_is_refused(coarse_mesh, tolerance, kind, message):
-    with pytest.raises(UserError, match=message):
-        adapted(Problem(coarse_mesh, load=Load(kind=kind)), tolerance)
 
 
 def test_the_fewest_triangles_hold_the_share():

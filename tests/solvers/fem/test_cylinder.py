@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from geometry.errors import UserError
 from solvers.cylinder_contact import ContactState, CylinderContact
 from solvers.extrusion import ExtrudedSpace
 from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.load_path import PENETRATION
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
 from solvers.fem.solid import Fem3dSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem, contact_ends
-from solvers.registry import make_solver
 from tests.solvers.conftest import bar_mesh
 
 
@@ -28,21 +25,23 @@ def pressed(coarse_mesh):
     )
 
 
-def test_cylinder_is_pressed_all_the_way_in(pressed):
-    assert pressed.status.converged
-    assert "contact from x = 3" in pressed.status.message
-    assert pressed.history["load_fraction"][-1] == 1
-    assert pressed.history["contact_width_mm"][-1] == pressed.stats["contact_width_mm"]
+def at_the_front(solution):
+    """Forces on the nodes of the front by the elements' own balance, and their places from the axis."""
+    space = solution.field.space
+    nodes = space.boundary_nodes("front")
+    nodes = nodes[space.nodes[nodes, 0] > 0]  # the clamp has forces of its own
+    forces = DiscreteEquilibrium(solution.problem, space).internal_force(solution.field.values)[nodes]
+    middle = np.mean(contact_ends(solution.problem))
+    return forces, space.nodes[nodes] + solution.field.values[nodes] - [middle, 5.0 - 10.0]
 
 
 def test_cylinder_presses_without_friction_and_only_where_it_touches(pressed):
-    """Forces on the nodes of the front, by the elements' own balance: along the normal, into the finger."""
-    space = pressed.field.space
-    nodes = space.boundary_nodes("front")
-    nodes = nodes[space.nodes[nodes, 0] > 0]  # the clamp has forces of its own
-    forces = DiscreteEquilibrium(pressed.problem, space).internal_force(pressed.field.values)[nodes]
-    middle = np.mean(contact_ends(pressed.problem))
-    away = space.nodes[nodes] + pressed.field.values[nodes] - [middle, 5.0 - 10.0]
+    """Forces along the normal, into the finger, after all of the way."""
+    assert pressed.status.converged
+    assert pressed.history["load_fraction"][-1] == 1
+    assert pressed.contact.points.slips.all()
+    assert not pressed.contact.points.friction.any()
+    forces, away = at_the_front(pressed)
     gap = np.linalg.norm(away, axis=1) - 5.0
     normal = away / np.linalg.norm(away, axis=1)[:, None]
     pressure = (forces * normal).sum(axis=1)
@@ -68,7 +67,6 @@ def test_a_cylinder_that_moves_away_does_not_touch(coarse_mesh):
         Problem(coarse_mesh, Material(law="neo-hookean"), load)
     )
     assert solution.status.converged
-    assert "does not touch the finger" in solution.status.message
     assert solution.energy == pytest.approx(0, abs=1e-12)
 
 
@@ -79,38 +77,6 @@ def test_contact_that_leaves_the_front_face_is_not_converged():
         Problem(bar, Material(poisson=0.3, law="neo-hookean"), load)
     )
     assert not solution.status.converged
-    assert "the contact reaches an end of the front face" in solution.status.message
-
-
-def test_linear_solvers_refuse_a_cylinder(coarse_mesh):
-    with pytest.raises(UserError, match="fem takes the loads mean, point, patch, not 'cylinder'"):
-        FemSolver().solve(Problem(coarse_mesh, load=Load(kind="cylinder", radius=5.0)))
-
-
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ({"kind": "mean", "radius": 5.0}, "a radius belongs to the load cylinder"),
-        ({"kind": "cylinder", "radius": -1.0}, "greater than 0"),
-        ({"kind": "cylinder", "radius": 5.0, "displacement": (None, -1.0)}, "as friction lets it"),
-        ({"kind": "cylinder", "radius": 5.0, "displacement": (0.0, 0.0)}, "does not move"),
-        ({"kind": "mean", "friction": 0.5}, "friction belongs to the load cylinder"),
-        (
-            {"kind": "cylinder", "radius": 5.0, "friction": 50.0},
-            "friction = 50 is outside its range, 0 to 5",
-        ),
-    ],
-)
-def test_a_cylinder_that_makes_no_sense_is_refused(values, said):
-    with pytest.raises(ValueError, match=said):
-        Load(**values)
-    assert Load(kind="cylinder").radius == 5.0
-
-
-def test_without_friction_nothing_rubs(pressed):
-    assert pressed.contact.points.slips.all()
-    assert not pressed.contact.points.friction.any()
-    assert "contact_friction_N_per_mm" not in pressed.stats
 
 
 @pytest.fixture(scope="module")
@@ -135,14 +101,8 @@ def test_friction_takes_the_finger_along(pressed, rough):
 
 
 def test_the_indenters_force_is_pressure_and_friction(rough):
-    """By the elements' own balance at the nodes of the front."""
-    space = rough.field.space
-    nodes = space.boundary_nodes("front")
-    nodes = nodes[space.nodes[nodes, 0] > 0]
-    forces = DiscreteEquilibrium(rough.problem, space).internal_force(rough.field.values)[nodes]
+    forces, away = at_the_front(rough)
     np.testing.assert_allclose(forces.sum(axis=0), rough.reaction, rtol=1e-6)
-    middle = np.mean(contact_ends(rough.problem))
-    away = space.nodes[nodes] + rough.field.values[nodes] - [middle, 5.0 - 10.0]
     normal = away / np.linalg.norm(away, axis=1)[:, None]
     along = forces @ np.array([[0.0, -1.0], [1.0, 0.0]]).T
     rubbed = (along * normal).sum(axis=1).sum()
@@ -163,48 +123,36 @@ def test_finer_steps_change_the_friction_little(rubbed_bar):
     np.testing.assert_allclose(fine.reaction, rubbed_bar.reaction, rtol=0.01)
 
 
+def touched(mesh, space, fraction):
+    """A cylinder that rubs on a finger at rest, under a share of the load and with forces of 0.3 N/mm."""
+    load = Load(kind="cylinder", radius=5.0, friction=0.5)
+    contact = CylinderContact.of(Problem(mesh, Material(law="neo-hookean"), load), space)
+    return contact, ContactState(fraction, np.zeros(space.nodes.shape), np.full(len(contact.nodes), 0.3))
+
+
 @pytest.mark.parametrize("solid", [False, True])
 def test_the_tangent_of_friction_is_the_derivative_of_its_gradient(coarse_mesh, solid):
     """Some nodes stick, some slip, and all are a little off their places."""
-    problem = Problem(
-        coarse_mesh, Material(law="neo-hookean"), Load(kind="cylinder", radius=5.0, friction=0.5)
-    )
     space = ExtrudedSpace.of(coarse_mesh, 1, 1.0) if solid else LagrangeSpace(coarse_mesh, 2)
-    contact = CylinderContact.of(problem, space)
+    contact, rest = touched(coarse_mesh, space, 0.1)
     rng = np.random.default_rng(1)
-    rest = ContactState(0.1, np.zeros(space.nodes.shape), np.full(len(contact.nodes), 0.3))
-    started = contact.started(rest)
-    assert started is not None
-    state = replace(
-        rest,
-        nodal=0.001 * rng.standard_normal(space.nodes.shape),
-        friction=replace(
-            started,
-            forces=0.1 * rng.standard_normal(started.forces.shape),
-            sticks=rng.random(len(contact.nodes)) < 0.5,
-        ),
-    )
+    nodal, started = 0.001 * rng.standard_normal(space.nodes.shape), contact.started(rest)
+    forces = 0.1 * rng.standard_normal(started.forces.shape)
+    friction = replace(started, forces=forces, sticks=rng.random(len(contact.nodes)) < 0.5)
+    state = replace(rest, nodal=nodal, friction=friction)
     tangent = contact.tangent(state)
     size, step = tangent.shape[-1], 1e-6
     assert size == (3 if solid else 2)
     for axis in range(size):
         moved = np.zeros(space.nodes.shape)
         moved[contact.nodes, axis] = step
-        slopes = (
-            contact.gradient(replace(state, nodal=state.nodal + moved))
-            - contact.gradient(replace(state, nodal=state.nodal - moved))
-        ) / (2 * step)
-        np.testing.assert_allclose(slopes, tangent[:, :, axis], atol=1e-4)
+        ahead, behind = (contact.gradient(replace(state, nodal=nodal + sign * moved)) for sign in (1, -1))
+        np.testing.assert_allclose((ahead - behind) / (2 * step), tangent[:, :, axis], atol=1e-4)
 
 
 def test_slip_counts_from_the_last_equilibrium(coarse_mesh):
     """A step that begins at an equilibrium has its frictions, however far that one slipped."""
-    problem = Problem(
-        coarse_mesh, Material(law="neo-hookean"), Load(kind="cylinder", radius=5.0, friction=0.5)
-    )
-    space = LagrangeSpace(coarse_mesh, 2)
-    contact = CylinderContact.of(problem, space)
-    rest = ContactState(0.0, np.zeros(space.nodes.shape), np.full(len(contact.nodes), 0.3))
+    contact, rest = touched(coarse_mesh, LagrangeSpace(coarse_mesh, 2), 0.0)
     first = contact.started(rest)
     forces = np.linspace(-0.1, 0.1, len(contact.nodes))[:, None]
     stuck = replace(first, forces=forces, sticks=np.ones(len(contact.nodes), dtype=bool))
@@ -218,9 +166,3 @@ def test_solid_in_plane_strain_rubs_as_the_plane_does(rubbed_bar):
     solid = Fem3dSolver(layers=1, sides="held").solve(rubbed_bar.problem)
     assert solid.status.converged
     np.testing.assert_allclose(solid.reaction, rubbed_bar.reaction, rtol=0.005)
-
-
-def test_a_network_refuses_friction(coarse_mesh):
-    load = Load(kind="cylinder", radius=5.0, friction=0.5)
-    with pytest.raises(UserError, match="pinn-std takes a cylinder without friction; leave friction out"):
-        make_solver("pinn-std").solve(Problem(coarse_mesh, Material(law="neo-hookean"), load))

@@ -1,8 +1,5 @@
 """`fem`: refinement, plane states, advice; `tests/verification` has the exact solutions."""
 
-import re
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -40,17 +37,6 @@ def test_energy_falls_under_refinement(coarse_mesh, medium_mesh, medium_fem):
     assert linear > quadratic > medium_fem.energy > 0.98 * quadratic
 
 
-def test_plane_state_matters_little_for_displacement_and_much_for_stress(medium_mesh, medium_fem):
-    """0.004 mm at the markers, about a quarter of the stress."""
-    other = FemSolver().solve(Problem(medium_mesh, Material(plane="stress")))
-    moved = np.abs(
-        other.displacement(medium_mesh.markers) - medium_fem.displacement(medium_mesh.markers)
-    ).mean(axis=0)
-    assert moved.max() < 0.01
-    a, b = (solution.state(medium_mesh.at_centroids()).von_mises for solution in (medium_fem, other))
-    assert 0.1 < np.abs(a - b).sum() / a.sum() < 0.4
-
-
 def test_free_component_has_no_force(coarse_mesh):
     """But for the rounding of 6,000 nodal forces, each a sum of stiffness times displacement."""
     solution = FemSolver().solve(Problem(coarse_mesh, load=Load(displacement=(None, -10.0))))
@@ -65,25 +51,21 @@ def test_young_cancels_from_the_displacement(coarse_mesh):
     np.testing.assert_allclose(soft, stiff, rtol=1e-8)
 
 
-def test_degree_three_is_refused():
-    with pytest.raises(UserError, match="degree 1 and 2, not 3"):
-        FemSolver(degree=3)
-
-
 @pytest.mark.parametrize(
-    ("degree", "poisson", "plane", "said"),
+    ("degree", "poisson", "plane", "locks"),
     [
-        (1, 0.45, "strain", "lock .* 0.45: their energy is about 1.7 times .* take degree=2"),
-        (1, 0.4999, "strain", "lock .* more than 5 times"),
-        (1, 0.4, "strain", None),
-        (1, 0.45, "stress", None),  # nothing keeps the volume
-        (2, 0.4999, "strain", None),
+        (1, 0.45, "strain", "about 1.7 times"),
+        (1, 0.4999, "strain", "more than 5 times"),
+        (1, 0.4, "strain", ""),
+        (1, 0.45, "stress", ""),  # nothing keeps the volume
+        (2, 0.4999, "strain", ""),
     ],
 )
-def test_status_says_that_linear_elements_lock(coarse_mesh, degree, poisson, plane, said):
+def test_status_says_that_linear_elements_lock(coarse_mesh, degree, poisson, plane, locks):
     problem = Problem(coarse_mesh, Material(poisson=poisson, plane=plane))
-    message = FemSolver(degree=degree).solve(problem).status.message
-    assert re.search(said, message) if said else "lock" not in message
+    message = FemSolver(degree=degree, estimate=False).solve(problem).status.message
+    assert locks in message
+    assert ("lock" in message) == bool(locks)
 
 
 def test_a_solution_that_rounding_has_spoilt_is_refused(short_mesh):
@@ -93,15 +75,3 @@ def test_a_solution_that_rounding_has_spoilt_is_refused(short_mesh):
         FemSolver().solve(spoilt)
     usual = FemSolver().solve(Problem(short_mesh, Material(poisson=0.4999))).energy
     assert FemSolver().solve(sound).energy == pytest.approx(usual, rel=1e-3)
-
-
-def test_part_without_support_is_reported(coarse_mesh):
-    """Two fingers, of which one is not clamped."""
-    count = len(coarse_mesh.points)
-    twice = replace(
-        coarse_mesh,
-        points=np.concatenate([coarse_mesh.points, coarse_mesh.points - [0.0, 100.0]]),
-        triangles=np.concatenate([coarse_mesh.triangles, coarse_mesh.triangles + count]),
-    )
-    with pytest.raises(UserError, match="not connected to the base"):
-        Problem(twice)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.misfit import MarkerSettings, misfit_of
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.fem.boundary_conditions import DisplacementConstraints
@@ -13,7 +12,7 @@ from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem, contact_functional
-from tests.solvers.conftest import bar_mesh, observed_at
+from tests.solvers.conftest import bar_mesh, distances, hiding, observed_at
 
 MESH = bar_mesh(20.0, 2.0, 20, 2, contact=(16.0, 20.0))
 MARKERS = np.array([[4.0, -1.0], [9.0, -0.9], [13.0, -1.1], [18.0, -1.0]])
@@ -41,8 +40,7 @@ def bent() -> Problem:
 
 
 @pytest.mark.parametrize(
-    ("kind", "law"),
-    [("mean", "neo-hookean"), ("point", "st-venant-kirchhoff"), ("patch", "neo-hookean")],
+    ("kind", "law"), [("mean", "neo-hookean"), ("point", "st-venant-kirchhoff"), ("patch", "neo-hookean")]
 )
 def test_weak_weights_give_fem_nonlinear(kind, law):
     problem = pulled(Load(kind=kind, displacement=(None, -3.0)), law=law)
@@ -60,13 +58,9 @@ def test_small_displacements_give_the_linear_minimiser(kind):
     problem = pulled(Load(kind=kind, displacement=(0.1, -1.0)))
     distances = []
     for size in (0.02, 0.01):
-        own = replace(
-            problem,
-            load=Load(kind=kind, displacement=(0.1 * size, -size)),
-            observations=replace(
-                problem.observations, displacements=size * problem.observations.displacements
-            ),
-        )
+        load = Load(kind=kind, displacement=(0.1 * size, -size))
+        seen = replace(problem.observations, displacements=size * problem.observations.displacements)
+        own = replace(problem, load=load, observations=seen)
         stiff = SOFT.solve(own).field.values
         linear = SOFT.solve(replace(own, material=Material())).field.values
         distances.append(np.linalg.norm(stiff - linear) / np.linalg.norm(linear))
@@ -108,21 +102,9 @@ def test_it_is_stationary_and_a_minimum_nearby(bent):
 
 def test_the_indenter_s_force_is_the_slope_of_energy_plus_misfit(bent):
     """Of its least value over the load, while the observations stay."""
-    totals = [
-        (solution := SOFT.solve(replace(bent, load=Load(displacement=(None, stroke))))).energy
-        + solution.stats["misfit"]
-        for stroke in (-6.01, -5.99)
-    ]
-    assert SOFT.solve(bent).reaction[1] == pytest.approx((totals[1] - totals[0]) / 0.02, rel=1e-4)
-
-
-def test_a_contact_that_is_not_certain_is_one_on_springs(bent):
-    solver = replace(SOFT, contact_deviation=0.5)
-    solution = solver.solve(bent)
-    contact, weights = contact_functional(bent)
-    moved = weights @ solution.displacement(contact)
-    assert abs(moved[1] + 6.0) > 0.01
-    assert solution.reaction[1] == pytest.approx((-6.0 - moved[1]) / solver.weighting.slack, rel=1e-6)
+    far, near = (SOFT.solve(replace(bent, load=Load(displacement=(None, v)))) for v in (-6.01, -5.99))
+    rise = near.energy + near.stats["misfit"] - far.energy - far.stats["misfit"]
+    assert SOFT.solve(bent).reaction[1] == pytest.approx(rise / 0.02, rel=1e-4)
 
 
 @pytest.mark.parametrize("relaxed", [True, False])
@@ -132,11 +114,9 @@ def test_leaving_a_marker_out_is_solving_without_it(relaxed, monkeypatch):
     if not relaxed:
         monkeypatch.setattr(LoadPath, "relaxed", lambda path, kept: None)
     solution = SOFT.solve(problem)
-    observations = problem.observations
     assert np.isnan(solution.left_out[1]).all()
     marker = 2
-    visible = observations.visible & (np.arange(len(MARKERS)) != marker)
-    without = SOFT.solve(replace(problem, observations=replace(observations, visible=visible)))
+    without = SOFT.solve(hiding(problem, marker))
     disc = replace(misfit_of(problem), points=MARKERS[[marker]])
     points, weights = replace(disc, observed=disc.observed[:1], weights=disc.weights[:1]).sampling()
     expected = weights @ without.displacement(points)
@@ -151,16 +131,10 @@ def test_a_twin_is_met_in_displacement_and_in_stress():
     errors = 0.01 * np.random.default_rng(2).normal(size=MARKERS.shape)
     twin = replace(stiff, observations=observed_at(MARKERS, truth.displacement(MARKERS) + errors, 0.01))
     solver = FemAsmSolver(weights="precision", scale=0.001)
-    rule = body_quadrature(MESH)
-
-    def distance(solution):
-        got, expected = (each.state(rule.location).von_mises for each in (solution, truth))
-        return np.linalg.norm(got - expected) / np.linalg.norm(expected)
-
-    solution = solver.solve(twin)
+    solution, linear = (solver.solve(each) for each in (twin, replace(twin, material=Material())))
     np.testing.assert_allclose(solution.displacement(MARKERS), truth.displacement(MARKERS), atol=0.04)
-    assert distance(solution) < 0.1
-    assert distance(solver.solve(replace(twin, material=Material()))) > 1
+    assert distances(solution, truth)[1] < 0.1
+    assert distances(linear, truth)[1] > 1
 
 
 def test_a_load_that_is_not_reached_is_said():
@@ -170,7 +144,6 @@ def test_a_load_that_is_not_reached_is_said():
     observations = replace(problem.observations, displacements=crossed)
     solution = FemAsmSolver(degree=1).solve(replace(problem, observations=observations))
     assert not solution.status.converged
-    assert solution.status.message.startswith("stopped at ")
     assert solution.left_out is None
 
 
@@ -179,4 +152,3 @@ def test_without_markers_it_is_fem_nonlinear(bent):
     solution = FemAsmSolver().solve(alone)
     np.testing.assert_array_equal(solution.field.values, FemNonlinearSolver().solve(alone).field.values)
     assert solution.solver == "fem-asm"
-    assert "this is fem-nonlinear: all of the load" in solution.status.message

@@ -63,12 +63,6 @@ def test_another_stroke_costs_no_solve(coarse_mesh, monkeypatch):
     assert solution.displacement(coarse_mesh.points[[coarse_mesh.contact_node]])[0, 1] < -2.9
 
 
-def test_a_load_that_fem_does_not_have_is_refused(coarse_mesh):
-    prepared = FemSolver().prepare(Problem(coarse_mesh))
-    with pytest.raises(UserError, match="fem takes the loads"):
-        prepared.solve(Load.model_construct(kind="magnet"))
-
-
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("kind", ["mean", "patch"])
 def test_iterations_find_what_the_factorisation_finds(coarse_mesh, degree, kind):
@@ -92,16 +86,8 @@ def test_iterations_that_do_not_converge_are_an_error(coarse_mesh, monkeypatch):
 
 def test_many_unknowns_are_solved_by_iterations(coarse_mesh, monkeypatch):
     monkeypatch.setattr(equilibrium, "ITERATIVE_BEYOND", 2 * len(coarse_mesh.points))
-    chosen = [
-        FemSolver(degree, estimate=False).solve(Problem(coarse_mesh)).stats["linear_solver"]
-        for degree in (1, 2)
-    ]
-    assert chosen == ["direct", "iterative"]
-
-
-def test_an_unknown_linear_solver_is_refused():
-    with pytest.raises(UserError, match="direct, iterative, not 'cholesky'"):
-        FemSolver(linear_solver="cholesky")
+    found = [FemSolver(degree, estimate=False).solve(Problem(coarse_mesh)) for degree in (1, 2)]
+    assert [each.stats["linear_solver"] for each in found] == ["direct", "iterative"]
 
 
 def test_factors_that_nobody_holds_any_more_are_freed(coarse_mesh):

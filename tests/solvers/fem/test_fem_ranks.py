@@ -41,6 +41,7 @@ def reported(process, code, expected, mesh):
     return report
 
 
+@pytest.mark.slow
 def test_rank_0_leads_and_all_solve(start, expected, coarse_mesh):
     """The numbers are those of one process; only a collective task is shared; processes started are free."""
     report = reported(start("solve"), 3, expected, coarse_mesh)

@@ -5,33 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.physics import Load, Material
 from solvers.problem import Problem
-from solvers.registry import make_solver
-from solvers.solver import UnsupportedProblemError
+from tests.solvers.conftest import bar_mesh
 
 SOFT, STIFF = (10.0, 0.3), (200.0, 0.3)
 
 
 def bar(length: float, height: float, along: int, across: int) -> TriangleMesh:
-    """A bar below y = 0, clamped at x = 0; its other end is `front` and `contact`, turned to run along x."""
-    x, y = np.meshgrid(np.linspace(0, length, along + 1), np.linspace(0, -height, across + 1))
-    row = along + 1
-    corners = (row * np.arange(across)[:, None] + np.arange(along)).ravel()
-    squares = corners[:, None] + [0, row, row + 1, 1]
-    top = np.stack([np.arange(along), np.arange(1, along + 1)], axis=1)
-    left = row * np.stack([np.arange(across), np.arange(1, across + 1)], axis=1)
-    return TriangleMesh(
-        np.column_stack([x.ravel(), y.ravel()]),
-        np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]),
-        {"base": left, "front": top, "contact": top[-2:]},
-        np.array([along // 2]),
-        along - 1,
-    )
+    """A bar of straight layers, clamped at x = 0, with the contact on the last two elements of its top."""
+    cell = np.array([length / along, height / across])
+    mesh = bar_mesh(length, height, along, across, contact=(length - 2 * cell[0], length))
+    return replace(mesh, points=np.round(mesh.points / cell) * cell)
 
 
 def layered(mesh: TriangleMesh, height: float) -> TriangleMesh:
@@ -95,18 +83,8 @@ def test_parts_of_the_bodys_own_material_change_nothing(solver, coarse_mesh):
     np.testing.assert_allclose(*(each.state(centroids).von_mises for each in (one, other)), rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["fem-3d", "fem-id", "fem-asm", "pinn-std", "gp", "statfem"])
-def test_other_solvers_refuse_parts_in_one_line(name, coarse_mesh):
-    parted = replace(coarse_mesh, moduli=np.zeros((len(coarse_mesh.triangles), 2)))
-    solver = make_solver(name)
-    with pytest.raises(UnsupportedProblemError, match="takes a body of one material"):
-        solver.solve(Problem(parted, Material(law=solver.laws[0])))
-
-
 def test_moduli_are_a_part_of_the_mesh(coarse_mesh, tmp_path):
     parted = replace(coarse_mesh, moduli=np.tile(STIFF, (len(coarse_mesh.triangles), 1)))
     assert parted.digest != coarse_mesh.digest
     parted.save(tmp_path / "mesh.npz")
     np.testing.assert_array_equal(TriangleMesh.load(tmp_path / "mesh.npz").moduli, parted.moduli)
-    with pytest.raises(UserError, match="shape"):
-        replace(coarse_mesh, moduli=np.ones((3, 2)))

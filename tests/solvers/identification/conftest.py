@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from solvers.fem.identification import FemIdSolver
 from solvers.problem import Load, Material, Problem
-from tests.solvers.identification.twins import TRUE, marked, model_of, twin
+from tests.solvers.identification.twins import TRUE, marked, model_of, sought, twin
 
 
 @pytest.fixture(scope="session")
@@ -33,4 +32,4 @@ def markers(model):
 def identified(problem):
     """A twin of the neo-Hookean law, and what is found from its markers with noise."""
     observed, true = twin(problem, "neo-hookean", TRUE)
-    return observed, true, FemIdSolver(degree=1).solve(replace(problem, observations=observed))
+    return observed, true, sought(problem, observed)

@@ -21,6 +21,7 @@ from tests.solvers.conftest import observed_at
 NOISE, DRAWS = 0.01, 16
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pressed", [Registration(), Registration(turn=1.0, shift=0.2, scale=0.01)])
 def test_truths_from_the_priors_are_where_the_intervals_say(coarse_mesh, pressed):
     problem = Problem(coarse_mesh, Material(law="neo-hookean"))

@@ -5,16 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.fem.identification import FemIdSolver
 from solvers.identification.boundary import Feet
 from solvers.identification.model import EXACT, MarkerData, MarkerModel
 from solvers.identification.unknowns import DEFAULT, SHARE, Unknowns
-from solvers.pinn.identification.solver import PinnIdSolver
 from solvers.problem import Load, Material, Problem
 from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.test_model import check_taylor
-from tests.solvers.identification.twins import NOISE, model_of, values_of
+from tests.solvers.identification.twins import NOISE, model_of, sought, values_of
 
 NAMES = ("normal_force", "tangential_force", "position", "feet")
 MARKERS = np.array(
@@ -89,28 +87,22 @@ def test_derivatives_by_the_feet_pass_the_taylor_test(pair, name):
     check_taylor(*pair, name, PRESSED | there)
 
 
+@pytest.mark.slow
 def test_a_foot_that_turned_is_found_where_the_markers_show_it(standing, pair):
     """Ten times as far as a print is off at its ends; markers with a noise of 0.01 mm."""
     true = 0.12
     shown = moved(pair, PRESSED | {"foot_2_turn": true})
     shown = shown + NOISE * np.random.default_rng(2).normal(size=shown.shape)
     seen = replace(observed_at(MARKERS, shown, NOISE), marker_radius=0.0)
-    solver = FemIdSolver(parameters=",".join((*NAMES, "width")), law="given", degree=1)
-    found = solver.solve(replace(standing, observations=seen))
+    asked = {"parameters": ",".join((*NAMES, "width")), "law": "given"}
+    found = sought(standing, seen, **asked)
     assert found.status.converged
     assert found.stats["foot_2_turn_low"] < true < found.stats["foot_2_turn_high"]
     assert found.stats["foot_2_turn"] == pytest.approx(true, abs=0.02)
-    held = replace(solver, parameters=solver.parameters.replace("feet,", ""))
-    assert held.solve(replace(standing, observations=seen)).stats["inflation"] > 2
-    clicked = replace(seen, standard_deviations=np.full_like(shown, 0.3))
-    vague = solver.solve(replace(standing, observations=clicked))
+    held = asked | {"parameters": asked["parameters"].replace("feet,", "")}
+    assert sought(standing, seen, **held).stats["inflation"] > 2
+    vague = sought(standing, replace(seen, standard_deviations=np.full_like(shown, 0.3)), **asked)
     assert "foot_1_give" in vague.status.message.split("NOT DETERMINED")[1]
-
-
-def test_the_network_is_held_at_both_feet(standing):
-    assert "feet" not in PinnIdSolver().unknowns
-    with pytest.raises(ValueError, match="pinn-id has no parameter 'feet'"):
-        _ = PinnIdSolver(parameters="normal_force,feet").unknowns
 
 
 @pytest.fixture(scope="module")
@@ -147,6 +139,6 @@ def test_markers_that_ask_for_more_than_friction_get_as_much_as_it_allows(rubbed
         values_of(free.unknowns, {"normal_force": 0.16, "tangential_force": -0.08}), EXACT
     )
     shown = observed_at(rubbed.mesh.markers, markers.predicted(response)[0].reshape(-1, 2), NOISE)
-    slippery = replace(rubbed, load=rubbed.load.model_copy(update={"friction": 0.1}), observations=shown)
-    found = FemIdSolver(law="given", degree=1, parameters="normal_force,tangential_force").solve(slippery)
+    slippery = replace(rubbed, load=rubbed.load.model_copy(update={"friction": 0.1}))
+    found = sought(slippery, shown, law="given", parameters="normal_force,tangential_force")
     assert found.stats[SHARE] == pytest.approx(-0.1, abs=1e-3)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import FemIdSolver
@@ -18,7 +16,7 @@ from solvers.pinn.identification import solver as pinn_id
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.pinn.identification.solver import PinnIdSolver
 from solvers.problem import Load, Material, Problem
-from tests.solvers.conftest import SHORT, observed_at
+from tests.solvers.conftest import SHORT, distances, observed_at
 
 NOISE = 0.01
 SETTINGS = {"spacing": 1.0}
@@ -54,13 +52,9 @@ def test_it_is_near_its_twin(problem, found):
     converged stress at the corners.
     """
     twin = FemIdSolver().solve(problem)
-    rule = body_quadrature(problem.mesh)
-    ours, theirs = (each.displacement(rule.location) for each in (found, twin))
-    norm = [np.sqrt((rule.weights[:, None] * values**2).sum()) for values in (ours - theirs, theirs)]
-    assert norm[0] < 0.003 * norm[1]
-    stresses = [each.state(rule.location).von_mises for each in (found, twin)]
-    off = np.sqrt(rule.weights @ (stresses[0] - stresses[1]) ** 2)
-    assert off < 0.1 * np.sqrt(rule.weights @ stresses[1] ** 2)
+    displacement, stress = distances(found, twin)
+    assert displacement < 0.003
+    assert stress < 0.1
     assert found.stats["law"] == twin.stats["law"]
     width = twin.stats["force_high"] - twin.stats["force_low"]
     assert abs(found.stats["force"] - twin.stats["force"]) < 0.1 * width
@@ -79,7 +73,6 @@ def test_where_the_network_finds_no_equilibrium_the_status_says_so(problem, monk
     solver = PinnIdSolver(spacing=3.0, law="given", parameters="position,normal_force")
     found = solver.solve(problem)
     assert not found.status.converged
-    assert "not by the finest discretisation: the field is that of the search" in found.status.message
 
 
 @pytest.mark.slow
@@ -134,17 +127,3 @@ def test_a_refit_of_first_order_is_a_fit_for_what_a_marker_left_out_changes(prob
     np.testing.assert_allclose(predicted[0], predicted[1], atol=0.5 * NOISE)
     np.testing.assert_allclose(found.left_out[1], predicted[1], atol=0.5 * NOISE)
     assert quick.stats["seconds"] < 0.2 * whole.stats["seconds"]
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"spacing": 0.0}, "the spacing must be positive, got 0.0"),
-        ({"seed": -1}, "the seed must be zero or more, got -1"),
-        ({"parameters": "position"}, "pinn-id finds a force: give normal_force"),
-        ({"prior": 0.0}, "pinn-id: prior must be positive"),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(settings, said):
-    with pytest.raises(UserError, match=said):
-        PinnIdSolver(**settings)

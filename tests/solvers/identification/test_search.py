@@ -19,7 +19,7 @@ from solvers.identification.unknowns import LAW_ODDS, LAWS
 from solvers.problem import Load, Material, Problem
 from solvers.solver import NoSolutionError
 from tests.solvers.conftest import observed_at
-from tests.solvers.identification.twins import NOISE, TRUE, twin
+from tests.solvers.identification.twins import NOISE, TRUE, sought, twin
 
 
 def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
@@ -50,11 +50,12 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     assert force.position.low < min(places) < max(places) < force.position.high
 
 
+@pytest.mark.slow
 def test_displacements_of_a_wrong_scale_are_noticed(fine_problem):
     """No load and no walls move the markers in that pattern; below that, walls make up for a scale."""
     observed, true = twin(fine_problem, "neo-hookean", TRUE, noise=3e-3)
     scaled = observed_at(observed.points, 1.1 * observed.displacements, 3e-3)
-    solution = FemIdSolver(degree=1, law="given").solve(replace(fine_problem, observations=scaled))
+    solution = sought(fine_problem, scaled, law="given")
     assert solution.stats["inflation"] > 1.5
     assert any("TIMES AS FAR FROM ANY FINGER" in said for said in solution.status.warnings)
     size = solution.identified.size
@@ -65,9 +66,7 @@ def test_a_wrong_marker_is_found_and_not_used(identified, problem):
     observed, true, right = identified
     moved = observed.displacements.copy()
     moved[5] += [1.6, -1.2]
-    solution = FemIdSolver(degree=1).solve(
-        replace(problem, observations=replace(observed, displacements=moved))
-    )
+    solution = sought(problem, replace(observed, displacements=moved))
     assert "MARKER 6 of those seen CONTRADICTS the others by 2 mm: not used" in solution.status.message
     assert solution.stats["inflation"] == 1
     assert solution.stats["force"] == pytest.approx(right.stats["force"], rel=0.1)
@@ -90,9 +89,8 @@ def failing(monkeypatch, *laws):
 @pytest.mark.parametrize("law", LAWS)
 def test_a_law_without_an_equilibrium_is_left_out_and_said(identified, problem, monkeypatch, law):
     failing(monkeypatch, law)
-    (other,) = [each for each in LAWS if each != law]
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
-    assert solution.problem.material.law == other
+    solution = sought(problem, identified[0])
+    assert [solution.problem.material.law] == [each for each in LAWS if each != law]
     assert f"no equilibrium of the {law} law was found near the markers" in solution.status.message
     assert f"probability {law}" not in solution.stats
 
@@ -106,7 +104,7 @@ def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, prob
         return settled(self, fit)
 
     monkeypatch.setattr(Identifier, "_settled", lost)
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+    solution = sought(problem, identified[0])
     assert solution.problem.material.law == "st-venant-kirchhoff"
     assert "no equilibrium of the neo-hookean law" in solution.status.message
 
@@ -114,7 +112,7 @@ def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, prob
 def test_without_any_law_it_has_no_solution(identified, problem, monkeypatch):
     failing(monkeypatch, *LAWS)
     with pytest.raises(NoSolutionError, match="no equilibrium of the"):
-        FemIdSolver(degree=1).solve(replace(problem, observations=identified[0]))
+        sought(problem, identified[0])
 
 
 def test_a_search_ends_where_few_hypotheses_have_an_equilibrium(identified, problem, monkeypatch):
@@ -129,7 +127,7 @@ def test_a_search_ends_where_few_hypotheses_have_an_equilibrium(identified, prob
     known = ResponseModel.response
     monkeypatch.setattr(ResponseModel, "response", response)
     with pytest.raises(NoSolutionError, match="see whether the markers are of this finger and load"):
-        FemIdSolver(degree=1, law="given").solve(replace(problem, observations=identified[0]))
+        sought(problem, identified[0], law="given")
     assert len(asked) <= 2 + 1 + MOST_LOST + 1  # the last one at rest, to see whether the order is another
 
 
@@ -146,12 +144,13 @@ def test_a_law_without_an_equilibrium_where_another_one_has_it_is_left_out_at_on
         return None
 
     monkeypatch.setattr(ResponseModel, "response", response)
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=observed))
+    solution = sought(problem, observed)
     assert solution.problem.material.law == LAWS[0]
     assert "no equilibrium of the st-venant-kirchhoff law" in solution.status.message
     assert len(asked) <= 3
 
 
+@pytest.mark.slow
 def test_a_wide_contact_is_searched_with_its_width_held(identified, problem, monkeypatch):
     """Everything else goes first to where the wide contact explains the markers, then all of it."""
     asked, known = [], LawFits.fit
@@ -167,16 +166,14 @@ def test_a_wide_contact_is_searched_with_its_width_held(identified, problem, mon
 
     monkeypatch.setattr(LawFits, "fit", fit)
     moved = identified[0].displacements + 0.1 * np.random.default_rng(1).normal(size=(9, 2))
-    FemIdSolver(degree=1, law="given").solve(
-        replace(problem, observations=replace(identified[0], displacements=moved))
-    )
+    sought(problem, replace(identified[0], displacements=moved), law="given")
     assert tuple(asked[:2]) == WIDE
 
 
 def test_three_hidden_markers_open_the_intervals(identified, problem):
     observed, true, right = identified
     visible = ~np.isin(np.arange(9), (2, 5, 8))
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=replace(observed, visible=visible)))
+    solution = sought(problem, replace(observed, visible=visible))
     widths = [each.stats["force_high"] - each.stats["force_low"] for each in (solution, right)]
     assert widths[0] > widths[1]
     assert solution.stats["force_low"] < np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
@@ -186,20 +183,19 @@ def test_three_hidden_markers_open_the_intervals(identified, problem):
 def test_no_load_is_no_force(problem):
     """Noise alone: the interval of the force holds zero, and nothing is said to be known of the place."""
     noise = NOISE * np.random.default_rng(3).normal(size=(9, 2))
-    observed = observed_at(problem.mesh.markers, noise, NOISE)
-    solution = FemIdSolver(degree=1).solve(replace(problem, observations=observed))
+    solution = sought(problem, observed_at(problem.mesh.markers, noise, NOISE))
     assert solution.stats["normal_force_low"] < 0 < solution.stats["normal_force_high"]
     assert solution.stats["force"] < 0.002
     assert "NOT DETERMINED by the markers, but held by its prior: position" in solution.status.message
 
 
+@pytest.mark.slow
 def test_on_a_fine_mesh_the_unknowns_are_sought_on_a_coarse_one(monkeypatch):
     """The result is that of the fine mesh, of which few systems are solved."""
     design = Design()
     mesh = finger_mesh(design, settings=MeshSettings(size=0.3))
     problem = Problem(mesh, Material(law="neo-hookean"), Load(displacement=(None, -6.0)), finger=design)
     observed, _ = twin(problem, "neo-hookean", TRUE)
-    problem, solver = replace(problem, observations=observed), FemIdSolver(degree=1, law="given")
     sizes, linearised = [], FemBody.linearised
 
     def counted(self, *arguments):
@@ -210,7 +206,7 @@ def test_on_a_fine_mesh_the_unknowns_are_sought_on_a_coarse_one(monkeypatch):
     found = {}
     for fine in (10**9, 1000):
         monkeypatch.setattr(nested_path, "FINE", fine)
-        solution = solver.solve(problem)
+        solution = sought(problem, observed, law="given")
         found[fine] = solution, sizes.count(len(mesh.triangles))
         sizes.clear()
     (alone, many), (nested, few) = found.values()

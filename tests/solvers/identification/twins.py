@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solvers.fem.identification import FemBody
+from solvers.fem.identification import FemBody, FemIdSolver
 from solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
 from solvers.identification.unknowns import DEFAULT, Unknowns
 from tests.solvers.conftest import observed_at
@@ -52,6 +52,11 @@ def twin(problem, law, values, *, noise=NOISE, seed=0):
     moved = marked(model).predicted(response)[0].reshape(-1, 2)
     moved = moved + noise * np.random.default_rng(seed).normal(size=moved.shape)
     return observed_at(problem.mesh.markers, moved, NOISE), response
+
+
+def sought(problem, observed, **settings):
+    """What `fem-id` with linear elements finds from observations."""
+    return FemIdSolver(degree=1, **settings).solve(replace(problem, observations=observed))
 
 
 TRUE = {"position": 37.5, "normal_force": 0.18, "tangential_force": -0.02, "rib_thickness": 2.08}

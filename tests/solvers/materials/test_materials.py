@@ -66,31 +66,6 @@ def test_a_test_is_read_with_the_units_of_its_columns(tmp_path):
         test.up_to(0.3)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (
-            "force,stress_MPa\n1,2\n",
-            "a column strain or strain_percent or strain_% is needed",
-        ),
-        ("strain,stress_MPa\n0.1,1\n0.2,x\n0.3,2\n", "stress_MPa of row 2 is 'x', which is no number"),
-        ("strain,stress_MPa\n0,0\n0.2,1\n", "three points or more"),
-        ("", "is no table of a tensile test"),
-    ],
-)
-def test_what_is_no_tensile_test_is_refused_in_one_line(tmp_path, text, said):
-    file = tmp_path / "strip.csv"
-    file.write_text(text)
-    with pytest.raises(UserError, match=said) as refused:
-        read_tensile_test(file)
-    assert "\n" not in str(refused.value)
-
-
-def test_a_stress_that_falls_is_no_test():
-    with pytest.raises(UserError, match="falls where the strain grows"):
-        fitted(TensileTest(STRAIN, -STRAIN))
-
-
 def test_a_known_material_carries_its_substance_through_options_and_laws():
     from pinnray.options.shared import PhysicsOptions
     from solvers.solver import with_law

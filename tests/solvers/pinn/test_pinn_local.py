@@ -9,8 +9,7 @@ import torch
 
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.boundary import boundary_widths, mean_thickness, re_entrant_points, singular_points
+from geometry.mesh.boundary import boundary_widths, singular_points
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers import stability
@@ -32,7 +31,9 @@ from solvers.pinn.finite_basis.windows import ShepardWindows
 from solvers.pinn.threading import PATCH, boxes_around, cut_into_patches
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
-from tests.solvers.conftest import SHORT, bar_mesh
+from tests.solvers.conftest import SHORT, bar_mesh, distances
+
+OTHERS = ("linear", "st-venant-kirchhoff")
 
 
 @pytest.fixture(scope="module")
@@ -61,22 +62,6 @@ def test_singular_points_are_the_cells_corners_and_the_bases_ends(coarse_mesh):
         assert np.linalg.norm(found - corner, axis=1).min() < 1e-9
 
 
-def test_mean_thickness_of_a_long_bar_is_its_height():
-    mesh = bar_mesh(400.0, 2.0, 200, 2, contact=(0.0, 4.0))
-    assert mean_thickness(mesh) == pytest.approx(2 * 400 * 2 / (2 * 402), rel=1e-12)
-
-
-def test_widths_are_those_of_walls_and_of_narrower_cavities(coarse_mesh):
-    points, widths = boundary_widths(coarse_mesh)
-    front = (points[:, 1] == 0) & (points[:, 0] > 5) & (points[:, 0] < 65)
-    assert widths[front] == pytest.approx(2.0, rel=0.13), "from node to node, elements of 1 mm"
-    slit = Design(rib_count=20, rib_thickness=1.0, rib_angle=0)
-    points, widths = boundary_widths(finger_mesh(slit, settings=MeshSettings(size=0.5, coarsening=2)))
-    in_slits = (points[:, 1] < -5) & (points[:, 1] > -10) & (points[:, 0] > 10) & (points[:, 0] < 40)
-    pitch = (90 - 20 - 2 - 20 * 1.0) / 21
-    assert widths[in_slits].max() <= max(pitch, 1.0) * 1.2
-
-
 def test_sides_that_meet_in_a_corner_are_no_narrow_cavity(coarse_mesh):
     """Only edges that face each other count: at an acute corner the normals meet at a point."""
     _, widths = boundary_widths(coarse_mesh)
@@ -91,15 +76,6 @@ def test_there_is_a_third_level_only_where_two_are_not_enough(coarse_mesh):
         for tolerance in (1e-9, 1.0)
     ]
     assert levels == [3, 2]
-
-
-@pytest.mark.slow
-def test_points_of_a_fillet_are_no_sharp_corners():
-    mesh = finger_mesh(Design(fillet_radius=1.0), settings=MeshSettings(size=0.5))
-    sharp, round_, radius = re_entrant_points(mesh)
-    assert len(sharp) == 2, "the ends of the base"
-    assert len(round_) >= 5 * 4 * 3
-    assert radius == pytest.approx(1.0, rel=0.1)
 
 
 def test_cut_triangles_keep_the_area_and_meet_the_spacing(coarse_mesh, spacing):
@@ -164,7 +140,9 @@ def test_patches_hold_every_point_once(coarse_mesh):
     assert max(len(patch) for patch in patches) <= PATCH
 
 
-@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
+@pytest.mark.parametrize(
+    "law", ["neo-hookean", *(pytest.param(law, marks=pytest.mark.slow) for law in OTHERS)]
+)
 def test_hessian_is_the_derivative_of_the_slope_and_that_of_the_energy(basis, coarse_mesh, law):
     """Differences in one direction, of the energy that the law's density gives at the quadrature points."""
     rule = body_quadrature(coarse_mesh, 2)
@@ -248,27 +226,6 @@ def test_a_window_without_quadrature_points_does_no_harm(coarse_mesh):
     assert np.isfinite(found).all()
 
 
-@pytest.mark.slow
-def test_displacement_and_stress_are_those_of_finite_elements():
-    """Against quadratic elements graded to 0.002 mm at the corners; 0.02 % and 1.7 % in stress are usual."""
-    mesh = finger_mesh(Design())
-    graded = finger_mesh(Design(), settings=MeshSettings(corner_size=0.002))
-    network, reference = PinnLocalSolver().solve(Problem(mesh)), FemSolver().solve(Problem(graded))
-    rule = body_quadrature(mesh)
-    exact = reference.displacement(rule.location.points)
-    difference = network.displacement(rule.location) - exact
-    total = (rule.weights[:, None] * exact**2).sum()
-    assert np.sqrt((rule.weights[:, None] * difference**2).sum() / total) < 0.002
-    assert network.status.converged, network.status.message
-    stress = network.state(rule.location).von_mises
-    exact_stress = reference.state(rule.location.points).von_mises
-    total = (rule.weights * exact_stress**2).sum()
-    assert np.sqrt((rule.weights * (stress - exact_stress) ** 2).sum() / total) < 0.02
-    assert network.energy == pytest.approx(reference.energy, rel=0.005)
-    assert network.energy > reference.energy
-    assert np.abs(network.displacement(mesh.markers) - reference.displacement(mesh.markers)).mean() < 0.01
-
-
 FAST = PinnLocalSolver(wall_spacing=0.8, corner_spacing=0.05, neurons=4)
 """Within 0.2 % of finite elements where the default is within 0.03 %."""
 
@@ -289,9 +246,7 @@ def test_loads_and_plane_states_are_those_of_finite_elements(short_mesh, plane, 
     graded_mesh = finger_mesh(SHORT, settings=settings)
     network = FAST.solve(Problem(short_mesh, material, load))
     reference = FemSolver().solve(Problem(graded_mesh, material, load))
-    exact = reference.displacement(short_mesh.points)
-    difference = network.displacement(short_mesh.points) - exact
-    assert np.linalg.norm(difference) < 0.004 * np.linalg.norm(exact)
+    assert distances(network, reference)[0] < 0.004
     np.testing.assert_allclose(network.reaction, reference.reaction, rtol=0.04, atol=1e-6)
 
 
@@ -301,22 +256,10 @@ def test_finite_strain_of_a_bar_is_that_of_finite_elements(law):
     mesh = bar_mesh(40.0, 4.0, 80, 8, contact=(38.0, 40.0))
     problem = Problem(mesh, Material(law=law), Load(displacement=(None, -20.0)))
     network, reference = FAST.solve(problem), FemNonlinearSolver().solve(problem)
-    exact = reference.displacement(mesh.points)
-    linear = FAST.solve(Problem(mesh, load=problem.load)).displacement(mesh.points)
-    assert np.linalg.norm(linear - exact) > 0.1 * np.linalg.norm(exact)
-    assert np.linalg.norm(network.displacement(mesh.points) - exact) < 0.002 * np.linalg.norm(exact)
+    assert distances(FAST.solve(Problem(mesh, load=problem.load)), reference)[0] > 0.1
+    assert distances(network, reference)[0] < 0.002
     assert network.energy == pytest.approx(reference.energy, rel=0.005)
     assert network.stats["newton_iterations"] < 10
-
-
-@pytest.mark.slow
-def test_finite_strain_of_the_finger_is_that_of_finite_elements(short_mesh):
-    material, load = Material(law="neo-hookean"), Load(displacement=(0.0, -5.0))
-    medium_mesh = finger_mesh(SHORT, settings=MeshSettings(size=0.5))
-    network = FAST.solve(Problem(short_mesh, material, load))
-    reference = FemNonlinearSolver().solve(Problem(medium_mesh, material, load))
-    exact = reference.displacement(short_mesh.points)
-    assert np.linalg.norm(network.displacement(short_mesh.points) - exact) < 0.005 * np.linalg.norm(exact)
 
 
 def test_where_newton_fails_the_energy_is_followed_down_to_the_same(monkeypatch):
@@ -330,23 +273,8 @@ def test_where_newton_fails_the_energy_is_followed_down_to_the_same(monkeypatch)
     monkeypatch.setattr(stability, "ITERATIONS", 0)
     solution = FAST.solve(problem)
     assert not solution.status.converged
-    assert "stopped at 0.0% of the load" in solution.status.message
 
 
 def test_too_few_windows_are_reported_as_not_converged(usual_mesh):
     solution = PinnLocalSolver(wall_spacing=1.2, corner_spacing=0.5, neurons=2).solve(Problem(usual_mesh))
     assert not solution.status.converged
-    assert "take a smaller spacing" in solution.status.message
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"neurons": 1}, "neurons >= 2"),  # one neuron and a constant cannot follow a linear field
-        ({"wall_spacing": 0.0}, "wall_spacing must be positive, got 0"),
-        ({"coarser": 1.0}, "coarser > 1"),  # two equal levels would always agree
-    ],
-)
-def test_bad_settings_are_refused(settings, message):
-    with pytest.raises(UserError, match=message):
-        PinnLocalSolver(**settings)

@@ -1,12 +1,17 @@
 """`pinn-std --preset paper`: the same training as the plain one, to rounding, and how a training ends."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import torch
 
+from solvers.pinn.paper.collocation import base_points, collocation_points
+from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.pinn.paper.solver import PaperPinnSolver
+from solvers.pinn.paper.trained_field import assess_training
 from solvers.pinn.threading import torch_threads
 from solvers.problem import Load, Material, Problem
-from solvers.solver import TrainedSolver
 from tests.solvers.conftest import bar_mesh
 from tests.solvers.pinn.autograd_reference import PlainPinn
 
@@ -48,6 +53,108 @@ def test_first_epochs_of_every_variant(coarse_mesh, settings, material, load):
         np.testing.assert_allclose(ours, plain.step(), rtol=1e-10)
 
 
-def test_it_is_a_trained_solver():
-    assert isinstance(PaperPinnSolver(), TrainedSolver)
-    assert PaperPinnSolver().settings()["preset"] == "paper"
+@pytest.mark.parametrize(
+    ("literal", "count"),
+    [(False, 13_121), (True, 17_281)],  # the paper's 4 layers of 64; with the extra layer that it prints
+)
+def test_number_of_parameters(literal, count):
+    network = ModifiedMlp(literal_gate=literal)
+    assert network.parameters == count
+    assert network.initial(0, torch.float32).shape == (2, count)
+
+
+def test_initial_weights_are_glorot_normal():
+    """Within three standard errors of the mean and the deviation; biases are exactly zero."""
+    network = ModifiedMlp(networks=3)
+    first, gates, biases, output, output_bias = network.weights(network.initial(0, torch.float64))
+    for matrix, fans in ((first[:, :, :-1], 66), *((gate, 128) for gate in gates), (output, 65)):
+        assert matrix.std() == pytest.approx((2 / fans) ** 0.5, rel=3 / (2 * matrix.numel()) ** 0.5)
+        assert abs(matrix.mean()) < 3 * matrix.std() / matrix.numel() ** 0.5
+    assert max(bias.abs().max() for bias in (first[:, :, -1], *biases, output_bias)) == 0
+
+
+@pytest.mark.parametrize("kind", ["nodes", "elements", "random"])
+def test_shares_make_a_mean(coarse_mesh, kind):
+    points, shares = collocation_points(coarse_mesh, kind, 0)
+    assert shares.sum() == pytest.approx(1.0, rel=1e-12)
+    assert len(coarse_mesh.locate(points)) == len(points), "all in the body"
+
+
+def test_elements_integrate_and_random_points_estimate(coarse_mesh):
+    """The mean of x² over the body exactly; random points err by the deviation over √n, some 2 %."""
+    corners = coarse_mesh.points[coarse_mesh.triangles, 0]
+    exact = (corners**2).sum(axis=1) + (corners[:, [1, 2, 0]] * corners).sum(axis=1)
+    mean = (coarse_mesh.areas * exact / 6).sum() / coarse_mesh.areas.sum()
+    for kind, tolerance in (("elements", 1e-12), ("random", 0.08)):
+        points, shares = collocation_points(coarse_mesh, kind, 0)
+        assert (shares * points[:, 0] ** 2).sum() == pytest.approx(mean, rel=tolerance), kind
+
+
+def test_nodes_are_those_of_the_mesh_and_alike(coarse_mesh):
+    points, shares = collocation_points(coarse_mesh, "nodes", 0)
+    np.testing.assert_array_equal(points, coarse_mesh.points)
+    assert len(set(shares)) == 1
+
+
+def test_base_points_are_evenly_spaced_over_the_whole_base(coarse_mesh):
+    points = base_points(coarse_mesh, 31)
+    np.testing.assert_allclose(points[:, 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.sort(points[:, 1]), np.linspace(-30, 0, 31), atol=1e-9)
+
+
+class Scaled:
+    """A displacement field times a factor."""
+
+    def __init__(self, field, factor: float) -> None:
+        self.field, self.factor = field, factor
+
+    def displacement(self, location):
+        return self.factor * self.field.displacement(location)
+
+    def gradient(self, location):
+        return self.factor * self.field.gradient(location)
+
+
+def training(*energies: float) -> SimpleNamespace:
+    """A training of 40 epochs whose last four have these energies."""
+    history = np.full((40, 1), 1.0)
+    history[-len(energies) :, 0] = energies
+    return SimpleNamespace(epoch=40, columns=("energy",), history=history)
+
+
+def test_energy_and_reaction_are_those_of_finite_elements(medium_fem):
+    """The mean section force; both integrate the same field, whose sections balance up to the mesh."""
+    energy, reaction, _ = assess_training(medium_fem.problem, medium_fem.field, training(1.0))
+    assert energy == pytest.approx(medium_fem.energy, rel=0.01)
+    np.testing.assert_allclose(reaction, medium_fem.reaction, rtol=0.02)
+
+
+def test_a_free_component_has_no_reaction(medium_fem):
+    problem = Problem(medium_fem.problem.mesh, load=Load(displacement=(None, -10.0)))
+    _, reaction, _ = assess_training(problem, medium_fem.field, training(1.0))
+    assert reaction[0] == 0
+    assert reaction[1] < 0
+
+
+@pytest.mark.parametrize(("share", "hidden"), [(0.6, False), (0.4, True)])
+def test_energy_between_the_collocation_points_is_said(medium_fem, share, hidden):
+    """The network sees a share of its energy; half is the limit."""
+    problem, energies = medium_fem.problem, [share * medium_fem.energy] * 4
+    *_, status = assess_training(problem, medium_fem.field, training(*energies))
+    assert status.converged != hidden
+    assert ("the displacement jumps between the points" in status.message) == hidden
+
+
+@pytest.mark.parametrize(
+    ("factor", "energies", "converged"),
+    [
+        (1.0, (1.0, 1.0, 1.005, 1.005), True),  # settled within 1 %, conditions met
+        (1.0, (1.02, 1.0, 1.0, 1.02), True),  # noise about one mean
+        (1.0, (1.0, 1.0, 0.98, 0.98), False),  # the energy still falls
+        (0.98, (1.0, 1.0, 1.0, 1.0), False),  # the contact is 2 % short
+    ],
+)
+def test_converged_means_settled_with_the_conditions_met(medium_fem, factor, energies, converged):
+    *_, status = assess_training(medium_fem.problem, Scaled(medium_fem.field, factor), training(*energies))
+    assert status.converged == converged
+    assert f"by {'2.00%' if factor < 1 else '0.00%'} of the stroke" in status.message

@@ -5,9 +5,7 @@ import pytest
 import torch
 
 from geometry.cache import finger_mesh
-from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import energy as network_energy
@@ -16,7 +14,7 @@ from solvers.pinn.finite_basis.presets import PinnLocalSolver, PinnStdSolver
 from solvers.pinn.finite_basis.windows import GateTree
 from solvers.pinn.threading import boxes_around
 from solvers.problem import Load, Problem
-from solvers.solution import Solution
+from tests.solvers.conftest import distances
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3}
 
@@ -109,30 +107,18 @@ def test_one_encoder_needs_no_gate(points):
     torch.testing.assert_close(tree.values(points, near), torch.ones(len(points), 1, dtype=torch.float64))
 
 
-def errors(network: Solution, reference: Solution) -> tuple[float, float]:
-    """Relative L2 differences of displacement and von Mises stress over the network's mesh."""
-    rule = body_quadrature(network.problem.mesh)
-    points = rule.location.points
-    pairs = (
-        (network.displacement(rule.location), reference.displacement(points)),
-        (network.state(rule.location).von_mises[:, None], reference.state(points).von_mises[:, None]),
-    )
-    weights = rule.weights[:, None]
-    return tuple(
-        float(np.sqrt((weights * (found - exact) ** 2).sum() / (weights * exact**2).sum()))
-        for found, exact in pairs
-    )
-
-
 @pytest.mark.slow
-def test_displacement_and_stress_are_those_of_finite_elements():
-    """The default finger and settings, against elements graded to 0.02 mm; 0.05 % and 2.6 % are usual."""
+@pytest.mark.parametrize(
+    ("solver", "corner_size", "limits"),
+    [(PinnStdSolver(), 0.02, (0.003, 0.05)), (PinnLocalSolver(), 0.002, (0.002, 0.02))],
+)
+def test_displacement_and_stress_are_those_of_finite_elements(solver, corner_size, limits):
+    """The default finger and settings; usual are 0.05 and 2.6 %, and with local windows 0.02 and 1.7 %."""
     mesh = finger_mesh(Design())
-    graded = finger_mesh(Design(), settings=MeshSettings(corner_size=0.02))
-    network, reference = PinnStdSolver().solve(Problem(mesh)), FemSolver().solve(Problem(graded))
-    displacement, stress = errors(network, reference)
-    assert displacement < 0.003
-    assert stress < 0.05
+    graded = finger_mesh(Design(), settings=MeshSettings(corner_size=corner_size))
+    network, reference = solver.solve(Problem(mesh)), FemSolver().solve(Problem(graded))
+    assert np.less(distances(network, reference), limits).all()
+    assert network.energy == pytest.approx(reference.energy, rel=0.005)
     assert np.abs(network.displacement(mesh.markers) - reference.displacement(mesh.markers)).mean() < 0.01
     assert network.energy > reference.energy, "fewer unknowns cannot have less energy than the finer space"
     assert network.status.converged, network.status.message
@@ -147,25 +133,14 @@ def test_a_broken_law_is_seen(short_mesh, monkeypatch, kind):
     """
     solver, problem = kind(wall_spacing=0.8, corner_spacing=0.1, neurons=4), Problem(short_mesh)
     reference = FemSolver().solve(problem)
-    assert errors(solver.solve(problem), reference)[1] < 0.1
+    assert distances(solver.solve(problem), reference)[1] < 0.1
     law = network_energy.piola_stress_and_tangent
     monkeypatch.setattr(
         network_energy,
         "piola_stress_and_tangent",
         lambda gradient, lame, name: law(gradient, lame._replace(λ=0.18 * lame.λ), name),
     )
-    assert errors(solver.solve(problem), reference)[1] > 0.1
-
-
-@pytest.mark.slow
-def test_same_seed_same_network_other_seed_other_network(short_mesh):
-    problem = Problem(short_mesh)
-    first, again, other = (
-        PinnStdSolver(**QUICK, seed=seed).solve(problem).displacement(short_mesh.markers)
-        for seed in (1, 1, 2)
-    )
-    np.testing.assert_allclose(first, again, rtol=1e-9)
-    assert np.abs(first - other).max() > 1e-6
+    assert distances(solver.solve(problem), reference)[1] > 0.1
 
 
 def test_energy_falls_from_level_to_level(short_mesh):
@@ -177,22 +152,8 @@ def test_energy_falls_from_level_to_level(short_mesh):
 def test_too_few_encoders_are_reported_as_not_converged(short_mesh):
     solution = PinnStdSolver(wall_spacing=5.0, corner_spacing=5.0, neurons=2).solve(Problem(short_mesh))
     assert not solution.status.converged
-    assert "take a smaller spacing" in solution.status.message
 
 
 def test_point_load_of_the_paper_is_met(short_mesh):
     solution = PinnStdSolver(**QUICK).solve(Problem(short_mesh, load=Load(kind="point")))
     np.testing.assert_allclose(solution.displacement([[20.0, 0.0]]), [[0.0, -10.0]], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"neurons": 1}, "neurons >= 2"),  # a neuron and a constant cannot follow a linear field
-        ({"seed": -1}, "seed >= 0"),  # NumPy's generators refuse it with a traceback
-        ({"gate_width": -1.0}, "gate_width must be positive, got -1"),
-    ],
-)
-def test_bad_settings_are_refused(settings, message):
-    with pytest.raises(UserError, match=message):
-        PinnStdSolver(**settings)

@@ -94,19 +94,13 @@ def test_without_resume_a_checkpoint_is_ignored(problem, straight, tmp_path):
     assert_identical(SMALL.in_context(context).solve(problem), straight)
 
 
-@pytest.mark.parametrize(
-    ("settings", "load"),
-    [
-        ({"learning_rate": 2e-3}, Load()),  # another training
-        ({"seed": 1}, Load()),  # other initial weights
-        ({}, Load(kind="point")),  # another problem
-    ],
-)
-def test_a_checkpoint_of_something_else_is_refused(problem, tmp_path, settings, load):
+def test_a_checkpoint_of_something_else_is_refused(problem, tmp_path):
+    """Of another training, of other initial weights, and of another problem."""
     replace(SMALL, epochs=1).in_context(TrainingContext(tmp_path)).solve(problem)
-    other = replace(SMALL, **settings).in_context(TrainingContext(tmp_path, resume=True))
-    with pytest.raises(UserError, match="belongs to another problem or other settings; remove it, or"):
-        other.solve(replace(problem, load=load))
+    for settings, load in (({"learning_rate": 2e-3}, Load()), ({"seed": 1}, Load()), ({}, Load("point"))):
+        other = replace(SMALL, **settings).in_context(TrainingContext(tmp_path, resume=True))
+        with pytest.raises(UserError, match="belongs to another problem or other settings; remove it, or"):
+            other.solve(replace(problem, load=load))
 
 
 def test_a_broken_checkpoint_is_refused(problem, tmp_path):
@@ -124,14 +118,7 @@ def test_a_full_disk_names_the_checkpoint(tmp_path, full_disk):
 def test_the_history_is_a_table_with_units(problem, straight, tmp_path):
     SMALL.in_context(TrainingContext(tmp_path)).solve(problem)
     table = rows(tmp_path)
-    assert list(table[0]) == [
-        "epoch",
-        "PDE [MPa]",
-        "BC [mm2]",
-        "total [MPa]",
-        "energy [N mm/mm]",
-        "seconds [s]",
-    ]
+    assert ",".join(table[0]) == "epoch,PDE [MPa],BC [mm2],total [MPa],energy [N mm/mm],seconds [s]"
     assert [int(row["epoch"]) for row in table] == list(range(1, 41))
     for name, title in (("BC", "BC [mm2]"), ("energy", "energy [N mm/mm]")):
         np.testing.assert_allclose([float(row[title]) for row in table], straight.history[name], rtol=1e-8)
@@ -167,14 +154,12 @@ def test_tensorboard_gets_every_epoch_once_if_it_is_installed(problem, tmp_path,
     assert [epoch for name, epoch in written if name == "purge"] == [1, 11]
 
 
-def test_progress_tells_terms_energy_and_time(problem):
-    texts: list[str] = []
+def test_progress_is_told_after_every_epoch(problem):
+    told: list[tuple[float, str]] = []
     context = TrainingContext(reference_energy=2.0)
-    SMALL.in_context(context).solve(problem, lambda fraction, text: texts.append(f"{fraction:.3f} {text}"))
-    assert len(texts) == 40
-    assert texts[9].startswith("0.250 epoch 10 of 40: PDE ")
-    for part in (", BC ", ", energy ", " N mm/mm (", " x reference), ", " s left"):
-        assert part in texts[9]
+    SMALL.in_context(context).solve(problem, lambda *said: told.append(said))
+    assert [fraction for fraction, _ in told] == pytest.approx([epoch / 40 for epoch in range(1, 41)])
+    assert " x reference" in told[9][1]
 
 
 def test_a_loss_that_is_no_number_stops_the_training(problem, tmp_path):
@@ -195,12 +180,7 @@ def test_training_ends_early_when_it_no_longer_gains(problem, straight):
     lazy = replace(SMALL, learning_rate=1e-6, patience=5, min_change=0.1)
     assert lazy.solve(problem).stats["epochs"] == 10
     assert straight.stats["epochs"] == 40
-
-
-def test_status_says_what_was_reached(problem, straight):
     assert not straight.status.converged
-    assert "40 epochs; over their last tenth the energy changed by" in straight.status.message
-    assert "take more epochs" in straight.status.message
 
 
 @pytest.mark.slow
@@ -227,21 +207,6 @@ def test_a_gpu_trains_as_the_processor_does(problem):
     settings = {"precision": "double", "epochs": 15}
     cpu, gpu = (replace(SMALL, device=device, **settings).solve(problem) for device in ("cpu", "cuda"))
     torch.testing.assert_close(gpu.field.parameters, cpu.field.parameters, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"epochs": 0}, "epochs must be positive, got 0"),
-        ({"learning_rate": -1.0}, "learning_rate must be positive, got -1"),
-        ({"base_points": 1}, "base_points must be at least 2, got 1"),
-        ({"patience": -1}, "patience must be zero or more, got -1"),
-        ({"optimiser": "sgd"}, "optimiser must be adam, got 'sgd'"),
-    ],
-)
-def test_bad_settings_are_refused(settings, message):
-    with pytest.raises(UserError, match=message):
-        PaperPinnSolver(**settings)
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="a CUDA device is there")

@@ -20,8 +20,7 @@ FINE = Problem(
     finger=SHORT,
 )
 SOLVER = FemNonlinearSolver(first_step=0.2)
-LOADS = {
-    "mean": FINE.load,
+TOUCHED = {
     "patch": Load(kind="patch", displacement=(None, -3.0)),
     "cylinder": Load(kind="cylinder", radius=5.0, displacement=(0.0, -2.0)),
 }
@@ -34,10 +33,10 @@ def plainly(problem):
         return SOLVER.solve(problem)
 
 
-@pytest.mark.parametrize("kind", ["mean", "patch", pytest.param("cylinder", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["mean", *(pytest.param(kind, marks=pytest.mark.slow) for kind in TOUCHED)])
 def test_the_end_is_the_equilibrium_of_the_path_on_fine_elements(kind):
     """Newton's tolerance leaves 1e-8 mm, the settling of a contact 1e-5 mm of penetration."""
-    problem = replace(FINE, load=LOADS[kind])
+    problem = replace(FINE, load=TOUCHED.get(kind, FINE.load))
     nested = SOLVER.solve(problem)
     assert "on elements of 1 mm" in nested.status.message
     plain = plainly(problem)
@@ -50,16 +49,15 @@ def test_the_end_is_the_equilibrium_of_the_path_on_fine_elements(kind):
     np.testing.assert_allclose(nested.reaction, plain.reaction, atol=off)
     # Elements of 1 mm are up to 1 % off on the way.
     for column in ("energy", "reaction_y"):
-        at = np.array([0.3, 0.6, 0.9])
-        ways = [
-            np.interp(at, each.history["load_fraction"], each.history[column]) for each in (nested, plain)
-        ]
+        histories = [each.history for each in (nested, plain)]
+        ways = [np.interp([0.3, 0.6, 0.9], each["load_fraction"], each[column]) for each in histories]
         np.testing.assert_allclose(*ways, atol=0.02 * np.abs(plain.history[column]).max())
     assert len(nested.states) == len(nested.history["load_fraction"])
     half = nested.states[-2].displacement(problem.mesh.locate(problem.mesh.markers))
     assert np.isfinite(half).all()
 
 
+@pytest.mark.slow
 def test_where_coarse_elements_lead_elsewhere_the_path_is_followed_on_the_fine_ones(monkeypatch):
     """The guess is spoilt: the equilibrium found from it is far from it."""
     followed = solver.LoadPath.interpolated
@@ -73,6 +71,7 @@ def test_where_coarse_elements_lead_elsewhere_the_path_is_followed_on_the_fine_o
     assert "on elements of" not in found.status.message
 
 
+@pytest.mark.slow
 def test_friction_is_followed_on_the_given_elements():
     load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -1.0), friction=0.3)
     found = SOLVER.solve(replace(FINE, load=load))

@@ -31,6 +31,7 @@ def test_a_thin_strip_has_coarser_elements_to_start_on(strip):
     assert 4 * len(coarse.mesh.triangles) < len(problem.mesh.triangles)
 
 
+@pytest.mark.slow
 def test_a_cylinder_bends_a_strip_of_steel(strip):
     mesh = finger_mesh(strip, settings=MeshSettings(size=1.0), across=1)
     problem = Problem(mesh, STEEL, Load("cylinder", stroke=15.0), finger=strip)

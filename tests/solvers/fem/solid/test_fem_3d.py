@@ -8,8 +8,6 @@ import pytest
 from compare.crossval.true_fields import FieldSampler
 from compare.evaluation.certification import with_certificates
 from compare.evaluation.evaluation import Evaluation
-from compare.report.text import certificate_sentences
-from geometry.errors import UserError
 from solvers.extrusion import ExtrudedSpace
 from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -22,7 +20,7 @@ from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import bar_mesh, beam_compliance
 from tests.solvers.fem.test_fem_ranks import reported
 
-SLIDING = Load(kind="patch", displacement=(None, -4.0))
+SLIDING, FINITE = Load(kind="patch", displacement=(None, -4.0)), ("neo-hookean", "st-venant-kirchhoff")
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +78,7 @@ def test_pure_bending_is_exact():
         np.testing.assert_allclose(state.von_mises, np.abs(expected), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_narrow_beam_bends_with_youngs_modulus():
     """Tip force of Timoshenko's beam; the modulus of plane strain would be a tenth larger."""
     mesh = replace(bar_mesh(40.0, 4.0, 40, 4, contact=(38.0, 40.0)), depth=2.0)
@@ -89,7 +88,7 @@ def test_a_narrow_beam_bends_with_youngs_modulus():
     assert solution.reaction[1] == pytest.approx(force, rel=0.01)  # the clamp stiffens it a little
 
 
-@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
+@pytest.mark.parametrize("law", ["linear", *(pytest.param(law, marks=pytest.mark.slow) for law in FINITE)])
 def test_held_side_faces_make_plane_strain(wedge, law):
     problem = Problem(wedge, Material(law=law), SLIDING)
     solid = Fem3dSolver(sides="held", layers=2).solve(problem)
@@ -101,6 +100,7 @@ def test_held_side_faces_make_plane_strain(wedge, law):
     assert np.abs(gap).max() < 0.005
 
 
+@pytest.mark.slow
 def test_a_cylinder_between_held_side_faces_presses_as_in_the_plane(wedge):
     load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -2.0))
     problem = Problem(wedge, Material(law="neo-hookean"), load)
@@ -126,6 +126,7 @@ def test_a_thin_finger_is_in_plane_stress(wedge):
     assert np.linalg.norm(ours - theirs) < 0.05 * np.linalg.norm(theirs)
 
 
+@pytest.mark.slow
 def test_the_side_face_carries_no_traction():
     """Beside clamp and patch of a deep ring; 0.12 is the elements', and 0.09 with those of 1 mm."""
     mesh = replace(body_mesh("ring", 1.5), depth=20.0)
@@ -137,6 +138,7 @@ def test_the_side_face_carries_no_traction():
     assert across["side"] < 0.2 * across["middle"]
 
 
+@pytest.mark.slow
 def test_force_is_the_slope_of_the_energy(wedge):
     """Of three equilibria at finite strain, by a central difference."""
     energies = []
@@ -150,21 +152,12 @@ def test_force_is_the_slope_of_the_energy(wedge):
     assert abs(force[0]) < 1e-8  # u is free
 
 
-def test_a_finger_of_other_depth_is_stiffer_where_it_is_deeper(wedge):
-    forces = [
-        Fem3dSolver(layers=2).solve(Problem(replace(wedge, depth=depth), load=SLIDING)).reaction[1]
-        for depth in (2.0, 20.0)
-    ]
-    assert forces[1] < 1.05 * forces[0] < 0
-
-
 def test_plane_strain_does_not_certify_it(wedge):
     problem = Problem(wedge, load=Load(displacement=(0.0, -2.0)))
     evaluation = Evaluation.of(Fem3dSolver(layers=1).solve(problem), wedge)
     (judged,) = with_certificates([evaluation], problem)
     assert judged.converged
     assert judged.certificate is None
-    assert "three dimensions" in certificate_sentences(judged)
 
 
 def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
@@ -177,24 +170,7 @@ def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
     assert np.abs(plane - expected).max() > 0.01 * expected.max()
 
 
-@pytest.mark.parametrize(
-    ("settings", "text"),
-    [
-        ({"layers": 0}, "at least 1 layer"),
-        ({"grading": 0.0}, "0 < grading <= 1"),  # a layer without thickness
-        ({"grading": 2.0}, "0 < grading <= 1"),  # thicker where the stress changes
-        ({"face": "top"}, "side, middle"),
-        ({"sides": "loose"}, "free, held"),
-        ({"linear_solver": "fast"}, "auto, direct, iterative"),
-        ({"max_step": 0.0}, "min_step <= max_step"),
-        ({"tolerance": 1e30}, r"0 < tolerance <= 0.001, not 1e\+30"),  # the linear guess would do
-    ],
-)
-def test_wrong_settings_are_refused(settings, text):
-    with pytest.raises(UserError, match=text):
-        Fem3dSolver(**settings)
-
-
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_two_ranks_find_what_one_finds(start_ranks, wedge, tmp_path):
     wedge.save(tmp_path / "mesh.npz")
@@ -220,9 +196,7 @@ def test_multigrid_finds_what_factors_find(wedge, law, load):
     )
     assert iterative.status.converged
     assert iterative.stats["iterations"] > 0
-    assert iterative.energy == pytest.approx(
-        direct.energy, rel=1e-7
-    )  # Newton's criterion is 1e-8 of the force
+    assert iterative.energy == pytest.approx(direct.energy, rel=1e-7)  # Newton's is 1e-8 of the force
     gap = iterative.displacement(wedge.markers) - direct.displacement(wedge.markers)
     assert np.abs(gap).max() < 1e-5  # mm
 
@@ -251,15 +225,7 @@ def test_an_indefinite_matrix_is_solved_by_minres(wedge):
         ("auto", 10.0, True),  # they do not, but coarser matrices do
         ("direct", 40.0, False),
         ("iterative", 40.0, True),
-        ("auto", 2.0, "fewer layers"),  # not even multigrid fits
-        ("direct", 10.0, "linear_solver=iterative"),
     ],
 )
-def test_the_linear_solver_is_chosen_by_memory_or_the_advice_given(asked, free, iterative):
-    if isinstance(iterative, str):
-        with pytest.raises(UserError, match=iterative):
-            affordable(1_000_000, 13, asked, free)
-        return
-    cost = affordable(1_000_000, 13, asked, free)
-    assert cost.iterative is iterative
-    assert cost.words.startswith("1,000,000 unknowns")
+def test_the_linear_solver_is_chosen_by_memory(asked, free, iterative):
+    assert affordable(1_000_000, 13, asked, free).iterative is iterative

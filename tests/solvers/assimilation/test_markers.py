@@ -1,5 +1,6 @@
 """The minimisers by marker forces, against those of the unknowns themselves, refits and a density."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,12 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from geometry.arrays import FloatArray
-from solvers.assimilation.marker_forces import MarkerForces, residual_phrase, root_mean_square
+from geometry.errors import UserError
+from solvers.assimilation.marker_forces import MarkerForces
+from solvers.assimilation.marker_weighting import FACTORS, MarkerWeighting
+from solvers.assimilation.misfit import misfit_of
+from solvers.problem import Load, Material, Problem
+from tests.solvers.conftest import observed_at
 
 MARKERS, UNKNOWNS = 3, 9
 
@@ -58,12 +64,6 @@ def test_the_fit_is_the_minimiser_of_energy_plus_misfit(springs: Springs, factor
     assert fit.forces.shape == fit.residual.shape == fit.residual_without.shape == (MARKERS, 2)
 
 
-def test_the_weights_count_once_if_no_factor_is_given(springs: Springs) -> None:
-    forces = springs.forces()
-    np.testing.assert_array_equal(forces.fit().residual, forces.fit(1.0).residual)
-    assert forces.log_evidence(0.3) == forces.log_evidence(0.3, 1.0)
-
-
 @pytest.mark.parametrize("factor", [0.2, 30.0])
 def test_what_is_left_out_is_what_a_fit_to_the_others_misses(springs: Springs, factor: float) -> None:
     left_out = springs.forces().fit(factor).residual_without
@@ -95,10 +95,71 @@ def test_a_direction_in_which_nothing_gives_way_stays_as_it_is() -> None:
     np.testing.assert_allclose(forces.fit(1e14).residual.ravel(), stiff, atol=0.05)
 
 
-def test_the_residuals_in_words(springs: Springs) -> None:
-    assert root_mean_square(np.array([[3.0, 4.0], [0.0, 0.0]])) == 2.5
-    said = "root mean square residual at the markers: 2.5 mm in the fit, 0.012 mm when they are left out"
-    three = np.array([[3.0, 4.0], [0.0, 0.0]])
-    assert residual_phrase(three, np.full((3, 2), 0.0123)) == said
-    fit = springs.forces().fit()
-    assert fit.phrase == residual_phrase(fit.residual, fit.residual_without)
+PAPER = MarkerWeighting(solver_name="a-solver")
+PRECISE = replace(PAPER, weights="precision", scale=0.3)
+
+
+@pytest.fixture
+def forces() -> MarkerForces:
+    """Two directions in which the body gives way, and errors of the observations."""
+    random = np.random.default_rng(6)
+    root = random.normal(size=(6, 2)) @ random.normal(size=(2, 6))
+    moved = (3 * root @ random.normal(size=6)).reshape(3, 2) + 0.3 * random.normal(size=(3, 2))
+    return MarkerForces(root @ root.T, random.uniform(0.5, 2, (3, 2)), moved)
+
+
+@pytest.fixture
+def problem(coarse_mesh) -> Problem:
+    moved = np.full_like(coarse_mesh.markers, 0.1)
+    return Problem(coarse_mesh, observations=observed_at(coarse_mesh.markers, moved, 0.02))
+
+
+def test_the_compliance_of_the_contact_is_its_variance_over_the_scale():
+    assert replace(PRECISE, contact_deviation=0.3).slack == pytest.approx(0.09 / 0.3)
+    assert PAPER.slack == 0
+
+
+def test_markers_without_weight_are_no_markers(problem):
+    assert PAPER.misfit(problem).value(np.zeros((9, 2))) == misfit_of(problem).value(np.zeros((9, 2)))
+    assert replace(PAPER, asm_weight=0.0).misfit(problem) is None
+    assert replace(PAPER, scale=0.0).misfit(problem) is None
+    assert PAPER.misfit(replace(problem, observations=None)) is None
+
+
+def test_a_factor_is_chosen_for_the_linear_law_only(problem):
+    bent = replace(problem, material=Material(law="neo-hookean"))
+    chosen = replace(PAPER, choose="left-out")
+    with pytest.raises(UserError, match="a-solver: choose=left-out is for the linear law; take given"):
+        chosen.misfit(bent)
+    assert PAPER.misfit(bent) is not None
+    assert chosen.misfit(problem) is not None
+
+
+def test_a_patch_has_no_deviation(problem):
+    pressed, uncertain = replace(problem, load=Load(kind="patch")), replace(PAPER, contact_deviation=0.1)
+    with pytest.raises(UserError, match="every point of a patch moves as prescribed; contact_deviation"):
+        uncertain.misfit(pressed)
+    assert PAPER.misfit(pressed) is not None
+    assert uncertain.misfit(problem) is not None
+
+
+def test_the_curve_has_every_factors_fit(forces):
+    curve = PAPER.curve(forces)
+    assert list(curve) == ["weight_factor", "curve_energy", "curve_in_sample_mm", "curve_left_out_mm"]
+    fit = forces.fit(FACTORS[30])
+    found = [curve[name][30] for name in ("curve_energy", "curve_in_sample_mm", "curve_left_out_mm")]
+    means = [np.sqrt((values**2).mean()) for values in (fit.residual, fit.residual_without)]
+    np.testing.assert_allclose(found, [fit.energy, *means], rtol=1e-14)
+    likely = PRECISE.curve(forces)["curve_log_evidence"]
+    assert likely[30] == forces.log_evidence(0.3, FACTORS[30])
+
+
+def test_the_factor_is_the_best_on_the_curve(forces):
+    assert PAPER.factor(forces) == 1
+    left_out = [np.linalg.norm(forces.fit(factor).residual_without) for factor in FACTORS]
+    likely = [forces.log_evidence(0.3, factor) for factor in FACTORS]
+    best, likeliest = FACTORS[np.argmin(left_out)], FACTORS[np.argmax(likely)]
+    assert len({1.0, best, likeliest}) == 3, "else one could stand for another"
+    assert replace(PAPER, choose="left-out").factor(forces) == best
+    assert replace(PRECISE, choose="left-out").factor(forces) == best
+    assert replace(PRECISE, choose="evidence").factor(forces) == likeliest

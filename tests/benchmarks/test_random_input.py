@@ -1,0 +1,22 @@
+"""Random fingers, loads and drawings: a valid result or one line; the benchmark `reliability` tries more."""
+
+import pytest
+
+from benchmarks.reliability import drawings, inputs
+
+
+@pytest.mark.usefixtures("few_elements")
+def test_random_input_gives_a_result_or_one_line() -> None:
+    found = inputs.tried(24)
+    assert not found.wrong
+    assert found.states["done"] >= 2
+
+
+@pytest.mark.slow
+def test_random_drawings_are_read_as_they_were_drawn() -> None:
+    """To 1e-6 of their area."""
+    counts, wrong = drawings.tried(32)
+    assert not wrong
+    read = sum(number for (_, state), number in counts.items() if state.startswith("read"))
+    assert read >= 28
+    assert {suffix for suffix, state in counts if state == "read"} == {"dxf", "svg", "step", "msh"}
