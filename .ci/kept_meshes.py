@@ -7,6 +7,6 @@ mesh is not in the cache fails.
 import json
 import os
 
-from geometry import cache
+from pinnray.geometry import cache
 
 cache._version = json.loads(os.environ["MAKERS"]).__getitem__

@@ -6,30 +6,30 @@ The names below are imported on first use: `import geometry` is quick and needs 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from geometry.cache import cad_files as cad_files
-    from geometry.cache import finger_mesh as finger_mesh
-    from geometry.errors import OutsideBodyError as OutsideBodyError
-    from geometry.errors import ShapeError as ShapeError
-    from geometry.errors import UserError as UserError
-    from geometry.finger.design import Design as Design
-    from geometry.finger.finger import Finger as Finger
-    from geometry.finger.markers import marker_positions as marker_positions
-    from geometry.finger.presets import load_design as load_design
-    from geometry.finger.presets import parse_overrides as parse_overrides
-    from geometry.finger.presets import preset_names as preset_names
-    from geometry.finger.section import finger_section as finger_section
-    from geometry.finger.validation import allowed_range as allowed_range
-    from geometry.mesh.boundary import elements_through_thickness as elements_through_thickness
-    from geometry.mesh.point_location import LocatedPoints as LocatedPoints
-    from geometry.mesh.quadrature import Quadrature as Quadrature
-    from geometry.mesh.quadrature import body_quadrature as body_quadrature
-    from geometry.mesh.quadrature import edge_quadrature as edge_quadrature
-    from geometry.mesh.settings import MeshSettings as MeshSettings
-    from geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
-    from geometry.observations import Observations as Observations
-    from geometry.section.loop import Loop as Loop
-    from geometry.section.section import Section as Section
+    from pinnray.geometry.cache import cad_files as cad_files
+    from pinnray.geometry.cache import finger_mesh as finger_mesh
+    from pinnray.geometry.errors import OutsideBodyError as OutsideBodyError
+    from pinnray.geometry.errors import ShapeError as ShapeError
+    from pinnray.geometry.errors import UserError as UserError
+    from pinnray.geometry.finger.design import Design as Design
+    from pinnray.geometry.finger.finger import Finger as Finger
+    from pinnray.geometry.finger.markers import marker_positions as marker_positions
+    from pinnray.geometry.finger.presets import load_design as load_design
+    from pinnray.geometry.finger.presets import parse_overrides as parse_overrides
+    from pinnray.geometry.finger.presets import preset_names as preset_names
+    from pinnray.geometry.finger.section import finger_section as finger_section
+    from pinnray.geometry.finger.validation import allowed_range as allowed_range
+    from pinnray.geometry.mesh.boundary import elements_through_thickness as elements_through_thickness
+    from pinnray.geometry.mesh.point_location import LocatedPoints as LocatedPoints
+    from pinnray.geometry.mesh.quadrature import Quadrature as Quadrature
+    from pinnray.geometry.mesh.quadrature import body_quadrature as body_quadrature
+    from pinnray.geometry.mesh.quadrature import edge_quadrature as edge_quadrature
+    from pinnray.geometry.mesh.settings import MeshSettings as MeshSettings
+    from pinnray.geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
+    from pinnray.geometry.observations import Observations as Observations
+    from pinnray.geometry.section.loop import Loop as Loop
+    from pinnray.geometry.section.section import Section as Section
 else:
-    from geometry.lazy_exports import lazy_exports
+    from pinnray.geometry.lazy_exports import lazy_exports
 
     __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

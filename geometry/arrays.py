@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.errors import ShapeError, UserError
+from pinnray.geometry.errors import ShapeError, UserError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -11,15 +11,15 @@ from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
 
-from geometry.atomic import remove_partials, write_bytes
-from geometry.content_hash import content_hash, file_digest, sources_digest
-from geometry.drawing.description import Description
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.worker import run_task
+from pinnray.geometry.atomic import remove_partials, write_bytes
+from pinnray.geometry.content_hash import content_hash, file_digest, sources_digest
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.worker import run_task
 
 TIMEOUT_S = 300.0
 
@@ -82,7 +82,7 @@ def expected_triangles(finger: Finger, settings: MeshSettings | None) -> int:
     """Number of triangles that `finger_mesh` gives: of the mesh of the finger's file, else to a tenth."""
     if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings is None:
         return len(finger.mesh.triangles)
-    from geometry.mesh.element_size import estimated_triangles
+    from pinnray.geometry.mesh.element_size import estimated_triangles
 
     return estimated_triangles(finger, settings or MeshSettings())
 

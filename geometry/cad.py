@@ -11,10 +11,10 @@ from pathlib import Path
 import cadquery as cq
 from cadquery.occ_impl.exporters.dxf import DxfDocument
 
-from geometry.arrays import FloatArray
-from geometry.finger.finger import Finger, outline_with_contact
-from geometry.finger.svg import section_svg
-from geometry.section.loop import Loop
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.finger import Finger, outline_with_contact
+from pinnray.geometry.finger.svg import section_svg
+from pinnray.geometry.section.loop import Loop
 
 LABELLED = {"base": 5, "contact": 30}
 """Layers of a DXF file that name parts of the outline, with their colours' numbers."""

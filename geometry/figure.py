@@ -13,8 +13,8 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as MplFigure
 
-from geometry.arrays import FloatArray
-from geometry.atomic import write_bytes
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType

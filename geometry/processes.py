@@ -44,7 +44,7 @@ from threading import Event, Thread
 from time import monotonic
 from typing import IO, Any, Self, TypeVar
 
-from geometry.machine_memory import peak_memory_gb
+from pinnray.geometry.machine_memory import peak_memory_gb
 
 FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_", "MPIEXEC_")
 """Environment variables that would make a child a member of the parent's MPI run."""

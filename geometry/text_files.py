@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from geometry.errors import UserError
+from pinnray.geometry.errors import UserError
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
-from geometry.errors import UserError
-from geometry.machine_memory import free_memory_gb, limit_memory, peak_memory_gb
-from geometry.processes import Pool, ProcessFailed
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.machine_memory import free_memory_gb, limit_memory, peak_memory_gb
+from pinnray.geometry.processes import Pool, ProcessFailed
 
 
 def run_task(task: Mapping[str, Any], timeout_s: float) -> Any:
@@ -68,20 +68,20 @@ def perform(task: Mapping[str, Any], report: Callable[..., None]) -> Any:
 def _work(kind: str) -> Callable[[Mapping[str, Any]], Any]:
     """The function for tasks of a kind, its libraries imported: a limit of memory is the task's alone."""
     if kind == "drawing":
-        from geometry.drawing.description import Description
-        from geometry.drawing.load import finger_from_file
+        from pinnray.geometry.drawing.description import Description
+        from pinnray.geometry.drawing.load import finger_from_file
 
         return lambda task: finger_from_file(task["file"], Description(**task["description"]))
-    from geometry.drawing.drawn_finger import finger_from
+    from pinnray.geometry.drawing.drawn_finger import finger_from
 
     if kind == "mesh":
-        from geometry.mesh.mesher import MIN_ELEMENTS, build_mesh
-        from geometry.mesh.settings import MeshSettings
+        from pinnray.geometry.mesh.mesher import MIN_ELEMENTS, build_mesh
+        from pinnray.geometry.mesh.settings import MeshSettings
 
         return lambda task: build_mesh(
             finger_from(task["finger"]), MeshSettings(**task["settings"]), task.get("across", MIN_ELEMENTS)
         )
-    from geometry.cad import cad_contents
+    from pinnray.geometry.cad import cad_contents
 
     return lambda task: cad_contents(finger_from(task["finger"]), task["formats"])
 

@@ -12,20 +12,13 @@ Imports every other package; none imports this one.
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from compare.crossval.result import CrossvalResult as CrossvalResult
-    from compare.evaluation.evaluation import Evaluation as Evaluation
-    from geometry.drawing.drawn_finger import DrawnFinger as DrawnFinger
-    from geometry.errors import OutsideBodyError as OutsideBodyError
-    from geometry.errors import UserError as UserError
-    from geometry.finger.design import Design as Design
-    from geometry.finger.presets import load_design as load_design
-    from geometry.finger.presets import preset_names as preset_names
-    from geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
     from pinnray.camera import calibrate as calibrate
     from pinnray.camera import film_forces as film_forces
     from pinnray.camera import rig as rig
     from pinnray.camera import track as track
-    from pinnray.comparison import Comparison as Comparison
+    from pinnray.compared import Comparison as Comparison
+    from pinnray.comparison.crossval.result import CrossvalResult as CrossvalResult
+    from pinnray.comparison.evaluation.evaluation import Evaluation as Evaluation
     from pinnray.designers import optimise as optimise
     from pinnray.designers import predict as predict
     from pinnray.designers import predict_field as predict_field
@@ -37,22 +30,29 @@ if TYPE_CHECKING:
     from pinnray.functions import mesh as mesh
     from pinnray.functions import solve as solve
     from pinnray.functions import solver as solver
+    from pinnray.geometry.drawing.drawn_finger import DrawnFinger as DrawnFinger
+    from pinnray.geometry.errors import OutsideBodyError as OutsideBodyError
+    from pinnray.geometry.errors import UserError as UserError
+    from pinnray.geometry.finger.design import Design as Design
+    from pinnray.geometry.finger.presets import load_design as load_design
+    from pinnray.geometry.finger.presets import preset_names as preset_names
+    from pinnray.geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
     from pinnray.observations import Observations as Observations
     from pinnray.simulators import export as export
     from pinnray.solution import Solution as Solution
-    from solvers.finger_figures.sensitivity import LocalSensitivity as LocalSensitivity
-    from solvers.materials.presets import MATERIALS as MATERIALS
-    from solvers.physics import Load as Load
-    from solvers.physics import Material as Material
-    from solvers.problem import Problem as Problem
-    from solvers.registry import solver_names as solver_names
-    from studies.fields.prediction import PredictedField as PredictedField
-    from studies.optimum.search import Optimum as Optimum
-    from studies.robots.export import Exported as Exported
-    from vision.calibration.camera_calibration import Calibration as Calibration
-    from vision.rig.exposure import Exposure as Exposure
-    from vision.rig.motion import Motion as Motion
+    from pinnray.solvers.finger_figures.sensitivity import LocalSensitivity as LocalSensitivity
+    from pinnray.solvers.materials.presets import MATERIALS as MATERIALS
+    from pinnray.solvers.physics import Load as Load
+    from pinnray.solvers.physics import Material as Material
+    from pinnray.solvers.problem import Problem as Problem
+    from pinnray.solvers.registry import solver_names as solver_names
+    from pinnray.studies.fields.prediction import PredictedField as PredictedField
+    from pinnray.studies.optimum.search import Optimum as Optimum
+    from pinnray.studies.robots.export import Exported as Exported
+    from pinnray.vision.calibration.camera_calibration import Calibration as Calibration
+    from pinnray.vision.rig.exposure import Exposure as Exposure
+    from pinnray.vision.rig.motion import Motion as Motion
 else:
-    from geometry.lazy_exports import lazy_exports
+    from pinnray.geometry.lazy_exports import lazy_exports
 
     __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

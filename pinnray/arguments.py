@@ -4,29 +4,29 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict, get_args
 
-from geometry.cache import drawn_finger
-from geometry.drawing.description import Description, description_beside, load_description
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.keywords import FingerKeywords
-from geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
-from geometry.finger.presets import load_design
-from geometry.mesh.settings import MeshSettings
-from geometry.text_files import as_path
-from solvers.elasticity import LawName
-from solvers.materials.presets import preset
-from solvers.physics import Load, LoadKind, Material, Physics
-from solvers.registry import PRESETS, make_solver, unknown_solver
-from solvers.solver import Solver
+from pinnray.geometry.cache import drawn_finger
+from pinnray.geometry.drawing.description import Description, description_beside, load_description
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.keywords import FingerKeywords
+from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
+from pinnray.geometry.finger.presets import load_design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.text_files import as_path
+from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.materials.presets import preset
+from pinnray.solvers.physics import Load, LoadKind, Material, Physics
+from pinnray.solvers.registry import PRESETS, make_solver, unknown_solver
+from pinnray.solvers.solver import Solver
 
 DRAWINGS = (".step", ".stp", ".dxf", ".svg", ".msh")
 """Endings of the files that are read as drawings."""
 
 
 class PhysicsKeywords(TypedDict, total=False):
-    """Material and travel of the indenter, as in `solvers.physics.Physics`; each may be left out."""
+    """Material and travel of the indenter, as in `pinnray.solvers.physics.Physics`; each may be left out."""
 
     young: float
     poisson: float

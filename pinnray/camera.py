@@ -6,11 +6,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
-from geometry import observations
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.finger.parameters import unknown_parameter
-from geometry.text_files import as_path
 from pinnray.arguments import (
     FILM,
     MATERIAL,
@@ -22,18 +17,23 @@ from pinnray.arguments import (
     read_job,
     read_solver,
 )
+from pinnray.geometry import observations
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.parameters import unknown_parameter
+from pinnray.geometry.text_files import as_path
 from pinnray.observations import Observations
-from solvers.physics import Load, LoadKind, Material
-from solvers.solver import Solver
+from pinnray.solvers.physics import Load, LoadKind, Material
+from pinnray.solvers.solver import Solver
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from compare.camera.film import Film
-    from compare.runtime.tables import Cell
-    from vision.calibration.camera_calibration import Calibration
-    from vision.rig.exposure import Exposure
-    from vision.rig.motion import Motion
+    from pinnray.comparison.camera.film import Film
+    from pinnray.comparison.runtime.tables import Cell
+    from pinnray.vision.calibration.camera_calibration import Calibration
+    from pinnray.vision.rig.exposure import Exposure
+    from pinnray.vision.rig.motion import Motion
 
 
 def calibrate(
@@ -63,11 +63,11 @@ def calibrate(
     Raises:
         UserError: If the photographs do not determine the camera.
     """
-    from vision.calibration.camera_calibration import calibrate_camera
-    from vision.calibration.camera_file import check_format, save_calibration
-    from vision.calibration.charuco import parse_board
-    from vision.calibration.lens_fit import LensChoice
-    from vision.frames.sources import photographs
+    from pinnray.vision.calibration.camera_calibration import calibrate_camera
+    from pinnray.vision.calibration.camera_file import check_format, save_calibration
+    from pinnray.vision.calibration.charuco import parse_board
+    from pinnray.vision.calibration.lens_fit import LensChoice
+    from pinnray.vision.frames.sources import photographs
 
     given = [images] if isinstance(images, str | Path) or not isinstance(images, Iterable) else images
     sources = [as_path(each, "a photograph") for each in given]
@@ -101,8 +101,8 @@ def track(
     Raises:
         UserError: If the film does not show the finger.
     """
-    from compare.camera.track_film import track_film
-    from compare.runtime.stages import shown_stages
+    from pinnray.comparison.camera.track_film import track_film
+    from pinnray.comparison.runtime.stages import shown_stages
 
     for name in film:
         if name not in FILM:
@@ -145,10 +145,10 @@ def film_forces(
     """
     import pandas as pd
 
-    from compare.camera.force_estimate import MESH, force_rows, force_tracker, forces_of
-    from compare.camera.track_film import track_film
-    from compare.runtime.stages import shown_stages
-    from geometry.cache import finger_mesh, mesh_sizes
+    from pinnray.comparison.camera.force_estimate import MESH, force_rows, force_tracker, forces_of
+    from pinnray.comparison.camera.track_film import track_film
+    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.geometry.cache import finger_mesh, mesh_sizes
 
     words: dict[str, Any] = {**given}
     film = _film(source, {name: words.pop(name) for name in FILM if name in words})
@@ -198,8 +198,8 @@ def rig(
         tilt: Angle between the optical axis and the finger's z axis, degrees, up to 30.
         turn: Rotation of the camera about its optical axis, degrees.
         paint: Of the markers.
-        exposure: Light, lens and sensor, as `vision.rig.exposure.Exposure`.
-        motion: Numbers of frames at rest, moving and held, as `vision.rig.motion.Motion`.
+        exposure: Light, lens and sensor, as `pinnray.vision.rig.exposure.Exposure`.
+        motion: Numbers of frames at rest, moving and held, as `pinnray.vision.rig.motion.Motion`.
         boards: Number of photographs of a calibration board, for `calibrate`.
         board: Inner corners of a chessboard, such as "9x6".
         square: Side of its squares, mm.
@@ -216,19 +216,19 @@ def rig(
     Raises:
         UserError: If the finger cannot be filmed so.
     """
-    from compare.camera.filmed_force import filmed_course
-    from compare.camera.virtual_film import filmed_solution, write_film
-    from compare.runtime.output_folder import check_output
-    from compare.runtime.stages import shown_stages
-    from geometry.cache import finger_mesh
-    from vision.calibration.charuco import parse_board
-    from vision.rig.bench import PAINTS, Bench
-    from vision.rig.exposure import Exposure
-    from vision.rig.motion import Motion
-    from vision.rig.recording import Recording
-    from vision.rig.recording_files import FILES
-    from vision.rig.virtual_camera import default_camera, viewing_pose
-    from vision.tracking.workspace import default_workspace
+    from pinnray.comparison.camera.filmed_force import filmed_course
+    from pinnray.comparison.camera.virtual_film import filmed_solution, write_film
+    from pinnray.comparison.runtime.output_folder import check_output
+    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.geometry.cache import finger_mesh
+    from pinnray.vision.calibration.charuco import parse_board
+    from pinnray.vision.rig.bench import PAINTS, Bench
+    from pinnray.vision.rig.exposure import Exposure
+    from pinnray.vision.rig.motion import Motion
+    from pinnray.vision.rig.recording import Recording
+    from pinnray.vision.rig.recording_files import FILES
+    from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+    from pinnray.vision.tracking.workspace import default_workspace
 
     folder = as_path(out, "out")
     check_output(folder)
@@ -281,7 +281,7 @@ def _with_nan(row: "dict[str, Cell]") -> "dict[str, Cell]":
 
 def _film(source: object, film: Mapping[str, Any]) -> "Film":
     """The film, with the options of `FilmKeywords` that are given."""
-    from compare.camera.film import Film
+    from pinnray.comparison.camera.film import Film
 
     if (method := film.get("method", "precise")) not in ("precise", "hough"):
         raise UserError(f"method = {method!r}: there are precise, hough")

@@ -11,22 +11,22 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
-from compare.runtime.provenance import cores
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
-from geometry.text_files import as_path
 from pinnray.arguments import JobKeywords, mesh_settings, read_job
-from solvers.physics import Load, LoadKind, Material, Physics
+from pinnray.comparison.runtime.provenance import cores
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
+from pinnray.geometry.text_files import as_path
+from pinnray.solvers.physics import Load, LoadKind, Material, Physics
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from solvers.finger_figures.sensitivity import LocalSensitivity
-    from studies.fields.prediction import PredictedField
-    from studies.optimum.search import Optimum
-    from studies.sweep.study import Study
+    from pinnray.solvers.finger_figures.sensitivity import LocalSensitivity
+    from pinnray.studies.fields.prediction import PredictedField
+    from pinnray.studies.optimum.search import Optimum
+    from pinnray.studies.sweep.study import Study
 
 
 def sensitivity(
@@ -54,12 +54,12 @@ def sensitivity(
     Raises:
         UserError: If the load has friction or the body several materials, or the full load is not reached.
     """
-    from compare.evaluation.deformed_body import DeformedBody
-    from compare.evaluation.plausibility import problem_remarks
-    from compare.runtime.stages import shown_stages
-    from geometry.cache import finger_mesh
-    from solvers.finger_figures.sensitivity import sensitivity_of
-    from solvers.problem import Problem
+    from pinnray.comparison.evaluation.deformed_body import DeformedBody
+    from pinnray.comparison.evaluation.plausibility import problem_remarks
+    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.geometry.cache import finger_mesh
+    from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
+    from pinnray.solvers.problem import Problem
 
     words = ("size", "material", "load", "design")
     finger, elastic, moved = read_job(design, material, load, given, besides=words)
@@ -112,11 +112,11 @@ def sweep(
     Raises:
         UserError: If the study cannot be run, or the folder holds another one.
     """
-    from compare.runtime.stages import shown_stages
-    from studies.sweep.job import StudyJob
-    from studies.sweep.study import Study, load_study
-    from studies.sweep.sweep import run_sweep
-    from studies.sweep.tables import sample_table
+    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.studies.sweep.job import StudyJob
+    from pinnray.studies.sweep.study import Study, load_study
+    from pinnray.studies.sweep.sweep import run_sweep
+    from pinnray.studies.sweep.tables import sample_table
 
     finger: Finger | None = None
     folder = Path()
@@ -157,8 +157,8 @@ def predict(
     Raises:
         UserError: If the sweep has too few samples, or a finger is outside its ranges.
     """
-    from studies.emulator.emulator import prediction_table
-    from studies.emulator.store import emulator_of
+    from pinnray.studies.emulator.emulator import prediction_table
+    from pinnray.studies.emulator.store import emulator_of
 
     several = [fingers] if isinstance(fingers, Mapping) else fingers
     if not isinstance(several, Sequence) or not all(isinstance(each, Mapping) for each in several):
@@ -182,7 +182,7 @@ def predict_field(sweep: str | Path, finger: Mapping[str, object], stroke: float
     Raises:
         UserError: If the sweep has no fields or too few, or the finger or stroke is outside its ranges.
     """
-    from studies.fields.store import fields_of
+    from pinnray.studies.fields.store import fields_of
 
     emulator = fields_of(as_path(sweep, "the sweep"))
     read = emulator.inputs.read({name: str(value) for name, value in finger.items()})
@@ -209,10 +209,10 @@ def optimise(
     Raises:
         UserError: If the question cannot be asked, the folder holds another one, or nothing is allowed.
     """
-    from compare.runtime.stages import shown_stages
-    from studies.optimum.question import load_question, question_of
-    from studies.optimum.search import search_front
-    from studies.sweep.job import StudyJob
+    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.studies.optimum.question import load_question, question_of
+    from pinnray.studies.optimum.search import search_front
+    from pinnray.studies.sweep.job import StudyJob
 
     if isinstance(question, Mapping):
         read, folder = question_of({"name": "question", **question}), Path()

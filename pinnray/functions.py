@@ -11,14 +11,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Unpack
 
-from geometry.cache import finger_mesh
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from geometry.text_files import as_path
 from pinnray.arguments import (
     JobKeywords,
     MeshKeywords,
@@ -29,17 +21,25 @@ from pinnray.arguments import (
     read_solvers,
 )
 from pinnray.camera import read_observations
-from pinnray.comparison import Comparison
+from pinnray.compared import Comparison
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.text_files import as_path
 from pinnray.solution import Solution
-from solvers.physics import Load, LoadKind, Material
-from solvers.problem import Problem
-from solvers.registry import make_solver
-from solvers.solver import Solver, Traits, solved, with_law
+from pinnray.solvers.physics import Load, LoadKind, Material
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Solver, Traits, solved, with_law
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from compare.crossval.result import CrossvalResult
+    from pinnray.comparison.crossval.result import CrossvalResult
 
 
 def mesh(design: str | Path | Finger = "default", **given: Unpack[MeshKeywords]) -> TriangleMesh:
@@ -47,7 +47,7 @@ def mesh(design: str | Path | Finger = "default", **given: Unpack[MeshKeywords])
 
     Args:
         design: A finger, the name of a preset, or the path of a TOML file or of a drawing.
-        given: Settings of `geometry.mesh.settings.MeshSettings`, mm, and parameters of the finger.
+        given: Settings of `pinnray.geometry.mesh.settings.MeshSettings`, mm, and parameters of the finger.
 
     Raises:
         UserError: If the design or a setting is not admissible.
@@ -64,7 +64,7 @@ def load_drawing(file: str | Path, **description: Any) -> DrawnFinger:
     Args:
         file: The drawing. A TOML file of the same name beside it may hold its description.
         description: Lines of the description that are new or other: `clamp`, `contact`, `markers`, `depth`,
-            `units` and so on, as in `geometry.drawing.description.Description`.
+            `units` and so on, as in `pinnray.geometry.drawing.description.Description`.
 
     Raises:
         UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
@@ -120,9 +120,13 @@ def solve(
     Raises:
         UserError: If the solver does not support the problem, or the measurements cannot be of it.
     """
-    from compare.evaluation.deformed_body import DeformedBody
-    from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-    from compare.runtime.stages import shown_stages
+    from pinnray.comparison.evaluation.deformed_body import DeformedBody
+    from pinnray.comparison.evaluation.plausibility import (
+        check_positions,
+        displacement_remarks,
+        problem_remarks,
+    )
+    from pinnray.comparison.runtime.stages import shown_stages
 
     chosen = read_solver(solver, preset)
     others = (size, material, load, measurements)
@@ -193,9 +197,9 @@ def compare(
     Raises:
         UserError: If the comparison cannot be made.
     """
-    from compare.pipeline.job import Job, checked
-    from compare.pipeline.pipeline import compute, run
-    from compare.runtime.stages import shown_stages
+    from pinnray.comparison.pipeline.job import Job, checked
+    from pinnray.comparison.pipeline.pipeline import compute, run
+    from pinnray.comparison.runtime.stages import shown_stages
     from pinnray.options.preset_jobs import job_defaults
 
     if adapt is not None and (isinstance(adapt, bool) or not isinstance(adapt, int | float)):
@@ -246,7 +250,7 @@ def crossval(
         material: The elastic constants.
         load: Motion of the indenter, or its kind alone.
         progress: Whether to show the stages; if None in a notebook only.
-        study: Further attributes of `compare.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
+        study: Further attributes of `comparison.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
             `seeds`, `noise`; and parameters of finger, material and load, as for `solve`.
 
     Returns:
@@ -255,9 +259,9 @@ def crossval(
     Raises:
         UserError: If the study cannot be made, or the folder holds another one.
     """
-    from compare.crossval.cross_validation import cross_validate
-    from compare.crossval.study import CrossvalStudy, solver_variants
-    from compare.runtime.stages import shown_stages
+    from pinnray.comparison.crossval.cross_validation import cross_validate
+    from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
+    from pinnray.comparison.runtime.stages import shown_stages
 
     own = [each.name for each in fields(CrossvalStudy)]
     words = {name: study.pop(name) for name in list(study) if name not in own}

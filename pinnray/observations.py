@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry import observations
-from geometry.errors import UserError
-from geometry.finger.parameters import MARKER
-from geometry.registration import FIXED, Registration
-from geometry.text_files import as_path
+from pinnray.geometry import observations
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.parameters import MARKER
+from pinnray.geometry.registration import FIXED, Registration
+from pinnray.geometry.text_files import as_path
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,12 +70,12 @@ class Observations(observations.Observations):
 
     @classmethod
     def from_csv(cls, path: str | Path, *, marker_radius: float = MARKER / 2) -> Self:
-        """Read a CSV file with the columns x_mm, y_mm, u_mm, v_mm; see `vision.measurements`.
+        """Read a CSV file with the columns x_mm, y_mm, u_mm, v_mm; see `pinnray.vision.measurements`.
 
         Raises:
             UserError: If the file cannot be read; the message names the line.
         """
-        from vision.measurements import read_measurements
+        from pinnray.vision.measurements import read_measurements
 
         return cls.of(read_measurements(as_path(path, "the measurements"), marker_radius=marker_radius))
 
@@ -86,7 +86,7 @@ class Observations(observations.Observations):
         Raises:
             UserError: If a column is missing or a value is no number; the message names the row.
         """
-        from vision.measurements import measurements_of
+        from pinnray.vision.measurements import measurements_of
 
         if not hasattr(frame, "itertuples"):
             kind = type(frame).__name__

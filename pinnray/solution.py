@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.text_files import as_path
-from solvers import solution
-from solvers.finger_figures import FingerFigures, figures_of
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.text_files import as_path
+from pinnray.solvers import solution
+from pinnray.solvers.finger_figures import FingerFigures, figures_of
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyvista
 
-    from compare.evaluation.evaluation import Evaluation
-    from geometry.figure import Figure
+    from pinnray.comparison.evaluation.evaluation import Evaluation
+    from pinnray.geometry.figure import Figure
 
 FieldName = Literal["displacement", "von_mises", "strain_principal", "strain_xx", "strain_yy", "strain_xy"]
 
@@ -59,8 +59,8 @@ class Solution(solution.Solution):
         Raises:
             UserError: If there is no such quantity.
         """
-        from compare.figures.fields import VIEWED, triangle_values
-        from geometry.mesh.picture import plot_field
+        from pinnray.comparison.figures.fields import VIEWED, triangle_values
+        from pinnray.geometry.mesh.picture import plot_field
 
         known = {each.name: each for each in VIEWED}
         if quantity not in known:
@@ -118,7 +118,7 @@ class Solution(solution.Solution):
 
     def to_pyvista(self) -> "pyvista.UnstructuredGrid":
         """The fields as a grid of PyVista: those of the `.vtu` files, such as `von_mises_MPa`."""
-        from compare.report.output_files import field_grid
+        from pinnray.comparison.report.output_files import field_grid
 
         return field_grid(self.problem.mesh, self._fields)
 
@@ -148,11 +148,11 @@ class Solution(solution.Solution):
         file = as_path(path, "the file")
         try:
             if file.suffix == ".vtu":
-                from compare.report.output_files import write_vtu
+                from pinnray.comparison.report.output_files import write_vtu
 
                 write_vtu(file, self.problem.mesh, self._fields)
             elif file.suffix == ".csv":
-                from geometry.atomic import write_text
+                from pinnray.geometry.atomic import write_text
 
                 write_text(file, self.to_dataframe().to_csv(index=False, lineterminator="\n"))
             else:
@@ -164,6 +164,6 @@ class Solution(solution.Solution):
     @cached_property
     def _fields(self) -> "Evaluation":
         """Everything that is drawn and written, on the mesh of the problem."""
-        from compare.evaluation.evaluation import Evaluation
+        from pinnray.comparison.evaluation.evaluation import Evaluation
 
         return Evaluation.of(self, self.problem.mesh)

@@ -18,10 +18,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from solvers.extrusion import NodalSpace
-from solvers.problem import Problem, contact_ends, front_points
-from solvers.solution import Contact, ContactPoints
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.solvers.extrusion import NodalSpace
+from pinnray.solvers.problem import Problem, contact_ends, front_points
+from pinnray.solvers.solution import Contact, ContactPoints
 
 FRICTION_STEP = 0.2
 """Travel of a cylinder with friction in one step over its radius; within a step slip has one direction."""

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple, assert_never, get_args
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from solvers.names import LawName as LawName
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.names import LawName as LawName
 
 PLANES = ("strain", "stress")
 

@@ -4,14 +4,14 @@ import numpy as np
 from scipy.sparse import diags
 from scipy.sparse.linalg import spsolve
 
-from geometry.arrays import FloatArray
-from geometry.mesh.boundary import mean_thickness
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.quadrature import body_quadrature
-from solvers.elasticity import piola_stress
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Problem, contact_ends, contact_nodes
-from solvers.solution import DisplacementField, State
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.boundary import mean_thickness
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.solvers.elasticity import piola_stress
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Problem, contact_ends, contact_nodes
+from pinnray.solvers.solution import DisplacementField, State
 
 
 def energy_and_force(problem: Problem, field: DisplacementField, degree: int = 2) -> tuple[float, FloatArray]:

@@ -16,9 +16,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.lagrange import LagrangeSpace
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.lagrange import LagrangeSpace
 
 
 @dataclass(frozen=True, eq=False)

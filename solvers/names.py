@@ -3,7 +3,7 @@
 from typing import Literal
 
 LawName = Literal["linear", "neo-hookean", "st-venant-kirchhoff", "gent"]
-"""See `solvers.elasticity`."""
+"""See `pinnray.solvers.elasticity`."""
 
 LoadKind = Literal["mean", "point", "patch", "cylinder"]
-"""See `solvers.physics.Load`."""
+"""See `pinnray.solvers.physics.Load`."""

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, get_
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.finger.parameters import CheckedModel, bounded
-from solvers.elasticity import Lame, lame_constants
-from solvers.names import LawName
-from solvers.names import LoadKind as LoadKind
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.parameters import CheckedModel, bounded
+from pinnray.solvers.elasticity import Lame, lame_constants
+from pinnray.solvers.names import LawName
+from pinnray.solvers.names import LoadKind as LoadKind
 
 RADIUS = 5.0
 """Default radius of the cylinder, mm."""

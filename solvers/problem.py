@@ -8,23 +8,23 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.content_hash import content_hash
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.quadrature import segment_quadrature
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.notebook import brief
-from geometry.observations import Observations
-from solvers.elasticity import Lame, lame_constants
-from solvers.physics import LEAST_TRAVEL as LEAST_TRAVEL
-from solvers.physics import RADIUS as RADIUS
-from solvers.physics import ROUGHEST as ROUGHEST
-from solvers.physics import Load as Load
-from solvers.physics import LoadKind as LoadKind
-from solvers.physics import Material as Material
-from solvers.physics import Physics as Physics
-from solvers.physics import Substance as Substance
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.content_hash import content_hash
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.quadrature import segment_quadrature
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.notebook import brief
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.elasticity import Lame, lame_constants
+from pinnray.solvers.physics import LEAST_TRAVEL as LEAST_TRAVEL
+from pinnray.solvers.physics import RADIUS as RADIUS
+from pinnray.solvers.physics import ROUGHEST as ROUGHEST
+from pinnray.solvers.physics import Load as Load
+from pinnray.solvers.physics import LoadKind as LoadKind
+from pinnray.solvers.physics import Material as Material
+from pinnray.solvers.physics import Physics as Physics
+from pinnray.solvers.physics import Substance as Substance
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,23 +10,23 @@ from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from geometry.errors import UserError
-from solvers.solver import Solver, check_name
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.solver import Solver, check_name
 
 GROUP = "pinnray.solvers"
 
 PRESETS = {
     "pinn-std": {
-        "fast": "solvers.pinn.finite_basis.presets:PinnStdSolver",
-        "local": "solvers.pinn.finite_basis.presets:PinnLocalSolver",
-        "paper": "solvers.pinn.paper.solver:PaperPinnSolver",
-        "trained": "solvers.pinn.finite_basis.presets:TrainedPinnSolver",
+        "fast": "pinnray.solvers.pinn.finite_basis.presets:PinnStdSolver",
+        "local": "pinnray.solvers.pinn.finite_basis.presets:PinnLocalSolver",
+        "paper": "pinnray.solvers.pinn.paper.solver:PaperPinnSolver",
+        "trained": "pinnray.solvers.pinn.finite_basis.presets:TrainedPinnSolver",
     },
     "pinn-asm": {
-        "fast": "solvers.pinn.finite_basis.presets:PinnAsmSolver",
-        "local": "solvers.pinn.finite_basis.presets:PinnLocalAsmSolver",
-        "paper": "solvers.pinn.paper.solver:PaperPinnAsmSolver",
-        "trained": "solvers.pinn.finite_basis.presets:TrainedPinnAsmSolver",
+        "fast": "pinnray.solvers.pinn.finite_basis.presets:PinnAsmSolver",
+        "local": "pinnray.solvers.pinn.finite_basis.presets:PinnLocalAsmSolver",
+        "paper": "pinnray.solvers.pinn.paper.solver:PaperPinnAsmSolver",
+        "trained": "pinnray.solvers.pinn.finite_basis.presets:TrainedPinnAsmSolver",
     },
 }
 """Presets of our solvers, the default first. Each is a class with its own settings."""
@@ -38,16 +38,16 @@ FORMER = {"pinn-local": "pinn-std", "pinn-local-asm": "pinn-asm"}
 """Former names of the preset `local`, and the solvers that have it."""
 
 BUILT_IN = {
-    "fem": "solvers.fem.linear:FemSolver",
-    "fem-nonlinear": "solvers.fem.finite_strain.solver:FemNonlinearSolver",
-    "fem-3d": "solvers.fem.solid:Fem3dSolver",
-    "fem-id": "solvers.fem.identification:FemIdSolver",
-    "fem-asm": "solvers.fem.assimilating:FemAsmSolver",
-    "gp": "solvers.statistics.gaussian_process:GaussianProcessSolver",
-    "statfem": "solvers.statistics.statistical_fem:StatFemSolver",
+    "fem": "pinnray.solvers.fem.linear:FemSolver",
+    "fem-nonlinear": "pinnray.solvers.fem.finite_strain.solver:FemNonlinearSolver",
+    "fem-3d": "pinnray.solvers.fem.solid:Fem3dSolver",
+    "fem-id": "pinnray.solvers.fem.identification:FemIdSolver",
+    "fem-asm": "pinnray.solvers.fem.assimilating:FemAsmSolver",
+    "gp": "pinnray.solvers.statistics.gaussian_process:GaussianProcessSolver",
+    "statfem": "pinnray.solvers.statistics.statistical_fem:StatFemSolver",
     "pinn-std": PRESETS["pinn-std"]["fast"],
     "pinn-asm": PRESETS["pinn-asm"]["fast"],
-    "pinn-id": "solvers.pinn.identification.solver:PinnIdSolver",
+    "pinn-id": "pinnray.solvers.pinn.identification.solver:PinnIdSolver",
 }
 
 

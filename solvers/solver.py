@@ -12,10 +12,10 @@ from typing import Any, ClassVar, Literal, Protocol, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.errors import UserError
-from geometry.observations import Observations
-from solvers.problem import Load, Material, Problem
-from solvers.solution import Solution, Status
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import Solution, Status
 
 RESERVED = "truth"
 """Name of the field of a simulated finger, which no solver can have."""

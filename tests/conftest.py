@@ -15,12 +15,12 @@ from typing import Any
 
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.processes import child_environment, leave_signals_alone
-from solvers.solver import silent
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.processes import child_environment, leave_signals_alone
+from pinnray.solvers.solver import silent
 
 leave_signals_alone(
     os.environ
@@ -119,7 +119,7 @@ def start_ranks() -> Callable[..., subprocess.Popen[str]]:
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures take most of the time of a small run, and have tests of their own."""
-    monkeypatch.setattr("compare.pipeline.pipeline.draw_all", lambda *_: [])
+    monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.draw_all", lambda *_: [])
 
 
 @pytest.fixture
@@ -130,13 +130,13 @@ def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
         for name, each in tasks.items():
             yield name, work(each, silent)
 
-    monkeypatch.setattr("geometry.processes.Pool.answers", inline)
+    monkeypatch.setattr("pinnray.geometry.processes.Pool.answers", inline)
 
 
 @pytest.fixture(scope="session")
 def discs_fitted_once() -> Iterator[None]:
     """Discs are not fitted again in a picture where they were: tests share films, and it takes longest."""
-    from vision.discs import disc_detector
+    from pinnray.vision.discs import disc_detector
 
     fit, known = disc_detector.fit_discs, {}
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.drawing.placement import Placement
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.drawing.placement import Placement
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
 
 
 def drawn(name: str, section: Section, markers: FloatArray, contact_abscissa: float) -> DrawnFinger:

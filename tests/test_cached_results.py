@@ -6,7 +6,7 @@ from pathlib import Path
 import grimp
 import pytest
 
-from geometry.content_hash import PROGRAM
+from pinnray.geometry.content_hash import PROGRAM
 
 ROOT = Path(__file__).parents[1]
 DIGESTS = ("sources_digest", "job_definition", "job.definition")
@@ -32,14 +32,14 @@ def keyed_modules() -> list[str]:
 def test_every_kind_of_cached_result_has_a_key():
     assert {module.rpartition(".")[0] for module in keyed_modules()} == {
         "geometry",  # meshes, CAD, drawings
-        "compare.evaluation",  # simulated truths
-        "compare.pipeline",  # solutions that a resumed run takes over
-        "compare.crossval",  # truths, folds
-        "studies.sweep",
-        "studies.emulator",
-        "studies.fields",
-        "studies.gridsearch",
-        "studies.optimum",
+        "pinnray.comparison.evaluation",  # simulated truths
+        "pinnray.comparison.pipeline",  # solutions that a resumed run takes over
+        "pinnray.comparison.crossval",  # truths, folds
+        "pinnray.studies.sweep",
+        "pinnray.studies.emulator",
+        "pinnray.studies.fields",
+        "pinnray.studies.gridsearch",
+        "pinnray.studies.optimum",
     }
 
 

@@ -12,7 +12,7 @@ PAGE = DOCS / "designers.md"
 
 
 def test_the_page_has_every_quantity_with_its_unit_and_meaning() -> None:
-    from solvers.finger_figures import QUANTITIES
+    from pinnray.solvers.finger_figures import QUANTITIES
 
     rows = table(PAGE, "quantity")
     assert names(rows) == list(QUANTITIES)
@@ -22,8 +22,8 @@ def test_the_page_has_every_quantity_with_its_unit_and_meaning() -> None:
 
 
 def test_the_page_has_every_key_of_a_study_and_of_a_question() -> None:
-    from studies.optimum.question import Question
-    from studies.sweep.study import Study
+    from pinnray.studies.optimum.question import Question
+    from pinnray.studies.sweep.study import Study
 
     assert names(table(PAGE, "key of a study")) == list(Study.model_fields)
     own = [name for name in Question.model_fields if name not in Study.model_fields]
@@ -32,14 +32,14 @@ def test_the_page_has_every_key_of_a_study_and_of_a_question() -> None:
 
 @pytest.mark.parametrize("name", ["ribs.toml", "loads.toml", "friction.toml", "fingers.toml"])
 def test_the_example_study_can_be_read(name: str) -> None:
-    from studies.sweep.study import load_study
+    from pinnray.studies.sweep.study import load_study
 
     load_study(DOCS / "examples" / name)
 
 
 @pytest.mark.parametrize("name", ["wrap.toml", "wrap-cylinder.toml"])
 def test_the_example_questions_can_be_read(name: str) -> None:
-    from studies.optimum.question import load_question
+    from pinnray.studies.optimum.question import load_question
 
     load_question(DOCS / "examples" / name)
 
@@ -49,9 +49,9 @@ def test_the_example_questions_can_be_read(name: str) -> None:
 def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(tmp_path, monkeypatch):
     from pinnray.cli import compare_main, main
 
-    monkeypatch.setattr("studies.optimum.search.ROUNDS", 2)
-    monkeypatch.setattr("studies.optimum.proposals.POPULATION", 16)  # a quick search for the front
-    monkeypatch.setattr("studies.optimum.proposals.GENERATIONS", 4)
+    monkeypatch.setattr("pinnray.studies.optimum.search.ROUNDS", 2)
+    monkeypatch.setattr("pinnray.studies.optimum.proposals.POPULATION", 16)  # a quick search for the front
+    monkeypatch.setattr("pinnray.studies.optimum.proposals.GENERATIONS", 4)
     monkeypatch.setitem(JOBS, "", JobDefaults(solvers="fem"))
     shutil.copytree(DOCS / "examples", tmp_path / "docs" / "examples")
     quick = {"samples = 64": "samples = 20", "runs = 40": "runs = 20", "mesh_size = 1.0": "mesh_size = 2.0"}

@@ -15,18 +15,18 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from geometry.cache import CAD_FORMATS
-from geometry.finger.markers import marker_positions
-from geometry.finger.parameters import Parameters, parameter_info
-from geometry.finger.presets import FOLDER, load_design, preset_names
-from geometry.mesh.settings import MeshSettings
 from pinnray.cli import compare_main, main
 from pinnray.commands.app import pinnray
+from pinnray.geometry.cache import CAD_FORMATS
+from pinnray.geometry.finger.markers import marker_positions
+from pinnray.geometry.finger.parameters import Parameters, parameter_info
+from pinnray.geometry.finger.presets import FOLDER, load_design, preset_names
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.preset_jobs import JOBS, JobDefaults
-from solvers.registry import BUILT_IN, PRESETS, make_solver
-from solvers.solver import Solver, Traits
-from vision.rig.exposure import Exposure
-from vision.rig.motion import Motion
+from pinnray.solvers.registry import BUILT_IN, PRESETS, make_solver
+from pinnray.solvers.solver import Solver, Traits
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.motion import Motion
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -354,7 +354,12 @@ def test_the_docs_have_every_setting_of_the_other_presets_as_it_is():
 
 
 def test_the_docs_have_the_limits_of_the_certificate():
-    from compare.evaluation.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT, WORK_LIMIT
+    from pinnray.comparison.evaluation.certificate import (
+        CONDITION_LIMIT,
+        ENERGY_LIMIT,
+        INTERPOLANT_LIMIT,
+        WORK_LIMIT,
+    )
 
     said = [float(row[1].split(" %")[0]) / 100 for row in table(TRUST, "fault")]
     assert said == [ENERGY_LIMIT, CONDITION_LIMIT, INTERPOLANT_LIMIT, WORK_LIMIT]
@@ -392,7 +397,7 @@ def test_the_page_of_the_python_interface_has_every_name():
 
 
 def test_the_docs_have_every_column_of_measurements():
-    from vision.measurements import OPTIONAL, REQUIRED
+    from pinnray.vision.measurements import OPTIONAL, REQUIRED
 
     rows = table(MEASUREMENTS, "column")
     documented = [(name, row[1]) for name, row in zip(names(rows), rows, strict=True)]
@@ -400,7 +405,7 @@ def test_the_docs_have_every_column_of_measurements():
 
 
 def test_the_measurements_in_the_docs_can_be_read(tmp_path):
-    from vision.measurements import read_measurements
+    from pinnray.vision.measurements import read_measurements
 
     table, frames = [block.text for block in blocks(MEASUREMENTS) if block.language == "csv"]
     path = tmp_path / "markers.csv"
@@ -415,9 +420,9 @@ def test_the_measurements_in_the_docs_can_be_read(tmp_path):
 @pytest.mark.parametrize(
     ("page", "column", "listed"),
     [
-        (FORCE, "parameter that can be found", "solvers.identification.unknowns:NAMES"),
-        (OWN_TRUTH, "scheme", "compare.crossval.folds:SCHEMES"),
-        (OWN_TRUTH, "truth", "compare.evaluation.truths:TRUTHS"),
+        (FORCE, "parameter that can be found", "pinnray.solvers.identification.unknowns:NAMES"),
+        (OWN_TRUTH, "scheme", "pinnray.comparison.crossval.folds:SCHEMES"),
+        (OWN_TRUTH, "truth", "pinnray.comparison.evaluation.truths:TRUTHS"),
     ],
 )
 def test_the_docs_have_every_name_of_a_list(page, column, listed):
@@ -425,7 +430,7 @@ def test_the_docs_have_every_name_of_a_list(page, column, listed):
 
 
 def test_the_docs_have_every_key_of_a_published_line():
-    from compare.camera.publication import FrameLine, PublishedForce
+    from pinnray.comparison.camera.publication import FrameLine, PublishedForce
 
     page = HOW_TO / "force-from-film.md"
     for heading, model in (("key of a line", FrameLine), ("key of a line's force", PublishedForce)):
@@ -436,7 +441,7 @@ def test_the_docs_have_every_key_of_a_published_line():
 
 
 def test_the_docs_have_every_exit_code():
-    from compare.runtime import exits
+    from pinnray.comparison.runtime import exits
 
     codes = {int(name) for name in names(table(REFERENCE / "exit-codes.md", "code"))}
     assert codes == {0, 1, exits.BAD_INPUT, exits.NOT_CONVERGED, exits.INTERRUPTED, exits.UNREAD}

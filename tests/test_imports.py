@@ -11,8 +11,8 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from geometry.content_hash import PROGRAM
 from pinnray.commands.app import COMMANDS
+from pinnray.geometry.content_hash import PROGRAM
 from tests.pinnray.commands.programs import run_python
 
 ROOT = Path(__file__).parents[1]

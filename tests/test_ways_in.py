@@ -26,8 +26,8 @@ def test_the_page_has_the_table_of_the_default_run(page, name):
 
 @pytest.mark.slow
 def test_the_figures_of_the_default_run_are_those_of_the_program():
-    from compare.evaluation.metrics import force_error, truth_differences
     from pinnray import compare
+    from pinnray.comparison.evaluation.metrics import force_error, truth_differences
 
     comparison = compare("default", ["fem", "fem-asm", "gp"])
     kept = {each.solver: each for each in kept_figures()}

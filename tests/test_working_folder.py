@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from geometry.processes import Pool, child_environment
+from pinnray.geometry.processes import Pool, child_environment
 
 
 def sum_of(number: int, progress: Callable[..., None]) -> int:
@@ -43,7 +43,7 @@ def run_in(folder: Path, code: str) -> str:
 
 def test_gmsh_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
     (tmp_path / ".petscrc").write_text(f"-history {tmp_path / 'written'}\n")
-    assert run_in(tmp_path, "from geometry.mesh.mesher import session\nwith session(): pass") == ""
+    assert run_in(tmp_path, "from pinnray.geometry.mesh.mesher import session\nwith session(): pass") == ""
     assert not (tmp_path / "written").exists()
 
 
@@ -55,7 +55,7 @@ def test_fem_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
         (tmp_path / f"dolfinx_jit_{name}.json").write_text('{"cffi_extra_compile_args": ["-fplugin=x.so"]}')
         (tmp_path / f"ffcx_{name}.json").write_text('{"epsilon": 0.5}')
     code = (
-        "from solvers.fem import dolfinx_compat as own\n"
+        "from pinnray.solvers.fem import dolfinx_compat as own\n"
         "for package in (own.dolfinx.jit, own.ffcx):\n"
         "    options = getattr(package, 'get_options', None) or package.get_parameters\n"
         "    print('found', options().get('cffi_extra_compile_args'), options().get('epsilon'))\n"
@@ -71,7 +71,7 @@ def test_pictures_take_no_settings_from_the_working_folder(tmp_path: Path) -> No
     code = (
         "import sys, subprocess\n"
         "from pathlib import Path\n"
-        "from geometry.figure import figure\n"
+        "from pinnray.geometry.figure import figure\n"
         "subprocess.check_output = lambda *given, **_: sys.exit('a program was started')\n"
         "with figure(1.0) as drawn:\n"
         "    drawn.text(0.5, 0.5, 'text')\n"

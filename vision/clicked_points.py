@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.errors import UserError
-from geometry.observations import Observations
-from geometry.registration import HAND_HELD, Homography, nearest_similarity
-from vision.foreign_tables import foreign_table
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import HAND_HELD, Homography, nearest_similarity
+from pinnray.vision.foreign_tables import foreign_table
 
 FEWEST = 3
 """Points that tell a picture's mirror image from itself."""

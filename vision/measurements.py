@@ -10,12 +10,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.atomic import atomic_path
-from geometry.errors import UserError
-from geometry.observations import Observations
-from geometry.registration import FIXED, HAND_HELD, Registration
-from vision.foreign_tables import foreign_table
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import atomic_path
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import FIXED, HAND_HELD, Registration
+from pinnray.vision.foreign_tables import foreign_table
 
 POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")

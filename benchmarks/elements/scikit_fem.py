@@ -9,12 +9,12 @@ import skfem
 from rich.table import Table
 from skfem.models.elasticity import linear_elasticity
 
-from compare.runtime.tables import terminal_table
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Problem, contact_functional
+from pinnray.comparison.runtime.tables import terminal_table
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Problem, contact_functional
 
 REPEATS = 3
 HEADER = (

@@ -19,19 +19,19 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tables import DOCS
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import force_error, reference_differences
-from compare.runtime.tables import terminal_table
-from geometry.cache import finger_mesh
-from geometry.drawing.load import finger_from_file
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.presets import load_design
-from geometry.mesh.settings import MeshSettings
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solution import Solution
-from solvers.solver import Solver
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import force_error, reference_differences
+from pinnray.comparison.runtime.tables import terminal_table
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.drawing.load import finger_from_file
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.presets import load_design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Solver
 from tests.geometry.mesh.test_mesher import random_design
 
 DATA = DOCS.parent / "tests" / "data"

@@ -199,7 +199,7 @@ def msh(random: np.random.Generator, sketch: "Sketch", path: Path) -> "Drawn":
     """A mesh of some version and order, plane or extruded; corners at the ends of arcs are cut straight."""
     import gmsh
 
-    from geometry.mesh.mesher import session
+    from pinnray.geometry.mesh.mesher import session
 
     depth, order = float(random.choice([0, 12])), int(random.integers(1, 4))
     version = float(random.choice([1, 2.2, 4.1]))

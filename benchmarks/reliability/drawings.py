@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.reliability import drawing_files
-from geometry.drawing.checks import body
-from geometry.drawing.load import read_drawing
-from geometry.errors import UserError
+from pinnray.geometry.drawing.checks import body
+from pinnray.geometry.drawing.load import read_drawing
+from pinnray.geometry.errors import UserError
 
 SAME = 1e-6
 """Largest relative difference of areas and of the markers' distances."""

@@ -212,18 +212,18 @@ def filled(folder: Path) -> Iterator[Path]:
     """A filled cache in a folder; in the block this process has imported what its forks need."""
     if (ending := started(FEM, folder)).code:
         raise RuntimeError(ending.text)
-    from compare.figures import gallery
-    from geometry.figure import Figure
     from pinnray.cli import main
+    from pinnray.comparison.figures import gallery
+    from pinnray.geometry.figure import Figure
 
     blank = gallery.Illustration(Figure(1.0), "Blank", "Blank.", "Blank.")
     drawings = {name: (what, lambda _: blank) for name, (what, _) in gallery.GALLERY.items()}
     with (
         # The same files with blank pictures, in a tenth of the time.
         patch.object(gallery, "GALLERY", drawings),
-        patch("geometry.figure.DPI", 20),
+        patch("pinnray.geometry.figure.DPI", 20),
         # Two processes work on any mesh, not only where that is worth its while.
-        patch("compare.pipeline.solving.LARGE", 0),
+        patch("pinnray.comparison.pipeline.solving.LARGE", 0),
     ):
         with patch.dict(os.environ, PINNRAY_CACHE=str(folder / CACHE)):
             main([each.replace("FOLDER", str(folder)) for each in FEM])

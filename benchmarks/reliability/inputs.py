@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from unittest.mock import patch
 
 from benchmarks.tables import keep_rows, kept_rows
-from geometry.cache import drawn_finger
-from geometry.drawing.description import load_description
-from geometry.errors import UserError
-from studies.sweep.measurement import Measurement, measured
+from pinnray.geometry.cache import drawn_finger
+from pinnray.geometry.drawing.description import load_description
+from pinnray.geometry.errors import UserError
+from pinnray.studies.sweep.measurement import Measurement, measured
 
 if TYPE_CHECKING:
     from benchmarks.reliability.strategies import Given

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from geometry.finger.parameters import Parameters, parameter_info
-from geometry.finger.presets import load_design, preset_names
-from geometry.mesh.settings import MeshSettings
-from solvers.registry import make_solver
-from studies.sweep.job import Task
-from studies.sweep.study import PHYSICS, parameter_limits
+from pinnray.geometry.finger.parameters import Parameters, parameter_info
+from pinnray.geometry.finger.presets import load_design, preset_names
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.registry import make_solver
+from pinnray.studies.sweep.job import Task
+from pinnray.studies.sweep.study import PHYSICS, parameter_limits
 
 WILD: tuple[Any, ...] = (
     *(nan, inf, -inf, -1.0, 0, -0.0, 1e-300, 5e-324, 1e300, 2**63, 10**400, True, None, "", "2 mm", "nan"),

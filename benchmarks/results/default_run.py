@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 from rich.table import Table
 
 from benchmarks.tables import DOCS, fill, keep_rows, kept_rows, markdown
-from compare.runtime.tables import terminal_table
-from geometry.errors import UserError
 from pinnray.cli import compare_main
+from pinnray.comparison.runtime.tables import terminal_table
+from pinnray.geometry.errors import UserError
 
 ROOT = DOCS.parent
 RUN = ROOT / "out" / "default" / "metrics.json"

@@ -23,11 +23,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.table import Table
 
-from compare.runtime import stages
-from compare.runtime.provenance import cores
-from compare.runtime.tables import terminal_table
-from geometry.errors import UserError
-from solvers.solver import Progress
+from pinnray.comparison.runtime import stages
+from pinnray.comparison.runtime.provenance import cores
+from pinnray.comparison.runtime.tables import terminal_table
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.solver import Progress
 
 ROOT = Path(__file__).parents[2]
 
@@ -36,12 +36,12 @@ LIBRARIES = ("scipy.sparse.linalg", "dolfinx", "torch", "pyvista", "matplotlib.f
 PRODUCTS = "GFlop of products"
 NEEDED = {
     "factorisations": (
-        "solvers.fem.linear_solvers:Factorisation.update",
-        "solvers.pinn.finite_basis.sparse_cholesky:BlockMatrix.factorised",
+        "pinnray.solvers.fem.linear_solvers:Factorisation.update",
+        "pinnray.solvers.pinn.finite_basis.sparse_cholesky:BlockMatrix.factorised",
     ),
-    PRODUCTS: ("solvers.pinn.finite_basis.energy:NetworkEnergy.hessian",),
-    "renders": ("compare.figures.pyvista_canvas:Canvas._cover",),
-    "fields written": ("compare.report.output_files:_write",),
+    PRODUCTS: ("pinnray.solvers.pinn.finite_basis.energy:NetworkEnergy.hessian",),
+    "renders": ("pinnray.comparison.figures.pyvista_canvas:Canvas._cover",),
+    "fields written": ("pinnray.comparison.report.output_files:_write",),
     "pictures encoded": ("PIL.Image:Image.save",),
 }
 """What no stage can do without: the functions that do it, by its name."""

@@ -12,14 +12,14 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tables import DOCS
-from geometry.arrays import FloatArray
-from studies.fields.emulator import FieldEmulator, grip_force
-from studies.fields.reader import FIGURES
-from studies.fields.snapshots import KnownSamples, Snapshots
-from studies.fields.store import fields_of
-from studies.sweep.job import StudyJob
-from studies.sweep.study import load_study
-from studies.sweep.sweep import run_sweep
+from pinnray.geometry.arrays import FloatArray
+from pinnray.studies.fields.emulator import FieldEmulator, grip_force
+from pinnray.studies.fields.reader import FIGURES
+from pinnray.studies.fields.snapshots import KnownSamples, Snapshots
+from pinnray.studies.fields.store import fields_of
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.study import load_study
+from pinnray.studies.sweep.sweep import run_sweep
 
 STROKES, SEED = 7, 11
 """Of what is unseen: strokes between those of the samples."""

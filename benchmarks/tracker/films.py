@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from compare.evaluation.truths import simulate
-from geometry.arrays import BoolArray, FloatArray
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.problem import Problem
-from vision.frames.frame import CapturedImage, Frames, Image
-from vision.rig.recording import FrameTruth
-from vision.tracking.trajectories import Tracking
+from pinnray.comparison.evaluation.truths import simulate
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.problem import Problem
+from pinnray.vision.frames.frame import CapturedImage, Frames, Image
+from pinnray.vision.rig.recording import FrameTruth
+from pinnray.vision.tracking.trajectories import Tracking
 
 HIDDEN = 0.02
 """Visible share of a marker below which it counts as hidden."""

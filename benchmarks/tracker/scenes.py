@@ -19,22 +19,22 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tracker.films import Finger, Score, coverage, film_of, one_thread
-from compare.runtime.tables import terminal_table
-from geometry.finger.design import Design
-from vision.calibration.camera import Camera
-from vision.calibration.camera_calibration import calibrate_camera
-from vision.calibration.chessboard import Board
-from vision.discs.disc_detector import luma_of
-from vision.rig.bench import Bench
-from vision.rig.boards import board_poses, board_scene
-from vision.rig.exposure import Exposure
-from vision.rig.motion import Motion
-from vision.rig.recording import Recording
-from vision.rig.render import render
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
-from vision.tracking.workspace import default_workspace
+from pinnray.comparison.runtime.tables import terminal_table
+from pinnray.geometry.finger.design import Design
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera_calibration import calibrate_camera
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.discs.disc_detector import luma_of
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.boards import board_poses, board_scene
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.motion import Motion
+from pinnray.vision.rig.recording import Recording
+from pinnray.vision.rig.render import render
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
+from pinnray.vision.tracking.workspace import default_workspace
 
 SCENES, CAMERAS, PHOTOGRAPHS = 200, 10, 20
 BOARD = Board(9, 6, 8.0)

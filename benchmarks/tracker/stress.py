@@ -23,26 +23,26 @@ from rich.table import Table
 
 from benchmarks.tables import DOCS, fill, markdown, table_of
 from benchmarks.tracker.films import HIDDEN, Finger, Score, coverage, film_of, one_thread
-from compare.runtime.tables import terminal_table
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from vision.calibration.camera import Pose
-from vision.discs.colour import DARK
-from vision.discs.colour_picker import pick_colour
-from vision.discs.disc_detector import METHODS, DetectionMethod
-from vision.frames.frame import Frames, Image
-from vision.frames.sources import open_frames
-from vision.rig.bench import BENCH, Bench
-from vision.rig.exposure import Exposure
-from vision.rig.motion import Course, Motion
-from vision.rig.occluders import cable, cables
-from vision.rig.recording import FrameTruth, Recording
-from vision.rig.recording_files import FILES, record
-from vision.rig.shapes import Shape, rectangle
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
-from vision.tracking.workspace import default_workspace
+from pinnray.comparison.runtime.tables import terminal_table
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.vision.calibration.camera import Pose
+from pinnray.vision.discs.colour import DARK
+from pinnray.vision.discs.colour_picker import pick_colour
+from pinnray.vision.discs.disc_detector import METHODS, DetectionMethod
+from pinnray.vision.frames.frame import Frames, Image
+from pinnray.vision.frames.sources import open_frames
+from pinnray.vision.rig.bench import BENCH, Bench
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.motion import Course, Motion
+from pinnray.vision.rig.occluders import cable, cables
+from pinnray.vision.rig.recording import FrameTruth, Recording
+from pinnray.vision.rig.recording_files import FILES, record
+from pinnray.vision.rig.shapes import Shape, rectangle
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
+from pinnray.vision.tracking.workspace import default_workspace
 
 REPORT = DOCS / "evidence" / "tracker_stress.md"
 FILMS = 2

@@ -9,13 +9,13 @@ import shapely
 import pinnray as pr
 from benchmarks.tables import markdown
 from benchmarks.validation.printed_finger import FINGERS, FRICTION, RADIUS, PrintedFinger
-from geometry.arrays import FloatArray
-from geometry.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
-from geometry.observations import Observations
-from geometry.registration import nearest_similarity
-from solvers.problem import Load
-from solvers.solution import Solution
-from vision.clicked_points import clicked_points, read_clicks
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import nearest_similarity
+from pinnray.solvers.problem import Load
+from pinnray.solvers.solution import Solution
+from pinnray.vision.clicked_points import clicked_points, read_clicks
 
 SIZE = 1.0
 """Of the elements, mm."""

@@ -13,10 +13,10 @@ from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from benchmarks.validation.laws import LAWS
-from geometry.arrays import FloatArray, IntArray
-from geometry.errors import UserError
-from solvers.fem.dolfinx_compat import dolfinx
-from solvers.petsc import PETSc
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.fem.dolfinx_compat import dolfinx
+from pinnray.solvers.petsc import PETSc
 
 LENGTH, WIDTH, HEIGHT = 100.0, 30.0, 30.0
 """Of the beam, mm."""

@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from compare.evaluation.truths import SLIDING, virtual_experiment
-from compare.runtime.tables import terminal_table
-from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from solvers.assimilation.estimation import values_of
-from solvers.fem.identification import FemBody, FemIdSolver
-from solvers.identification.model import EXACT, MarkerModel
-from solvers.identification.search import Identifier
-from solvers.problem import Load, Material, Problem
-from solvers.solver import silent
+from pinnray.comparison.evaluation.truths import SLIDING, virtual_experiment
+from pinnray.comparison.runtime.tables import terminal_table
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.assimilation.estimation import values_of
+from pinnray.solvers.fem.identification import FemBody, FemIdSolver
+from pinnray.solvers.identification.model import EXACT, MarkerModel
+from pinnray.solvers.identification.search import Identifier
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solver import silent
 
 NOISE = 0.005
 WALKERS, STEPS, BURNED = 32, 2500, 500

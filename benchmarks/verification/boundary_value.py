@@ -11,14 +11,14 @@ import numpy as np
 from scipy.special import roots_jacobi, roots_legendre
 
 from benchmarks.verification.hooke import PlaneLaw
-from geometry.arrays import BoolArray, FloatArray
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.quadrature import Quadrature, edge_quadrature
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Material, Problem
-from solvers.solution import State
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.quadrature import Quadrature, edge_quadrature
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.solution import State
 
 Function = Callable[[FloatArray], FloatArray]
 """Takes points (n, 2), mm, to values at them."""

@@ -1,11 +1,11 @@
-"""Hooke's law of the plane states from E and ν, independent of `solvers.elasticity`."""
+"""Hooke's law of the plane states from E and ν, independent of `pinnray.solvers.elasticity`."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from solvers.problem import Material
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.problem import Material
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Hyperelastic laws in tensor form, independent of `solvers.elasticity`.
+"""Hyperelastic laws in tensor form, independent of `pinnray.solvers.elasticity`.
 
 Tensors are the last two axes, 2 by 2 (in-plane) or 3 by 3, in plane strain.
 """
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from solvers.elasticity import check_known
-from solvers.problem import Material
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.elasticity import check_known
+from pinnray.solvers.problem import Material
 
 
 def trace(tensor: FloatArray) -> FloatArray:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from compare.figures.style import axes_at, write_heading
-from geometry.arrays import FloatArray
-from geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
-from vision.calibration.camera import Camera
-from vision.calibration.camera_calibration import Calibration
+from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera_calibration import Calibration
 
 MARGIN, GAP, HEAD, TITLE = 0.12, 0.14, 0.56, 0.2
 LONGEST = 0.05

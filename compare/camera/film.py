@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from geometry.content_hash import file_digest
-from geometry.finger.finger import Finger
+from pinnray.geometry.content_hash import file_digest
+from pinnray.geometry.finger.finger import Finger
 
 if TYPE_CHECKING:  # it imports OpenCV
-    from vision.tracking.scene import FilmedScene
+    from pinnray.vision.tracking.scene import FilmedScene
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Film:
         Raises:
             UserError: If a file cannot be read.
         """
-        from vision.calibration.camera_file import load_camera
-        from vision.discs.colour import read_colour
-        from vision.tracking.scene import FilmedScene
-        from vision.tracking.workspace import default_workspace, load_workspace
+        from pinnray.vision.calibration.camera_file import load_camera
+        from pinnray.vision.discs.colour import read_colour
+        from pinnray.vision.tracking.scene import FilmedScene
+        from pinnray.vision.tracking.workspace import default_workspace, load_workspace
 
         return FilmedScene(
             design=design,

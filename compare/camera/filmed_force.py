@@ -3,10 +3,10 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from compare.runtime.tables import Cell
-from solvers.solution import Solution
-from vision.rig.motion import Course
-from vision.rig.recording import Recording
+from pinnray.comparison.runtime.tables import Cell
+from pinnray.solvers.solution import Solution
+from pinnray.vision.rig.motion import Course
+from pinnray.vision.rig.recording import Recording
 
 LONGEST_STEP = 0.05
 """Longest load step of a filmed simulation: a spline through its equilibria is then exact to micrometres."""

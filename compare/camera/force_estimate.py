@@ -9,18 +9,18 @@ from typing import Generic, NamedTuple, Self, TypeVar
 import numpy as np
 from rich.table import Table
 
-from compare.figures.force_charts import draw_force_track
-from compare.runtime.tables import Cell, terminal_table, write_csv
-from geometry.arrays import BoolArray, FloatArray
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.identification.tracker import ForceReading, LawTracker
-from solvers.problem import Material, Problem
-from solvers.registry import make_solver
-from solvers.solver import Progress
-from vision.frames.frame import Frame
-from vision.tracking.frame_tracker import FrameDetections
-from vision.tracking.trajectories import Tracking
+from pinnray.comparison.figures.force_charts import draw_force_track
+from pinnray.comparison.runtime.tables import Cell, terminal_table, write_csv
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.identification.tracker import ForceReading, LawTracker
+from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Progress
+from pinnray.vision.frames.frame import Frame
+from pinnray.vision.tracking.frame_tracker import FrameDetections
+from pinnray.vision.tracking.trajectories import Tracking
 
 Newest = TypeVar("Newest")
 
@@ -110,7 +110,7 @@ def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, ra
         UserError: If DOLFINx is missing.
     """
     make_solver("fem-id")  # or says which library is missing
-    from solvers.fem.identification import fem_law_tracker
+    from pinnray.solvers.fem.identification import fem_law_tracker
 
     problem = Problem(mesh, material)
     if material.law == "linear":
@@ -212,7 +212,7 @@ class LiveForce:
         return LiveRate(self._newest.passed_over, rate)
 
     def watch(self, frame: Frame, detections: FrameDetections) -> None:
-        """Take a frame; see `vision.tracking.tracker.track`."""
+        """Take a frame; see `pinnray.vision.tracking.tracker.track`."""
         places, discs = detections.places, detections.markers
         seen = np.isfinite(discs.radii)
         per_mm = np.linalg.norm(np.ptp(detections.guesses, axis=0)) / np.linalg.norm(np.ptp(places, axis=0))

@@ -9,18 +9,18 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import marker_errors
-from compare.figures import Picture
-from compare.figures.gallery import each_of
-from compare.figures.overlay import errors_note
-from compare.figures.style import axes_at, legend_below_heading, write_heading
-from geometry.arrays import FloatArray
-from geometry.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
-from geometry.registration import nearest_similarity
-from vision.frames.frame import Image
-from vision.tracking.trajectories import Tracking
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import marker_errors
+from pinnray.comparison.figures import Picture
+from pinnray.comparison.figures.gallery import each_of
+from pinnray.comparison.figures.overlay import errors_note
+from pinnray.comparison.figures.style import axes_at, legend_below_heading, write_heading
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
+from pinnray.geometry.registration import nearest_similarity
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.tracking.trajectories import Tracking
 
 HEAD, TITLE, GAP = 0.55, 0.2, 0.12
 """Heights in inches: heading and legend, the name above a panel; the gap around panels."""

@@ -10,11 +10,11 @@ from typing import Literal, Self, TextIO
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from compare.camera.force_estimate import FrameForce, LiveForce
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.frames.frame import Frame
-from vision.tracking.frame_tracker import FrameDetections
+from pinnray.comparison.camera.force_estimate import FrameForce, LiveForce
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.frames.frame import Frame
+from pinnray.vision.tracking.frame_tracker import FrameDetections
 
 Point = tuple[float, float]
 Watch = Callable[[Frame, FrameDetections], None]

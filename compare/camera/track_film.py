@@ -11,25 +11,25 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from compare.camera.film import Film
-from compare.camera.force_estimate import LiveForce
-from compare.figures import Picture
-from compare.runtime.tables import NONE, Cell, significant, terminal_table, write_csv
-from geometry.arrays import FloatArray
-from geometry.atomic import write_json
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.observations import Observations
-from solvers.solver import Progress
-from vision.frames.frame import DEFAULT_RATE, RIG_MARK, Frame, Frames, Image
-from vision.frames.pictures import write_picture
-from vision.frames.sources import open_frames
-from vision.frames.video import video_writer
-from vision.measurements import write_measurements
-from vision.tracking.annotation import annotated
-from vision.tracking.frame_tracker import FrameDetections
-from vision.tracking.tracker import track
-from vision.tracking.trajectories import Tracking
+from pinnray.comparison.camera.film import Film
+from pinnray.comparison.camera.force_estimate import LiveForce
+from pinnray.comparison.figures import Picture
+from pinnray.comparison.runtime.tables import NONE, Cell, significant, terminal_table, write_csv
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_json
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.solver import Progress
+from pinnray.vision.frames.frame import DEFAULT_RATE, RIG_MARK, Frame, Frames, Image
+from pinnray.vision.frames.pictures import write_picture
+from pinnray.vision.frames.sources import open_frames
+from pinnray.vision.frames.video import video_writer
+from pinnray.vision.measurements import write_measurements
+from pinnray.vision.tracking.annotation import annotated
+from pinnray.vision.tracking.frame_tracker import FrameDetections
+from pinnray.vision.tracking.tracker import track
+from pinnray.vision.tracking.trajectories import Tracking
 
 BEFORE_AND_AFTER = 2
 """Number of pictures whose times nobody asks for."""

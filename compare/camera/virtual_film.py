@@ -4,22 +4,22 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from compare.camera.filmed_force import LONGEST_STEP, true_forces
-from compare.evaluation.truths import experiment_source, simulate
-from compare.runtime.output_folder import replaced_folder, write_run
-from compare.runtime.provenance import machine, package_versions
-from compare.runtime.stages import Stages
-from compare.runtime.tables import write_csv
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.problem import Load, Material, Problem
-from solvers.solution import Solution
-from solvers.solver import Solver, solved, with_law
-from vision.calibration.chessboard import Board
-from vision.rig.boards import board_poses, board_scene
-from vision.rig.recording import Recording
-from vision.rig.recording_files import photograph, record
+from pinnray.comparison.camera.filmed_force import LONGEST_STEP, true_forces
+from pinnray.comparison.evaluation.truths import experiment_source, simulate
+from pinnray.comparison.runtime.output_folder import replaced_folder, write_run
+from pinnray.comparison.runtime.provenance import machine, package_versions
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.comparison.runtime.tables import write_csv
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Solver, solved, with_law
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.rig.boards import board_poses, board_scene
+from pinnray.vision.rig.recording import Recording
+from pinnray.vision.rig.recording_files import photograph, record
 
 
 def filmed_solution(

@@ -1,5 +1,5 @@
 """Cross-validation: solvers scored at markers, loads and fields that they were not given.
 
-`cross_validation.cross_validate` is the entry. Imports `compare.evaluation`, `compare.figures`,
-`compare.runtime`.
+`cross_validation.cross_validate` is the entry. Imports `comparison.evaluation`, `comparison.figures`,
+`comparison.runtime`.
 """

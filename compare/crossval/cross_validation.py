@@ -8,26 +8,26 @@ from typing import TypeVar
 
 import numpy as np
 
-from compare.crossval.folds import LOAD, FoldResult, LoadCase, SeedResults, folds_of, load_cases_of
-from compare.crossval.output_files import write_results
-from compare.crossval.result import Case, CaseResult, CrossvalResult
-from compare.crossval.solver_folds import SWEPT, SolverTask, run_folds, sweep_weights
-from compare.crossval.study import CrossvalStudy, visible_markers
-from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
-from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-from compare.evaluation.truths import experiment_source
-from compare.runtime.output_folder import check_resumable_folder, locked
-from compare.runtime.stages import Stages, in_stages
-from geometry.arrays import FloatArray
-from geometry.atomic import write_json
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.observations import Observations
-from geometry.processes import ProcessFailed
-from geometry.registration import FIXED
-from solvers.fem.assimilating import FemAsmSolver
-from solvers.problem import Problem
-from solvers.solver import Progress
+from pinnray.comparison.crossval.folds import LOAD, FoldResult, LoadCase, SeedResults, folds_of, load_cases_of
+from pinnray.comparison.crossval.output_files import write_results
+from pinnray.comparison.crossval.result import Case, CaseResult, CrossvalResult
+from pinnray.comparison.crossval.solver_folds import SWEPT, SolverTask, run_folds, sweep_weights
+from pinnray.comparison.crossval.study import CrossvalStudy, visible_markers
+from pinnray.comparison.crossval.true_fields import TrueField, TruthTask, simulate_truth
+from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
+from pinnray.comparison.evaluation.truths import experiment_source
+from pinnray.comparison.runtime.output_folder import check_resumable_folder, locked
+from pinnray.comparison.runtime.stages import Stages, in_stages
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_json
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.processes import ProcessFailed
+from pinnray.geometry.registration import FIXED
+from pinnray.solvers.fem.assimilating import FemAsmSolver
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import Progress
 
 DEFINITION = "definition.json"
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.observations import Observations
-from solvers.problem import Load, Problem, contact_ends
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.problem import Load, Problem, contact_ends
 
 ALL, ONE, TIP, RANDOM, LOAD = "all", "one-out", "tip-out", "random", "load-out"
 SCHEMES = {

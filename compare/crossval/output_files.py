@@ -8,12 +8,12 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
-from compare.crossval.folds import ONE, SeedResults
-from compare.crossval.result import Case, CrossvalResult
-from compare.crossval.scores import FIELD_NAMES, Score
-from compare.crossval.tables import all_tables, conclusions
-from compare.figures import FORMATS
-from compare.figures.style import (
+from pinnray.comparison.crossval.folds import ONE, SeedResults
+from pinnray.comparison.crossval.result import Case, CrossvalResult
+from pinnray.comparison.crossval.scores import FIELD_NAMES, Score
+from pinnray.comparison.crossval.tables import all_tables, conclusions
+from pinnray.comparison.figures import FORMATS
+from pinnray.comparison.figures.style import (
     LEGEND_LINE,
     SOLVER_COLOURS,
     axes_at,
@@ -22,11 +22,11 @@ from compare.figures.style import (
     solver_colour,
     write_heading,
 )
-from compare.runtime.html import write_html
-from compare.runtime.tables import Cell, write_csv
-from geometry.atomic import write_json
-from geometry.content_hash import file_digest
-from geometry.figure import WIDTH, Figure, figure
+from pinnray.comparison.runtime.html import write_html
+from pinnray.comparison.runtime.tables import Cell, write_csv
+from pinnray.geometry.atomic import write_json
+from pinnray.geometry.content_hash import file_digest
+from pinnray.geometry.figure import WIDTH, Figure, figure
 
 HELD_OUT, FIELDS, SWEEP = "held_out", "fields", "l_curve"
 """Names of the pictures, without the truth that follows if there are several."""
@@ -167,7 +167,7 @@ def draw_fields(scores: Mapping[str, Mapping[str, Mapping[str, Score]]], schemes
 def draw_weight_sweeps(sweeps: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
     """Draw the errors of `fem-asm` at the markers and over the body against the weight of the markers.
 
-    A row for each layout, with the columns of `compare.crossval.solver_folds.sweep_weights`.
+    A row for each layout, with the columns of `pinnray.comparison.crossval.solver_folds.sweep_weights`.
     """
     panels: dict[str, dict[str, str]] = {
         "root mean square, mm": {"in_sample_mm": "markers given", "left_out_mm": "each held out"},

@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass, field
 from math import isnan, nan
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from compare.crossval.folds import ALL, SCHEMES, Fold, SeedResults
-from compare.crossval.scores import (
+from pinnray.comparison.crossval.folds import ALL, SCHEMES, Fold, SeedResults
+from pinnray.comparison.crossval.scores import (
     BASELINES,
     LEVEL,
     MARKERS,
@@ -17,12 +17,12 @@ from compare.crossval.scores import (
     of_scheme,
     score,
 )
-from compare.crossval.study import CrossvalStudy, SolverVariant
-from compare.crossval.true_fields import TrueContact
-from compare.runtime.tables import Cell
-from geometry.notebook import brief
-from geometry.observations import Observations
-from solvers.solver import Traits
+from pinnray.comparison.crossval.study import CrossvalStudy, SolverVariant
+from pinnray.comparison.crossval.true_fields import TrueContact
+from pinnray.comparison.runtime.tables import Cell
+from pinnray.geometry.notebook import brief
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.solver import Traits
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,25 +10,25 @@ from pydantic import ConfigDict, TypeAdapter
 from pydantic_core import to_jsonable_python
 from scipy.special import ndtri
 
-from compare.crossval.folds import ALL, Fold, FoldResult, LoadCase, hide_markers
-from compare.crossval.scores import FIELDS, LEVEL
-from compare.crossval.study import CrossvalStudy, SolverVariant
-from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
-from compare.evaluation.deformed_body import DeformedBody
-from compare.evaluation.truths import SLIDING, Truth
-from geometry.atomic import write_bytes
-from geometry.content_hash import has_source, sources_digest
-from geometry.errors import UserError
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from geometry.processes import known_to_children
-from solvers.assimilation.marker_forces import root_mean_square
-from solvers.assimilation.marker_weighting import FACTORS
-from solvers.fem.assimilating import FemAsmSolver
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem
-from solvers.solution import Solution
-from solvers.solver import (
+from pinnray.comparison.crossval.folds import ALL, Fold, FoldResult, LoadCase, hide_markers
+from pinnray.comparison.crossval.scores import FIELDS, LEVEL
+from pinnray.comparison.crossval.study import CrossvalStudy, SolverVariant
+from pinnray.comparison.crossval.true_fields import FieldSampler, SampledField, TrueField
+from pinnray.comparison.evaluation.deformed_body import DeformedBody
+from pinnray.comparison.evaluation.truths import SLIDING, Truth
+from pinnray.geometry.atomic import write_bytes
+from pinnray.geometry.content_hash import has_source, sources_digest
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.processes import known_to_children
+from pinnray.solvers.assimilation.marker_forces import root_mean_square
+from pinnray.solvers.assimilation.marker_weighting import FACTORS
+from pinnray.solvers.fem.assimilating import FemAsmSolver
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import (
     Progress,
     Solver,
     Traits,

@@ -7,21 +7,21 @@ from typing import Any, cast
 
 import numpy as np
 
-from compare.crossval.folds import ALL, SCHEMES
-from compare.evaluation.truths import EVERY_TRUTH, SLIDING, TRUTHS, Truth, check_truths
-from compare.runtime.output_folder import job_definition
-from compare.runtime.provenance import cores
-from geometry.arrays import FloatArray
-from geometry.cache import mesh_sizes
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from geometry.registration import FIXED, PARTS, Homography, Registration
-from solvers.assimilation.misfit import MarkerSettings
-from solvers.problem import Load, Material
-from solvers.solver import Solver, check_load, check_name, with_law
+from pinnray.comparison.crossval.folds import ALL, SCHEMES
+from pinnray.comparison.evaluation.truths import EVERY_TRUTH, SLIDING, TRUTHS, Truth, check_truths
+from pinnray.comparison.runtime.output_folder import job_definition
+from pinnray.comparison.runtime.provenance import cores
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import mesh_sizes
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import FIXED, PARTS, Homography, Registration
+from pinnray.solvers.assimilation.misfit import MarkerSettings
+from pinnray.solvers.problem import Load, Material
+from pinnray.solvers.solver import Solver, check_load, check_name, with_law
 
 SIZES = MeshSettings(size=0.5)
 """Usual element sizes: `fem` is off by 0.01 mm at the markers, a hundredth of its model error."""

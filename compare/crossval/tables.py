@@ -7,13 +7,13 @@ from math import isnan
 from rich.table import Table
 from rich.text import Text
 
-from compare.crossval.folds import ALL, SCHEMES
-from compare.crossval.result import CaseResult, CrossvalResult
-from compare.crossval.scores import BASELINES, FIELD_NAMES, FIELDS, LEVEL, ScoreInterval
-from compare.crossval.study import CrossvalStudy
-from compare.evaluation.truths import Truth
-from compare.runtime.tables import NONE, TextTable, distance, percent, significant, terminal_table
-from solvers.solver import Traits, with_law
+from pinnray.comparison.crossval.folds import ALL, SCHEMES
+from pinnray.comparison.crossval.result import CaseResult, CrossvalResult
+from pinnray.comparison.crossval.scores import BASELINES, FIELD_NAMES, FIELDS, LEVEL, ScoreInterval
+from pinnray.comparison.crossval.study import CrossvalStudy
+from pinnray.comparison.evaluation.truths import Truth
+from pinnray.comparison.runtime.tables import NONE, TextTable, distance, percent, significant, terminal_table
+from pinnray.solvers.solver import Traits, with_law
 
 NULL_MODELS = ("gp", "statfem")
 OPPONENTS = (*NULL_MODELS, "fem-asm")

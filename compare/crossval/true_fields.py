@@ -6,25 +6,25 @@ from pathlib import Path
 
 import numpy as np
 
-from compare.crossval.folds import LoadCase
-from compare.crossval.study import SIZES, CrossvalStudy
-from compare.evaluation.evaluation import field_difference
-from compare.evaluation.truths import Truth, simulate
-from compare.runtime.provenance import package_versions
-from compare.runtime.tables import Cell
-from geometry.arrays import FloatArray
-from geometry.atomic import write_arrays
-from geometry.cache import cache_folder, finger_mesh, kept_if_possible
-from geometry.content_hash import content_hash, sources_digest
-from geometry.errors import UserError
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.mesh.wall_motion import WallMotion
-from solvers.assimilation.misfit import disc_quadrature, radius_within
-from solvers.problem import Load, Problem
-from solvers.solution import SolidField, Solution, State
-from solvers.solver import Progress, silent
+from pinnray.comparison.crossval.folds import LoadCase
+from pinnray.comparison.crossval.study import SIZES, CrossvalStudy
+from pinnray.comparison.evaluation.evaluation import field_difference
+from pinnray.comparison.evaluation.truths import Truth, simulate
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.comparison.runtime.tables import Cell
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_arrays
+from pinnray.geometry.cache import cache_folder, finger_mesh, kept_if_possible
+from pinnray.geometry.content_hash import content_hash, sources_digest
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solution import SolidField, Solution, State
+from pinnray.solvers.solver import Progress, silent
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
 """Solutions sampled on the shared mesh, their certificate, metrics, and the virtual experiment.
 
-Imports `compare.runtime`.
+Imports `comparison.runtime`.
 """

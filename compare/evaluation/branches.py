@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.evaluation.certificate import ROUNDING
-from compare.evaluation.evaluation import Evaluation, field_difference
-from compare.runtime.tables import percent
-from solvers.problem import Problem
-from solvers.registry import MissingLibraryError, make_solver
+from pinnray.comparison.evaluation.certificate import ROUNDING
+from pinnray.comparison.evaluation.evaluation import Evaluation, field_difference
+from pinnray.comparison.runtime.tables import percent
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import MissingLibraryError, make_solver
 
 if TYPE_CHECKING:
-    from solvers.fem.finite_strain.solver import Equilibrium
+    from pinnray.solvers.fem.finite_strain.solver import Equilibrium
 
 UNLIKE = 0.01
 """Relative L2 difference of displacements, beyond the stated errors, that needs an explanation: the networks'
@@ -91,7 +91,7 @@ def _branches(evaluations: Sequence[Evaluation], problem: Problem) -> tuple[list
     except MissingLibraryError as error:
         warnings.warn(f"results differ, and nobody looks for branches: {error}", stacklevel=2)
         return [], []
-    from solvers.fem.finite_strain.solver import equilibria_near
+    from pinnray.solvers.fem.finite_strain.solver import equilibria_near
 
     starts = [np.concatenate([entry.node_displacement, entry.edge_displacement]) for entry in evaluations]
     branches: list[_Branch] = []

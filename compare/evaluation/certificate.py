@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compare.runtime.tables import percent
-from geometry.arrays import FloatArray
+from pinnray.comparison.runtime.tables import percent
+from pinnray.geometry.arrays import FloatArray
 
 ENERGY_LIMIT = 0.02
 """Most energy that the imbalance of a converged solution may have, relative to the energy of `fem`.
@@ -74,7 +74,9 @@ class Certificate:
     load: FloatArray  #: Largest deviation from the prescribed u and v, shape (2,), mm; NaN where free.
     work: float  #: Of the own reaction on the prescribed displacement; twice the energy in equilibrium.
     stroke: float  #: Largest prescribed displacement, mm.
-    regions: Mapping[str, Region]  #: The error by region, see `compare.evaluation.certification.REGIONS`.
+    regions: Mapping[
+        str, Region
+    ]  #: The error by region, see `pinnray.comparison.evaluation.certification.REGIONS`.
     density: FloatArray  #: Energy density of the rest, its mean over each triangle, shape (t,), MPa.
 
     @property

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from compare.evaluation.certificate import ROUNDING, Certificate, Region
-from compare.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation, field_difference
-from geometry.arrays import BoolArray, FloatArray
-from geometry.mesh.boundary import boundary_loops, mean_thickness, singular_points
-from geometry.mesh.quadrature import body_quadrature
-from solvers.elasticity import energy_density_of
-from solvers.fem.boundary_conditions import reaction_by_residual_work
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem, contact_nodes
-from solvers.registry import MissingLibraryError, make_solver
-from solvers.solution import State
+from pinnray.comparison.evaluation.certificate import ROUNDING, Certificate, Region
+from pinnray.comparison.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation, field_difference
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.mesh.boundary import boundary_loops, mean_thickness, singular_points
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.solvers.elasticity import energy_density_of
+from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Problem, contact_nodes
+from pinnray.solvers.registry import MissingLibraryError, make_solver
+from pinnray.solvers.solution import State
 
 NOT_FINITE = "its displacement or stress is not finite everywhere"
 """Fault of a result with NaN or infinity in a field."""
@@ -84,7 +84,7 @@ class Certifier:
     """Finite elements of degree 2 on a problem's mesh, by which any displacement is measured."""
 
     def __init__(self, problem: Problem) -> None:
-        from solvers.fem.equilibrium import linear_equilibrium  # it needs DOLFINx
+        from pinnray.solvers.fem.equilibrium import linear_equilibrium  # it needs DOLFINx
 
         self._problem = problem
         self._space = LagrangeSpace(problem.mesh, 2)

@@ -4,8 +4,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import (
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import (
     MEANS,
     force_error,
     held_out_errors,
@@ -13,13 +13,13 @@ from compare.evaluation.metrics import (
     reference_differences,
     truth_differences,
 )
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.fem.adaptive_refinement import Adaptation
-from solvers.problem import Load, Material
-from solvers.solver import Solver, UnsupportedProblemError, check_load, with_law
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.fem.adaptive_refinement import Adaptation
+from pinnray.solvers.problem import Load, Material
+from pinnray.solvers.solver import Solver, UnsupportedProblemError, check_load, with_law
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from compare.evaluation.certification import NOT_FINITE
-from compare.evaluation.evaluation import Evaluation
-from geometry.arrays import BoolArray, FloatArray
-from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
-from solvers.lagrange import LagrangeSpace
-from solvers.solution import Solution, Status
+from pinnray.comparison.evaluation.certification import NOT_FINITE
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.solution import Solution, Status
 
 INSIDE_OUT = "TURNED INSIDE OUT"
 THROUGH_ITSELF = "THE BODY GOES THROUGH ITSELF"

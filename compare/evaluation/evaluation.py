@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import TypeAdapter
 
-from compare.evaluation.certificate import Certificate
-from geometry.arrays import FloatArray
-from geometry.atomic import write_arrays
-from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.notebook import brief
-from solvers.finger_figures import FingerFigures
-from solvers.lagrange import LagrangeSpace
-from solvers.solution import IdentifiedForce, SolidField, Solution
+from pinnray.comparison.evaluation.certificate import Certificate
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_arrays
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.notebook import brief
+from pinnray.solvers.finger_figures import FingerFigures
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.solution import IdentifiedForce, SolidField, Solution
 
 
 class FieldDifference(NamedTuple):

@@ -8,16 +8,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from compare.evaluation.evaluation import Evaluation, FieldDifference, ReferenceDifferences, field_difference
-from compare.runtime.tables import Cell, write_csv
-from geometry.arrays import FloatArray
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from geometry.registration import nearest_similarity
-from solvers.finger_figures import figures_of
-from solvers.problem import Load
-from solvers.shared_work import shared
-from solvers.solution import Solution
+from pinnray.comparison.evaluation.evaluation import (
+    Evaluation,
+    FieldDifference,
+    ReferenceDifferences,
+    field_difference,
+)
+from pinnray.comparison.runtime.tables import Cell, write_csv
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import nearest_similarity
+from pinnray.solvers.finger_figures import figures_of
+from pinnray.solvers.problem import Load
+from pinnray.solvers.shared_work import shared
+from pinnray.solvers.solution import Solution
 
 COMPONENTS: dict[str, tuple[int, int]] = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}
 

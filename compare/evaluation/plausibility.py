@@ -8,16 +8,16 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import shapely
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.errors import OutsideBodyError, UserError
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from geometry.section.thickness import wall_thickness
-from solvers.identification.contradiction import MUCH_NEARER, likely_order, order_words
-from solvers.problem import Problem
-from solvers.registry import MissingLibraryError, make_solver
-from solvers.solver import NONE_SEEN
-from vision.measurements import SMALLEST_DISTANCE
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.errors import OutsideBodyError, UserError
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.section.thickness import wall_thickness
+from pinnray.solvers.identification.contradiction import MUCH_NEARER, likely_order, order_words
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import MissingLibraryError, make_solver
+from pinnray.solvers.solver import NONE_SEEN
+from pinnray.vision.measurements import SMALLEST_DISTANCE
 
 UNITS = {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0, "micrometres": 0.001}
 """Millimetres in other units."""

@@ -12,21 +12,21 @@ from math import isfinite, radians, tan
 
 import numpy as np
 
-from compare.evaluation.evaluation import Evaluation
-from compare.runtime.provenance import package_versions
-from geometry.cache import cache_folder, finger_mesh, kept_if_possible
-from geometry.content_hash import content_hash, sources_digest
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.section import rib_feet, rib_pitch, rib_slope
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from solvers.elasticity import LawName
-from solvers.problem import Load, LoadKind, Material, Problem
-from solvers.registry import MissingLibraryError, make_solver
-from solvers.solution import Solution
-from solvers.solver import Progress, Solver, silent
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.geometry.cache import cache_folder, finger_mesh, kept_if_possible
+from pinnray.geometry.content_hash import content_hash, sources_digest
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.section import rib_feet, rib_pitch, rib_slope
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.problem import Load, LoadKind, Material, Problem
+from pinnray.solvers.registry import MissingLibraryError, make_solver
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Progress, Solver, silent
 
 EVERY_TRUTH = "all"
 """The name that stands for every truth."""

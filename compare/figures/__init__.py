@@ -1,6 +1,7 @@
 """The pictures of a comparison; each function that draws one returns a `geometry.figure.Figure`.
 
-Imports `compare.evaluation`. Matplotlib and PyVista are imported when the first picture is drawn, so that a
+Imports `comparison.evaluation`. Matplotlib and PyVista are imported when the first picture is drawn, so that
+a
 run without pictures starts fast.
 """
 
@@ -12,13 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from compare.evaluation.comparison import Results
-from geometry.errors import UserError
-from geometry.processes import Pool, ProcessFailed, end_with_parent
-from solvers.shared_work import SharedWork
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.processes import Pool, ProcessFailed, end_with_parent
+from pinnray.solvers.shared_work import SharedWork
 
 if TYPE_CHECKING:
-    from geometry.figure import Figure
+    from pinnray.geometry.figure import Figure
 
 FORMATS = ("svg", "pdf")
 """Formats of pictures for print."""
@@ -70,7 +71,7 @@ def pictures_beside(
     if not pool or "pdf" in formats or len(comparison.mesh.points) < LARGE:
         yield None
         return
-    from compare.figures.fields import QUANTITIES
+    from pinnray.comparison.figures.fields import QUANTITIES
 
     names = [*(quantity.name for quantity in QUANTITIES), *BESIDE]
     task = (folder, comparison, names, formats)
@@ -99,8 +100,8 @@ def draw_all(
 
     `progress` is called before every picture with the share done, from 0 to 1, and what comes next.
     """
-    from compare.figures.gallery import GALLERY
-    from compare.figures.pages import write_pages
+    from pinnray.comparison.figures.gallery import GALLERY
+    from pinnray.comparison.figures.pages import write_pages
 
     ours = [name for name in GALLERY if beside is None or name not in beside.names]
     drawn = _drawn(folder, comparison, ours, formats, progress)
@@ -124,7 +125,7 @@ def _drawn(
     progress: Callable[[float, str], None] = lambda done, what: None,
 ) -> "list[tuple[str, Picture, Figure]]":
     """Draw and write the pictures of these names; none of a name that the comparison has nothing for."""
-    from compare.figures.gallery import GALLERY
+    from pinnray.comparison.figures.gallery import GALLERY
 
     drawn = []
     # Figures have so many objects that a tenth of the time went into collecting garbage among older ones.

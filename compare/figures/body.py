@@ -21,11 +21,11 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 from PIL import Image
 
-from compare.evaluation.evaluation import weighted_percentile
-from compare.figures.pyvista_canvas import Canvas, Extent, Pixels
-from geometry.arrays import FloatArray, IntArray
-from geometry.figure import INK, MUTED, SMALL
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.evaluation.evaluation import weighted_percentile
+from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent, Pixels
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.figure import INK, MUTED, SMALL
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 PERCENT = 99.5
 """Share of the area within a colour scale; peaks at re-entrant corners would leave the rest in one colour."""

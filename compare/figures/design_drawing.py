@@ -9,16 +9,16 @@ import shapely
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from compare.figures import body
-from compare.figures.dimensions import CENTRE_LINE, Draughtsman, upright
-from compare.figures.pyvista_canvas import Extent
-from compare.figures.style import arrow, axes_at, write_heading
-from geometry.arrays import FloatArray
-from geometry.figure import CONTACT, MEASURED, SMALL, WIDTH, Figure, figure
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.picture import draw_section
-from geometry.finger.section import (
+from pinnray.comparison.figures import body
+from pinnray.comparison.figures.dimensions import CENTRE_LINE, Draughtsman, upright
+from pinnray.comparison.figures.pyvista_canvas import Extent
+from pinnray.comparison.figures.style import arrow, axes_at, write_heading
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import CONTACT, MEASURED, SMALL, WIDTH, Figure, figure
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.picture import draw_section
+from pinnray.geometry.finger.section import (
     apex_angle,
     back_line,
     base_corners,
@@ -28,8 +28,8 @@ from geometry.finger.section import (
     ribs,
     tip_tangent,
 )
-from geometry.section.section import Section
-from geometry.section.thickness import inner_normals
+from pinnray.geometry.section.section import Section
+from pinnray.geometry.section.thickness import inner_normals
 
 POINT = 8.5 / 72 / WIDTH
 """Height of the type as a share of the drawing's width."""

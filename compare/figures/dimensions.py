@@ -9,9 +9,9 @@ import shapely
 from matplotlib.axes import Axes
 from matplotlib.text import Annotation, Text
 
-from compare.figures.style import HALO, arrow
-from geometry.arrays import FloatArray
-from geometry.figure import INK
+from pinnray.comparison.figures.style import HALO, arrow
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import INK
 
 LabelPlace = Sequence[float] | FloatArray
 CENTRE_LINE = (0, (6, 2, 1, 2))

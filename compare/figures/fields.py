@@ -6,18 +6,18 @@ from typing import NamedTuple
 import matplotlib as mpl
 import numpy as np
 
-from compare.evaluation.comparison import TRUTH, Results
-from compare.evaluation.evaluation import Evaluation, field_difference, weighted_percentile
-from compare.evaluation.metrics import COMPONENTS
-from compare.figures import body
-from compare.figures.body import PERCENT, ColourScale, diverging, sequential, symmetric
-from compare.figures.pyvista_canvas import Canvas
-from compare.figures.style import axes_at, write_heading
-from compare.runtime.tables import percent, significant
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.evaluation.comparison import TRUTH, Results
+from pinnray.comparison.evaluation.evaluation import Evaluation, field_difference, weighted_percentile
+from pinnray.comparison.evaluation.metrics import COMPONENTS
+from pinnray.comparison.figures import body
+from pinnray.comparison.figures.body import PERCENT, ColourScale, diverging, sequential, symmetric
+from pinnray.comparison.figures.pyvista_canvas import Canvas
+from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.comparison.runtime.tables import percent, significant
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
 HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55

@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import ForceCurve, follows_load
-from compare.figures.style import (
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import ForceCurve, follows_load
+from pinnray.comparison.figures.style import (
     axes_at,
     legend_above,
     legend_height,
     solver_colour,
     write_heading,
 )
-from geometry.arrays import FloatArray
-from geometry.figure import INK, MEASURED, WIDTH, Figure, figure
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import INK, MEASURED, WIDTH, Figure, figure
 
 
 def draw_force_displacement(

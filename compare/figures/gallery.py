@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import IN_SAMPLE, Evaluation
-from compare.evaluation.metrics import ForceCurve, force_curves, held_out_errors
-from compare.figures.body import PERCENT
-from compare.figures.design_drawing import draw_design
-from compare.figures.fields import (
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import IN_SAMPLE, Evaluation
+from pinnray.comparison.evaluation.metrics import ForceCurve, force_curves, held_out_errors
+from pinnray.comparison.figures.body import PERCENT
+from pinnray.comparison.figures.design_drawing import draw_design
+from pinnray.comparison.figures.fields import (
     DECADES,
     QUANTITIES,
     FieldQuantity,
@@ -20,16 +20,21 @@ from compare.figures.fields import (
     draw_field,
     drawn_solvers,
 )
-from compare.figures.force_charts import draw_force_displacement
-from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
-from compare.figures.overlay import draw_overlay
-from compare.figures.solver_charts import draw_convergence, draw_energy, draw_losses, draw_marker_errors
-from geometry.errors import UserError
-from geometry.figure import Figure
+from pinnray.comparison.figures.force_charts import draw_force_displacement
+from pinnray.comparison.figures.mesh_drawing import draw_mesh, mesh_numbers
+from pinnray.comparison.figures.overlay import draw_overlay
+from pinnray.comparison.figures.solver_charts import (
+    draw_convergence,
+    draw_energy,
+    draw_losses,
+    draw_marker_errors,
+)
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.figure import Figure
 
 
 class Illustration(NamedTuple):
-    """A picture with the words of `compare.figures.Picture`."""
+    """A picture with the words of `pinnray.comparison.figures.Picture`."""
 
     figure: Figure
     title: str

@@ -5,13 +5,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Rectangle
 
-from compare.figures import body
-from compare.figures.pyvista_canvas import Extent
-from compare.figures.style import HALO, axes_at, write_heading
-from geometry.arrays import FloatArray
-from geometry.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
-from geometry.mesh.boundary import edge_paths
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.figures import body
+from pinnray.comparison.figures.pyvista_canvas import Extent
+from pinnray.comparison.figures.style import HALO, axes_at, write_heading
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
+from pinnray.geometry.mesh.boundary import edge_paths
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 HEAD, INSET_TITLE, MARGIN = 0.48, 0.24, 0.1
 """Heights of the headings, and the margin, inches."""

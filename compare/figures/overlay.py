@@ -8,17 +8,17 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import held_out_errors, marker_errors
-from compare.figures import body
-from compare.figures.body import ColourScale
-from compare.figures.pyvista_canvas import Canvas, Extent
-from compare.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
-from geometry.arrays import FloatArray
-from geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import held_out_errors, marker_errors
+from pinnray.comparison.figures import body
+from pinnray.comparison.figures.body import ColourScale
+from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent
+from pinnray.comparison.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
 
 MARGIN = 0.12
 HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48

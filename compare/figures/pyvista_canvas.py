@@ -19,10 +19,10 @@ os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import pyvista
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.boundary import edge_paths
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.shared_work import shared
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.mesh.boundary import edge_paths
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.shared_work import shared
 
 Pixels = NDArray[np.uint8]
 

@@ -9,10 +9,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullLocator
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
-from compare.figures.style import (
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
+from pinnray.comparison.figures.style import (
     axes_at,
     legend_above,
     legend_below_heading,
@@ -21,9 +21,9 @@ from compare.figures.style import (
     write_heading,
     write_letter,
 )
-from geometry.arrays import BoolArray, FloatArray
-from geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
-from geometry.observations import Observations
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.geometry.observations import Observations
 
 HEAD = 0.3
 """Height of the heading, inches."""

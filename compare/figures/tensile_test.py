@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from compare.figures.style import axes_at, solver_colour, write_heading
-from geometry.figure import MEASURED, WIDTH, Figure, figure
-from solvers.materials import TensileFit, TensileTest
+from pinnray.comparison.figures.style import axes_at, solver_colour, write_heading
+from pinnray.geometry.figure import MEASURED, WIDTH, Figure, figure
+from pinnray.solvers.materials import TensileFit, TensileTest
 
 
 def draw_tensile_test(test: TensileTest, fits: Sequence[TensileFit]) -> Figure:

@@ -1,4 +1,5 @@
 """One comparison of solvers, and the folder of its files: `pipeline.run` makes the comparison of a `job.Job`.
 
-Imports `compare.camera`, `compare.report`, `compare.figures`, `compare.evaluation`, `compare.runtime`.
+Imports `comparison.camera`, `comparison.report`, `comparison.figures`, `comparison.evaluation`,
+`comparison.runtime`.
 """

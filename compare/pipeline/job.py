@@ -4,20 +4,20 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from compare.camera.film import Film
-from compare.evaluation.comparison import supported_solvers
-from compare.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
-from compare.figures import check_formats
-from geometry.cache import mesh_sizes
-from geometry.content_hash import has_source
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from solvers.fem.adaptive_refinement import check_adaptable
-from solvers.problem import Load, Material
-from solvers.solver import Solver, check_name
-from vision.measurements import read_measurements
+from pinnray.comparison.camera.film import Film
+from pinnray.comparison.evaluation.comparison import supported_solvers
+from pinnray.comparison.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
+from pinnray.comparison.figures import check_formats
+from pinnray.geometry.cache import mesh_sizes
+from pinnray.geometry.content_hash import has_source
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.fem.adaptive_refinement import check_adaptable
+from pinnray.solvers.problem import Load, Material
+from pinnray.solvers.solver import Solver, check_name
+from pinnray.vision.measurements import read_measurements
 
 
 @dataclass(frozen=True)

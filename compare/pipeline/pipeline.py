@@ -7,37 +7,37 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from compare.camera.film import Film
-from compare.evaluation.branches import with_branches
-from compare.evaluation.comparison import Results, supported_solvers
-from compare.evaluation.deformed_body import with_body_checks
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import force_curves, pick_reference, write_force_displacement
-from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-from compare.evaluation.truths import (
+from pinnray.comparison.camera.film import Film
+from pinnray.comparison.evaluation.branches import with_branches
+from pinnray.comparison.evaluation.comparison import Results, supported_solvers
+from pinnray.comparison.evaluation.deformed_body import with_body_checks
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import force_curves, pick_reference, write_force_displacement
+from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
+from pinnray.comparison.evaluation.truths import (
     TRUTHS,
     UnfinishedExperimentError,
     no_displacements,
     virtual_experiment,
 )
-from compare.figures import Picture, draw_all, pictures_beside
-from compare.pipeline.job import Job, checked
-from compare.pipeline.shared_mesh import shared_mesh, write_rounds
-from compare.pipeline.solving import ERRORS, solve_all
-from compare.report.tables import write_markers, write_summary, write_table_one
-from compare.runtime.output_folder import check_output, replaced_folder, write_run
-from compare.runtime.provenance import package_versions
-from compare.runtime.stages import Stages
-from geometry.atomic import write_json
-from geometry.content_hash import file_digest
-from geometry.errors import UserError
-from geometry.observations import Observations
-from geometry.processes import Pool
-from solvers.problem import Problem
-from solvers.shared_work import SharedWork
-from solvers.solver import Solver, Traits
-from vision.frames.frame import Frame
-from vision.measurements import write_measurements
+from pinnray.comparison.figures import Picture, draw_all, pictures_beside
+from pinnray.comparison.pipeline.job import Job, checked
+from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
+from pinnray.comparison.pipeline.solving import ERRORS, solve_all
+from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
+from pinnray.comparison.runtime.output_folder import check_output, replaced_folder, write_run
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.atomic import write_json
+from pinnray.geometry.content_hash import file_digest
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.processes import Pool
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.shared_work import SharedWork
+from pinnray.solvers.solver import Solver, Traits
+from pinnray.vision.frames.frame import Frame
+from pinnray.vision.measurements import write_measurements
 
 
 def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
@@ -60,8 +60,8 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
             _write(folder, job, comparison, stages, pool)
             return comparison
         # They need OpenCV.
-        from compare.camera.predicted_frame import predicted_frame
-        from compare.camera.track_film import track_figures, track_film
+        from pinnray.comparison.camera.predicted_frame import predicted_frame
+        from pinnray.comparison.camera.track_film import track_figures, track_film
 
         last: deque[Frame] = deque(maxlen=1)
         track = folder / "track"
@@ -177,8 +177,8 @@ def _write(
 ) -> None:
     """Write every file of a comparison but its solutions; photographs of the tracking are for the report."""
     # They need the libraries of pictures.
-    from compare.report.html_report import viewer, write_report
-    from compare.report.output_files import metrics, write_vtu
+    from pinnray.comparison.report.html_report import viewer, write_report
+    from pinnray.comparison.report.output_files import metrics, write_vtu
 
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)

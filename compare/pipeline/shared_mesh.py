@@ -3,17 +3,17 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from compare.runtime.exits import say
-from compare.runtime.stages import Stages
-from compare.runtime.tables import Cell, write_csv
-from geometry.cache import finger_mesh
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.adaptive_refinement import Adaptation, check_adaptable
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solver import Solver
+from pinnray.comparison.runtime.exits import say
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.comparison.runtime.tables import Cell, write_csv
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.adaptive_refinement import Adaptation, check_adaptable
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Solver
 
 
 def shared_mesh(
@@ -51,7 +51,7 @@ def shared_mesh(
     if tolerance is None:
         return mesh, None
     make_solver("fem")  # or says which library is missing
-    from solvers.fem.adaptive_refinement import adapted
+    from pinnray.solvers.fem.adaptive_refinement import adapted
 
     degrees = [solver.settings()["degree"] for solver in solvers if solver.name == "fem"]
     problem = Problem(mesh, material.model_copy(update={"law": "linear"}), load)

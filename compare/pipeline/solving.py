@@ -11,25 +11,25 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from compare.evaluation.certification import with_certificates
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import evaluated
-from compare.pipeline.job import Job
-from compare.runtime.output_folder import SOLUTIONS, TRAINING, take_training
-from compare.runtime.provenance import cores, package_versions
-from compare.runtime.stages import Stages
-from geometry.atomic import write_text
-from geometry.cache import expected_triangles
-from geometry.content_hash import content_hash, sources_digest
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from geometry.processes import Pool, ProcessFailed, end_with_parent
-from solvers.problem import Material, Problem
-from solvers.registry import solver_modules
-from solvers.shared_work import SharedWork
-from solvers.solver import (
+from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.comparison.pipeline.job import Job
+from pinnray.comparison.runtime.output_folder import SOLUTIONS, TRAINING, take_training
+from pinnray.comparison.runtime.provenance import cores, package_versions
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.atomic import write_text
+from pinnray.geometry.cache import expected_triangles
+from pinnray.geometry.content_hash import content_hash, sources_digest
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.processes import Pool, ProcessFailed, end_with_parent
+from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.registry import solver_modules
+from pinnray.solvers.shared_work import SharedWork
+from pinnray.solvers.solver import (
     NoSolutionError,
     Progress,
     Solver,
@@ -51,7 +51,7 @@ LARGE = 5000
 SHARE = max(1, cores() // 2)
 """Threads of the linear algebra in each of two processes."""
 
-PICTURES = "compare.report.html_report"
+PICTURES = "pinnray.comparison.report.html_report"
 """Module that imports the libraries of pictures, which both processes draw next."""
 
 Stage = Callable[[str], AbstractContextManager[Progress]]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from solvers.finger_figures import FingerFigures
+from pinnray.solvers.finger_figures import FingerFigures
 
 
 def figures_lines(figures: FingerFigures, grip: Sequence[tuple[float, float]] = ()) -> list[str]:

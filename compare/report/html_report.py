@@ -13,13 +13,18 @@ from typing import Any
 import numpy as np
 from jinja2 import Template
 
-from compare.evaluation.certification import REGION_RADIUS
-from compare.evaluation.comparison import TRUTH, Results, unsupported_remarks
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import force_error, indistinct, reference_differences, truth_differences
-from compare.figures import Picture
-from compare.figures.body import diverging
-from compare.figures.fields import (
+from pinnray.comparison.evaluation.certification import REGION_RADIUS
+from pinnray.comparison.evaluation.comparison import TRUTH, Results, unsupported_remarks
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import (
+    force_error,
+    indistinct,
+    reference_differences,
+    truth_differences,
+)
+from pinnray.comparison.figures import Picture
+from pinnray.comparison.figures.body import diverging
+from pinnray.comparison.figures.fields import (
     QUANTITIES,
     VIEWED,
     FieldQuantity,
@@ -27,16 +32,16 @@ from compare.figures.fields import (
     field_scale,
     triangle_values,
 )
-from compare.figures.overlay import contact_motion
-from compare.report import text
-from compare.report.output_files import metrics
-from compare.report.summary import answers
-from compare.report.tables import millimetres, printed_rows, seconds, table_one
-from compare.runtime.html import Packed, base64_text, picture_urls, template_environment
-from compare.runtime.tables import distance, number, percent
-from geometry.arrays import FloatArray
-from geometry.atomic import write_text
-from geometry.mesh.boundary import edge_paths
+from pinnray.comparison.figures.overlay import contact_motion
+from pinnray.comparison.report import text
+from pinnray.comparison.report.output_files import metrics
+from pinnray.comparison.report.summary import answers
+from pinnray.comparison.report.tables import millimetres, printed_rows, seconds, table_one
+from pinnray.comparison.runtime.html import Packed, base64_text, picture_urls, template_environment
+from pinnray.comparison.runtime.tables import distance, number, percent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_text
+from pinnray.geometry.mesh.boundary import edge_paths
 
 BUDGET = 6_000_000
 """Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""

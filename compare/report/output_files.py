@@ -13,9 +13,9 @@ import numpy as np
 import pyvista
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation, FieldDifference, ReferenceDifferences
-from compare.evaluation.metrics import (
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation, FieldDifference, ReferenceDifferences
+from pinnray.comparison.evaluation.metrics import (
     COMPONENTS,
     MEANS,
     MarkerErrors,
@@ -26,11 +26,11 @@ from compare.evaluation.metrics import (
     truth_differences,
     without_rigid_motion,
 )
-from geometry.atomic import write_text
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.finger_figures import FingerFigures
-from solvers.solution import IdentifiedForce
+from pinnray.geometry.atomic import write_text
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.finger_figures import FingerFigures
+from pinnray.solvers.solution import IdentifiedForce
 
 SCHEMA = 1
 """Keys may be added to a schema; a key that is renamed or removed makes a new one."""

@@ -7,13 +7,13 @@ from math import hypot, isfinite
 from pathlib import Path
 from typing import Any
 
-from compare.evaluation.metrics import MEANS
-from compare.report.output_files import SCHEMA, read_solvers
-from compare.report.summary import RunAnswer, answers
-from compare.runtime.html import picture_urls, write_html
-from compare.runtime.output_folder import RUN_FILE, check_links
-from compare.runtime.tables import NONE, Cell, TextTable, number, percent, write_csv
-from geometry.errors import UserError
+from pinnray.comparison.evaluation.metrics import MEANS
+from pinnray.comparison.report.output_files import SCHEMA, read_solvers
+from pinnray.comparison.report.summary import RunAnswer, answers
+from pinnray.comparison.runtime.html import picture_urls, write_html
+from pinnray.comparison.runtime.output_folder import RUN_FILE, check_links
+from pinnray.comparison.runtime.tables import NONE, Cell, TextTable, number, percent, write_csv
+from pinnray.geometry.errors import UserError
 
 TABLE = "runs.csv"
 SHOWN_PICTURES = {"overlay.png": "Deformed finger", "von_mises.png": "Von Mises stress"}

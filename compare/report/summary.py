@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
-from compare.runtime.tables import NONE, TextTable, number, percent
-from solvers.finger_figures import break_warning
+from pinnray.comparison.runtime.tables import NONE, TextTable, number, percent
+from pinnray.solvers.finger_figures import break_warning
 
 Metrics = Mapping[str, Any]
 """`metrics.json`, or a part of it, with NaN for a number that is not known."""

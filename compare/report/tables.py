@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from rich.table import Table
 
-from compare.evaluation.certificate import Certificate
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation, ReferenceDifferences
-from compare.evaluation.metrics import (
+from pinnray.comparison.evaluation.certificate import Certificate
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation, ReferenceDifferences
+from pinnray.comparison.evaluation.metrics import (
     MEANS,
     RIGID,
     TruthDifferences,
@@ -23,10 +23,10 @@ from compare.evaluation.metrics import (
     reference_differences,
     truth_differences,
 )
-from compare.runtime.tables import NONE, Cell, percent, terminal_table, write_csv
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.parameters import SYMBOLS
+from pinnray.comparison.runtime.tables import NONE, Cell, percent, terminal_table, write_csv
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.parameters import SYMBOLS
 
 Means = tuple[float, float, float | None, float]
 """Mean absolute errors at the markers in the order of `MEANS`, mm; None where it is not printed."""

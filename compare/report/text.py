@@ -6,15 +6,15 @@ from math import isfinite
 import numpy as np
 from markupsafe import Markup
 
-from compare.evaluation.certificate import Certificate
-from compare.evaluation.certification import REGIONS
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import force_error, truth_differences
-from compare.runtime.tables import distance, number, percent
-from geometry.arrays import FloatArray
-from geometry.finger.finger import Finger
-from solvers.problem import Load
+from pinnray.comparison.evaluation.certificate import Certificate
+from pinnray.comparison.evaluation.certification import REGIONS
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import force_error, truth_differences
+from pinnray.comparison.runtime.tables import distance, number, percent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.finger import Finger
+from pinnray.solvers.problem import Load
 
 FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"
 LAW_WORDS = {

@@ -15,7 +15,7 @@ from types import FrameType
 from typing import NoReturn
 from unicodedata import category
 
-from geometry.processes import leave_signals_alone
+from pinnray.geometry.processes import leave_signals_alone
 
 _signals: list[int] = []
 """The signals that asked this program to end."""

@@ -17,9 +17,9 @@ from markupsafe import Markup, escape
 from numpy.typing import NDArray
 from PIL import Image
 
-from geometry.arrays import FloatArray
-from geometry.atomic import write_text
-from geometry.errors import UserError
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_text
+from pinnray.geometry.errors import UserError
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -17,13 +17,13 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
-from compare.runtime.provenance import package_versions
-from geometry.atomic import is_partial, remove_partials, write_json
-from geometry.content_hash import file_digest, sources_digest
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from solvers.problem import Load, Material
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.geometry.atomic import is_partial, remove_partials, write_json
+from pinnray.geometry.content_hash import file_digest, sources_digest
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.problem import Load, Material
 
 RUN_FILE = "run.json"
 SCHEMA = 1

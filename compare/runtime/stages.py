@@ -19,10 +19,10 @@ from rich.progress import (
 )
 from rich.table import Column
 
-from compare.runtime.provenance import cores, machine
-from geometry.processes import Input, Output, Pool, ProcessFailed
-from solvers.solver import Progress as Report
-from solvers.solver import UnsupportedProblemError
+from pinnray.comparison.runtime.provenance import cores, machine
+from pinnray.geometry.processes import Input, Output, Pool, ProcessFailed
+from pinnray.solvers.solver import Progress as Report
+from pinnray.solvers.solver import UnsupportedProblemError
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from compare.runtime.exits import shown
-from geometry.atomic import atomic_path
+from pinnray.comparison.runtime.exits import shown
+from pinnray.geometry.atomic import atomic_path
 
 Cell = str | int | float | bool
 NONE = "–"

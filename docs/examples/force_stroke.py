@@ -3,9 +3,9 @@
 The indenter is a 2 mm patch that slides without friction. Forces are for the whole depth of the finger.
 """
 
-from geometry import MeshSettings, finger_mesh, load_design
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
+from pinnray.geometry import MeshSettings, finger_mesh, load_design
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
 
 
 def main() -> None:

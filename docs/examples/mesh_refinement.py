@@ -5,9 +5,9 @@ Prints the mean absolute difference of u and v from quadratic triangles of 0.3 m
 
 import numpy as np
 
-from geometry import MeshSettings, finger_mesh, load_design
-from solvers.problem import Problem
-from solvers.registry import make_solver
+from pinnray.geometry import MeshSettings, finger_mesh, load_design
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
 
 
 def main() -> None:

@@ -6,9 +6,9 @@ cylinder and +3.38 mm under a patch that slides, but by -1.09 mm under the defau
 along the finger, and by +0.98 mm under that load in the linear law, which knows no large rotations.
 """
 
-from geometry import MeshSettings, finger_mesh, load_design
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
+from pinnray.geometry import MeshSettings, finger_mesh, load_design
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
 
 CYLINDER = Load(kind="cylinder", radius=5.0, displacement=(0.0, -10.0))
 

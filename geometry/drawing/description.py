@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
-from geometry.errors import UserError
-from geometry.finger.parameters import CheckedModel, bounded
-from geometry.text_files import parse_toml, read_toml
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.parameters import CheckedModel, bounded
+from pinnray.geometry.text_files import parse_toml, read_toml
 
 Coordinates = tuple[float, float]
 

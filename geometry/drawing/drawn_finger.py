@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from geometry.arrays import FloatArray, frozen_array
-from geometry.atomic import write_text
-from geometry.content_hash import content_hash
-from geometry.drawing.checks import least_thickness
-from geometry.drawing.placement import Placement
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.notebook import brief, fact_table, png_image
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.arrays import FloatArray, frozen_array
+from pinnray.geometry.atomic import write_text
+from pinnray.geometry.content_hash import content_hash
+from pinnray.geometry.drawing.checks import least_thickness
+from pinnray.geometry.drawing.placement import Placement
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.notebook import brief, fact_table, png_image
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
 
 if TYPE_CHECKING:
-    from geometry.figure import Figure
+    from pinnray.geometry.figure import Figure
 
 KIND = "drawing"
 """Value of `kind` in the definition."""
@@ -231,7 +231,7 @@ class DrawnFinger:
 
     def plot(self) -> "Figure":
         """The section with clamp, contact and numbered markers in the file's axes, as a matplotlib figure."""
-        from geometry.drawing.picture import plot_drawing
+        from pinnray.geometry.drawing.picture import plot_drawing
 
         return plot_drawing(self, self.placement)
 

@@ -8,19 +8,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.content_hash import file_digest
-from geometry.drawing import proposal
-from geometry.drawing.checks import body, check_contact, check_markers
-from geometry.drawing.description import Description, description_beside, load_description
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.drawing.formats.closed_loops import straightened
-from geometry.drawing.formats.drawing import LABELS, Drawing, label_of, place
-from geometry.drawing.placement import placed, with_part
-from geometry.drawing.ready_mesh import ready_mesh
-from geometry.errors import UserError
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.content_hash import file_digest
+from pinnray.geometry.drawing import proposal
+from pinnray.geometry.drawing.checks import body, check_contact, check_markers
+from pinnray.geometry.drawing.description import Description, description_beside, load_description
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.drawing.formats.closed_loops import straightened
+from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, label_of, place
+from pinnray.geometry.drawing.placement import placed, with_part
+from pinnray.geometry.drawing.ready_mesh import ready_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
 
 SUFFIXES = (".step", ".stp", ".dxf", ".svg", ".msh")
 
@@ -76,7 +76,7 @@ def read_drawing(
     try:
         digest = file_digest(path)
         kind = suffix[1:].replace("stp", "step")
-        read = getattr(import_module(f"geometry.drawing.formats.{kind}"), f"read_{kind}")
+        read = getattr(import_module(f"pinnray.geometry.drawing.formats.{kind}"), f"read_{kind}")
         drawing: Drawing = read(path, units, tolerance, *([plane] if kind == "step" else []))
     except OSError as error:
         raise UserError(f"cannot read the drawing {path}: {error.strerror}") from None

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import FloatArray, frozen_array
-from geometry.drawing.formats.closed_loops import corner_at, cut_at, nearest_piece, run_between
-from geometry.drawing.formats.drawing import place
-from geometry.errors import UserError
-from geometry.section.loop import STRAIGHT, Loop
-from geometry.section.section import Section
-from geometry.section.thickness import inner_normals
+from pinnray.geometry.arrays import FloatArray, frozen_array
+from pinnray.geometry.drawing.formats.closed_loops import corner_at, cut_at, nearest_piece, run_between
+from pinnray.geometry.drawing.formats.drawing import place
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.section.loop import STRAIGHT, Loop
+from pinnray.geometry.section.section import Section
+from pinnray.geometry.section.thickness import inner_normals
 
 STEEPEST = np.radians(60)
 """Largest angle of the front's normal from the contact's."""

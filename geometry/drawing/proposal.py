@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.section.loop import Loop
-from geometry.section.section import Section
-from geometry.section.thickness import inner_normals, through
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
+from pinnray.geometry.section.thickness import inner_normals, through
 
 MARKERS = 9
 SIDEWAYS = np.cos(np.radians(45))

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 import shapely
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.drawing.description import PartMaterial
-from geometry.drawing.formats.drawing import MeshInFile, label_of
-from geometry.drawing.placement import Placement
-from geometry.errors import UserError
-from geometry.mesh.boundary import are_among, counter_clockwise
-from geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
-from geometry.section.section import Section
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.drawing.description import PartMaterial
+from pinnray.geometry.drawing.formats.drawing import MeshInFile, label_of
+from pinnray.geometry.drawing.placement import Placement
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.boundary import are_among, counter_clockwise
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
+from pinnray.geometry.section.section import Section
 
 
 def ready_mesh(

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import model_validator
 
-from geometry.arrays import FloatArray
-from geometry.finger.markers import marker_positions
-from geometry.finger.parameters import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.markers import marker_positions
+from pinnray.geometry.finger.parameters import (
     MARKER,
     SYMBOLS,
     Parameters,
@@ -14,14 +14,14 @@ from geometry.finger.parameters import (
     parameter_info,
     with_unit,
 )
-from geometry.finger.rules import fitting_marker
-from geometry.finger.section import finger_section
-from geometry.finger.validation import check
-from geometry.notebook import fact_table
-from geometry.section.section import Section
+from pinnray.geometry.finger.rules import fitting_marker
+from pinnray.geometry.finger.section import finger_section
+from pinnray.geometry.finger.validation import check
+from pinnray.geometry.notebook import fact_table
+from pinnray.geometry.section.section import Section
 
 if TYPE_CHECKING:
-    from geometry.figure import Figure
+    from pinnray.geometry.figure import Figure
 
 
 class Design(Parameters):
@@ -77,13 +77,13 @@ class Design(Parameters):
 
     def plot(self) -> "Figure":
         """The section to scale, with its markers and the contact, as a matplotlib figure."""
-        from geometry.finger.picture import plot_finger
+        from pinnray.geometry.finger.picture import plot_finger
 
         return plot_finger(self)
 
     def _repr_html_(self) -> str:
         """The section and the paper's nine parameters, in a notebook."""
-        from geometry.finger.svg import section_svg
+        from pinnray.geometry.finger.svg import section_svg
 
         facts = {
             f"{name} ({symbol})": with_unit(getattr(self, name), name) for symbol, name in SYMBOLS.items()

@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
 
 if TYPE_CHECKING:
-    from geometry.figure import Figure
+    from pinnray.geometry.figure import Figure
 
 
 class Finger(Protocol):

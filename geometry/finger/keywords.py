@@ -4,7 +4,7 @@ from typing import Literal, TypedDict
 
 
 class FingerKeywords(TypedDict, total=False):
-    """The parameters of `geometry.finger.parameters.Parameters`; each may be left out.
+    """The parameters of `pinnray.geometry.finger.parameters.Parameters`; each may be left out.
 
     The paper's symbols, such as N for `rib_count`, are understood too.
     """

@@ -4,9 +4,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.finger.parameters import Parameters
-from geometry.finger.section import rib_axes, tip_middle, tip_tangent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.finger.section import rib_axes, tip_middle, tip_tangent
 
 
 @lru_cache(maxsize=64)

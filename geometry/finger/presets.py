@@ -4,17 +4,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.keywords import FingerKeywords
-from geometry.finger.parameters import (
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.keywords import FingerKeywords
+from pinnray.geometry.finger.parameters import (
     SYMBOLS,
     Parameters,
     by_parameter_name,
     unknown_parameter,
     with_symbol,
 )
-from geometry.text_files import read_toml
+from pinnray.geometry.text_files import read_toml
 
 FOLDER = Path(__file__).parent.parent / "designs"
 """Folder of the presets, one TOML file each."""

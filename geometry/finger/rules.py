@@ -7,9 +7,9 @@ import numpy as np
 import shapely
 from scipy.spatial.distance import pdist
 
-from geometry.finger.markers import marker_positions
-from geometry.finger.parameters import MARKER, Parameters, parameter_info
-from geometry.finger.section import (
+from pinnray.geometry.finger.markers import marker_positions
+from pinnray.geometry.finger.parameters import MARKER, Parameters, parameter_info
+from pinnray.geometry.finger.section import (
     back_line,
     cavity_ends,
     cells,

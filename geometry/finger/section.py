@@ -5,10 +5,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.finger.parameters import Parameters
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
 
 
 @dataclass(frozen=True, eq=False)

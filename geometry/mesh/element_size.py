@@ -7,11 +7,11 @@ import numpy as np
 import shapely
 from scipy.ndimage import distance_transform_edt
 
-from geometry.arrays import FloatArray
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from geometry.section.section import Section
-from geometry.section.thickness import wall_thickness
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.section.section import Section
+from pinnray.geometry.section.thickness import wall_thickness
 
 TRIES = (3.6, 4.8, 6.4)
 """Thickness over element size: the first that gives `MIN_ELEMENTS` of the mesher is taken."""

@@ -9,20 +9,20 @@ from typing import NamedTuple
 import gmsh
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.atomic import write_bytes
-from geometry.errors import UserError
-from geometry.finger.finger import Finger, outline_with_contact
-from geometry.mesh.boundary import (
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.atomic import write_bytes
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger, outline_with_contact
+from pinnray.geometry.mesh.boundary import (
     are_among,
     counter_clockwise,
     elements_through_thickness,
 )
-from geometry.mesh.element_size import TRIES, contact_points, size_field
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.mesh.element_size import TRIES, contact_points, size_field
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
 
 MIN_ELEMENTS = 3
 """Least number of elements through the thickness of every wall and rib."""

@@ -5,9 +5,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.tri import Triangulation
 
-from geometry.arrays import FloatArray
-from geometry.figure import INK, MUTED, Figure, body_figure
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.figure import INK, MUTED, Figure, body_figure
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 
 def plot_field(

@@ -1,6 +1,6 @@
 """Settings of the mesh: element sizes."""
 
-from geometry.finger.parameters import CheckedModel, bounded
+from pinnray.geometry.finger.parameters import CheckedModel, bounded
 
 
 class MeshSettings(CheckedModel):

@@ -13,15 +13,15 @@ import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.mesh.boundary import (
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.geometry.mesh.boundary import (
     CORNER_ANGLE,
     boundary_loops,
     mean_thickness,
     walls_and_ribs,
 )
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 
 @dataclass(frozen=True, eq=False)

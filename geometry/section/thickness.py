@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.section.loop import STRAIGHT, Loop
-from geometry.section.section import Section
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.geometry.section.loop import STRAIGHT, Loop
+from pinnray.geometry.section.section import Section
 
 TOUCH = 1e-7
 """Length of a ray within which it is still at its own start, mm."""

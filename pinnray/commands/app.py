@@ -5,15 +5,15 @@ from pathlib import Path
 
 from cyclopts import App
 
-from compare.runtime.provenance import program_version
 from pinnray.commands.launch import EXIT_CODES
+from pinnray.comparison.runtime.provenance import program_version
 from pinnray.options.file import take_options
 
 COMMANDS = (
     *("comparison.compare", "comparison.report"),
     *("finger.design", "finger.mesh", "finger.material", "finger.solve", "finger.sensitivity"),
-    *("finger.export", "studies.sweep", "studies.predict", "studies.explore", "studies.app"),
-    *("studies.optimise", "studies.gridsearch", "comparison.crossval", "comparison.solvers"),
+    *("finger.export", "pinnray.studies.sweep", "studies.predict", "studies.explore", "studies.app"),
+    *("studies.optimise", "pinnray.studies.gridsearch", "comparison.crossval", "comparison.solvers"),
     *("camera.fiducials", "camera.calibrate", "camera.pick", "camera.points", "camera.rig", "camera.track"),
 )
 """Modules of this package with a function `command`; each is imported when its command is asked for."""

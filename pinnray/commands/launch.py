@@ -17,8 +17,8 @@ from typing import Any, TextIO
 
 from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 
-from compare.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
-from geometry.errors import UserError
+from pinnray.comparison.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
+from pinnray.geometry.errors import UserError
 
 EXIT_CODES = (
     "Exit codes: 0 all well; 1 a fault of the program; 2 bad input, with one line that says what and how to "
@@ -177,9 +177,9 @@ def _with_enough_files(command: Callable[[], Any]) -> Any:
 
 
 def _on_ranks(command: Callable[[], Any]) -> int:
-    from solvers.registry import make_solver
+    from pinnray.solvers.registry import make_solver
 
     make_solver("fem")  # or says which library is missing
-    from solvers.fem.ranks import lead
+    from pinnray.solvers.fem.ranks import lead
 
     return lead(command, guarded)

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from geometry.errors import UserError
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import Flag, Repeated, existing
 
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
-    from compare.camera.film import Film
-    from geometry.finger.finger import Finger
-    from geometry.mesh.triangle_mesh import TriangleMesh
-    from solvers.physics import Material
-    from vision.calibration.camera import Camera, Pose
-    from vision.calibration.chessboard import Board
-    from vision.rig.bench import Bench
-    from vision.tracking.workspace import Workspace
+    from pinnray.comparison.camera.film import Film
+    from pinnray.geometry.finger.finger import Finger
+    from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+    from pinnray.solvers.physics import Material
+    from pinnray.vision.calibration.camera import Camera, Pose
+    from pinnray.vision.calibration.chessboard import Board
+    from pinnray.vision.rig.bench import Bench
+    from pinnray.vision.tracking.workspace import Workspace
 
 CAMERA = Group("Camera", sort_key=4)
 FORCE = Group("Force", sort_key=5)
@@ -56,7 +56,7 @@ class FilmOptions:
         Raises:
             UserError: If the camera's or the workspace's file does not exist.
         """
-        from compare.camera.film import Film
+        from pinnray.comparison.camera.film import Film
 
         return Film(
             source,
@@ -91,7 +91,7 @@ class ForceOptions:
         Raises:
             UserError: If a constant is out of its range or given without --force.
         """
-        from solvers.physics import Material
+        from pinnray.solvers.physics import Material
 
         given: dict[str, Any] = {
             name: value for name in ("young", "poisson", "law") if (value := getattr(self, name)) is not None
@@ -122,8 +122,8 @@ class CameraOptions:
 
     def read(self, workspace: "Workspace") -> "tuple[Camera, Pose]":
         """The camera and its pose."""
-        from vision.calibration.camera_file import load_camera
-        from vision.rig.virtual_camera import default_camera, viewing_pose
+        from pinnray.vision.calibration.camera_file import load_camera
+        from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
 
         if not (found := re.fullmatch(r"(\d{2,4})x(\d{2,4})", self.size.strip())):
             raise UserError(f"--size {self.size}: give width and height in pixels, such as 1280x720")
@@ -170,7 +170,7 @@ class SceneOptions:
         Raises:
             UserError: If a share is out of its range.
         """
-        from vision.rig.bench import Bench
+        from pinnray.vision.rig.bench import Bench
 
         for name, most in (("irregular", 0.1), ("mottle", 0.5), ("layers", 0.5)):
             value = getattr(self, name)
@@ -207,7 +207,7 @@ class BoardOptions:
 
     def read(self) -> "Board":
         """The board."""
-        from vision.calibration.charuco import parse_board
+        from pinnray.vision.calibration.charuco import parse_board
 
         if not 0 <= self.boards <= 1000:
             raise UserError(f"--boards {self.boards}: give 0 to 1000 photographs")

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from geometry.cache import mesh_sizes
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.machine_memory import free_memory_gb
-from geometry.mesh.element_size import estimated_triangles
-from geometry.mesh.settings import MeshSettings
-from solvers.solver import Cost, Solver, Traits
+from pinnray.geometry.cache import mesh_sizes
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.machine_memory import free_memory_gb
+from pinnray.geometry.mesh.element_size import estimated_triangles
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.solver import Cost, Solver, Traits
 
 MESH, EXPERIMENT = Cost(per_triangle=40), Cost(per_triangle=300)
 """Time of making the mesh, and of a virtual experiment on it."""

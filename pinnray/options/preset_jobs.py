@@ -2,7 +2,7 @@
 
 from typing import Literal, NamedTuple
 
-from geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.settings import MeshSettings
 
 
 class JobDefaults(NamedTuple):

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from compare.runtime.exits import errors_of_interruption, say
-from compare.runtime.provenance import cores
-from geometry.errors import UserError
-from geometry.text_files import parse_toml
-from solvers.names import LawName, LoadKind
+from pinnray.comparison.runtime.exits import errors_of_interruption, say
+from pinnray.comparison.runtime.provenance import cores
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.text_files import parse_toml
+from pinnray.solvers.names import LawName, LoadKind
 
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
-    from geometry.finger.design import Design
-    from geometry.finger.finger import Finger
-    from geometry.mesh.settings import MeshSettings
-    from solvers.physics import Load, Material
-    from solvers.solver import Solver
-    from studies.sweep.job import S, StudyJob
+    from pinnray.geometry.finger.design import Design
+    from pinnray.geometry.finger.finger import Finger
+    from pinnray.geometry.mesh.settings import MeshSettings
+    from pinnray.solvers.physics import Load, Material
+    from pinnray.solvers.solver import Solver
+    from pinnray.studies.sweep.job import S, StudyJob
 
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
@@ -75,8 +75,8 @@ class FingerOptions:
 
         The sizes are None for a finger whose file has a mesh, if neither option nor preset asks for any.
         """
-        from geometry.cache import mesh_sizes
-        from geometry.mesh.settings import MeshSettings
+        from pinnray.geometry.cache import mesh_sizes
+        from pinnray.geometry.mesh.settings import MeshSettings
         from pinnray.options.preset_jobs import job_defaults
 
         asked = job_defaults(preset).mesh
@@ -90,7 +90,7 @@ class FingerOptions:
 
     def files(self) -> list[Path]:
         """The files that describe the finger."""
-        from geometry.drawing.description import description_beside
+        from pinnray.geometry.drawing.description import description_beside
 
         given = [Path(self.design), self.section, self.section and description_beside(self.section)]
         return [path for path in given if path is not None and path.is_file()]
@@ -110,10 +110,10 @@ class FingerOptions:
             check_mesh_cost(finger, mesh, solvers, simulated=simulated)
 
     def _designed(self) -> "Design":
-        from geometry.finger.design import Design
-        from geometry.finger.parameters import SYMBOLS, symbols
-        from geometry.finger.presets import load_design, parse_overrides
-        from solvers.physics import Physics
+        from pinnray.geometry.finger.design import Design
+        from pinnray.geometry.finger.parameters import SYMBOLS, symbols
+        from pinnray.geometry.finger.presets import load_design, parse_overrides
+        from pinnray.solvers.physics import Physics
 
         for option in ("clamp", "contact", "markers"):
             if getattr(self, option) is not None:
@@ -133,8 +133,8 @@ class FingerOptions:
         return design
 
     def _drawn(self, file: Path) -> "Finger":
-        from geometry.cache import drawn_finger
-        from geometry.drawing.description import description_beside, load_description
+        from pinnray.geometry.cache import drawn_finger
+        from pinnray.geometry.drawing.description import description_beside, load_description
 
         if self.design != "default":
             raise UserError(f"--section {file} and --design {self.design}: give one of them")
@@ -204,12 +204,12 @@ class PhysicsOptions:
 
     def read(self, preset: str | None = None) -> "tuple[Material, Load]":
         """Material and load; a preset of the solvers may choose the kind of load."""
-        from solvers.physics import Physics
+        from pinnray.solvers.physics import Physics
 
         material, load = Physics(**self.values(preset)).parts
         if self.material is None:
             return material, load
-        from solvers.materials.presets import preset as material_preset
+        from pinnray.solvers.materials.presets import preset as material_preset
 
         return material.made_of(material_preset(self.material).material.substance), load
 
@@ -219,7 +219,7 @@ class PhysicsOptions:
 
         given = {**asdict(self), "load": self.load or job_defaults(preset).load}
         if (name := given.pop("material")) is not None:
-            from solvers.materials.presets import preset as material_preset
+            from pinnray.solvers.materials.presets import preset as material_preset
 
             known = material_preset(name).material
             for constant in ("young", "poisson"):
@@ -261,7 +261,7 @@ class SolverOptions:
         Raises:
             UserError: If a solver, preset or setting does not exist or a text cannot be read.
         """
-        from solvers.registry import PRESETS
+        from pinnray.solvers.registry import PRESETS
 
         if self.seed < 0:
             raise UserError(f"--seed {self.seed}: give a whole number from 0")
@@ -287,7 +287,7 @@ class SolverOptions:
 
 def _presets_with_device(name: str) -> list[str]:
     """The presets of a solver that can choose a device."""
-    from solvers.registry import PRESETS, make_solver
+    from pinnray.solvers.registry import PRESETS, make_solver
 
     presets = PRESETS.get(name, ())
     return [preset for preset in presets if "device" in make_solver(name, preset=preset).settings()]
@@ -311,7 +311,7 @@ def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, o
 
 def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) -> "Solver":
     """The solver with its own settings and those of the shared settings that it has."""
-    from solvers.registry import make_solver
+    from pinnray.solvers.registry import make_solver
 
     solver = make_solver(name, **given)
     had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
@@ -337,7 +337,7 @@ class StudyOptions:
 
     def job(self, study: "S", file: Path, kind: str) -> "StudyJob[S]":
         """The job of the study in a file."""
-        from studies.sweep.job import StudyJob
+        from pinnray.studies.sweep.job import StudyJob
 
         out = self.out or Path("out") / f"{kind}-{study.name}"
         return StudyJob(study, file.parent, out, read_processes(self.processes), self.scheduler)
@@ -360,7 +360,7 @@ def comma_list(text: str) -> list[str]:
 
 def read_formats(text: str) -> list[str]:
     """Formats of pictures besides PNG, from their names with commas between them."""
-    from compare.figures import check_formats
+    from pinnray.comparison.figures import check_formats
 
     check_formats(formats := comma_list(text))
     return formats

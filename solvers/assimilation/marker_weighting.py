@@ -5,12 +5,12 @@ from typing import get_args
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from solvers.assimilation.marker_forces import MarkerForces, root_mean_square
-from solvers.assimilation.misfit import Choice, MarkerSettings, Misfit, Weighting, misfit_of
-from solvers.problem import Problem
-from solvers.solver import Solver
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.assimilation.marker_forces import MarkerForces, root_mean_square
+from pinnray.solvers.assimilation.misfit import Choice, MarkerSettings, Misfit, Weighting, misfit_of
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import Solver
 
 FACTORS: FloatArray = 10.0 ** np.arange(-9, 3.25, 0.25)
 """Factors of the weights on the L-curve, among which one can be chosen."""

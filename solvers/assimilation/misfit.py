@@ -19,11 +19,11 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.special import roots_legendre
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.problem import Problem
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.problem import Problem
 
 Weighting = Literal["paper", "precision"]
 Choice = Literal["given", "left-out", "evidence"]

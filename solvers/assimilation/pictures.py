@@ -16,15 +16,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from geometry.arrays import FloatArray
-from geometry.observations import Observations
-from geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
-from solvers.assimilation.estimation import LEVEL, Parameter, values_of
-from solvers.assimilation.marker_forces import MarkerForces
-from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import leave_one_out_displacements
-from solvers.problem import Problem
-from solvers.solution import Solution
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
+from pinnray.solvers.assimilation.estimation import LEVEL, Parameter, values_of
+from pinnray.solvers.assimilation.marker_forces import MarkerForces
+from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
+from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution
 
 ROUNDS = 4
 """Linearisations about the frames that the last one found: from 5 degrees the last changes them by 1e-4."""

@@ -13,15 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from geometry.mesh.refinement import refined
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.section.section import Section
-from solvers.fem.error_estimate import ErrorEstimator
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Problem
-from solvers.solver import Progress, silent
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.refinement import refined
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.section.section import Section
+from pinnray.solvers.fem.error_estimate import ErrorEstimator
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solver import Progress, silent
 
 
 class RefinementRound(NamedTuple):
@@ -120,7 +120,7 @@ def largest(shares: FloatArray, part: float) -> BoolArray:
 
 def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[RefinementRound, FloatArray]:
     """One solution: its estimate, and every triangle's contribution to the functional's error, shape (t,)."""
-    from solvers.fem.equilibrium import DiscreteEquilibrium  # needs DOLFINx
+    from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium  # needs DOLFINx
 
     mesh, space = problem.mesh, LagrangeSpace(problem.mesh, degree)
     equilibrium = DiscreteEquilibrium(problem, space)

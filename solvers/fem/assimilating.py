@@ -13,24 +13,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from geometry.observations import Observations
-from solvers.assimilation.marker_forces import MarkerForces, residual_phrase
-from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
-from solvers.assimilation.pictures import FreePictures
-from solvers.constrained_elimination import ConstrainedElimination
-from solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.fem.ranks import on_all_ranks
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem
-from solvers.solution import Solution, Status
-from solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.assimilation.marker_forces import MarkerForces, residual_phrase
+from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
+from pinnray.solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
+from pinnray.solvers.assimilation.pictures import FreePictures
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.ranks import on_all_ranks
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True, eq=False)

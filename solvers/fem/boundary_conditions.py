@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from solvers.assimilation.misfit import Misfit
-from solvers.extrusion import NodalSpace
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Problem, contact_functional
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.solvers.assimilation.misfit import Misfit
+from pinnray.solvers.extrusion import NodalSpace
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Problem, contact_functional
 
 
 def dirichlet_conditions(problem: Problem, space: NodalSpace) -> tuple[BoolArray, FloatArray]:

@@ -10,7 +10,8 @@ from pathlib import Path
 from time import time
 from typing import Any, Generic, TypeVar
 
-from solvers.petsc import PETSc  # before DOLFINx, which would start it with files of the working folder
+# Before DOLFINx, which would start PETSc with files of the working folder.
+from pinnray.solvers.petsc import PETSc
 
 # isort: split
 import dolfinx
@@ -20,11 +21,11 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from solvers.elasticity import Lame
-from solvers.extrusion import NodalSpace
-from solvers.fem.ranks import communicator
-from solvers.lagrange import LagrangeSpace
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.solvers.elasticity import Lame
+from pinnray.solvers.extrusion import NodalSpace
+from pinnray.solvers.fem.ranks import communicator
+from pinnray.solvers.lagrange import LagrangeSpace
 
 # DOLFINx and FFCx read their option files once: here, from a folder without any. A file of others in the
 # working folder could choose the compiler's flags and the text that it compiles.

@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 import ufl
 
-from geometry.arrays import BoolArray, FloatArray
-from solvers.constrained_elimination import ConstrainedElimination
-from solvers.cylinder_contact import ContactState, CylinderContact
-from solvers.elasticity import deformation_jacobian, energy_density_of
-from solvers.extrusion import NodalSpace
-from solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_conditions
-from solvers.fem.dolfinx_compat import DistributedSpace
-from solvers.fem.linear_solvers import Factorisation, LinearSolver, Multigrid
-from solvers.fem.ranks import communicator
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Problem
-from solvers.shared_work import is_shared, shared
-from solvers.stability import ShiftedStep
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.cylinder_contact import ContactState, CylinderContact
+from pinnray.solvers.elasticity import deformation_jacobian, energy_density_of
+from pinnray.solvers.extrusion import NodalSpace
+from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_conditions
+from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
+from pinnray.solvers.fem.linear_solvers import Factorisation, LinearSolver, Multigrid
+from pinnray.solvers.fem.ranks import communicator
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.shared_work import is_shared, shared
+from pinnray.solvers.stability import ShiftedStep
 
 QUADRATURE_DEGREE = 4
 """For laws of finite strain: exact for their quadratic part on quadratic elements."""

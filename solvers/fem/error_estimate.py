@@ -30,14 +30,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_matrix, diags, vstack
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.quadrature import Quadrature, body_quadrature, triangle_rule
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.elasticity import deformation_jacobian, lame_constants, piola_stress
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Material, Problem
-from solvers.solution import ErrorEstimate, State
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.quadrature import Quadrature, body_quadrature, triangle_rule
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.elasticity import deformation_jacobian, lame_constants, piola_stress
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.solution import ErrorEstimate, State
 
 
 class GradientRecovery:

@@ -9,39 +9,39 @@ from typing import Any, ClassVar
 import numpy as np
 import ufl
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.quadrature import body_quadrature
-from geometry.observations import Observations
-from geometry.registration import Registration
-from solvers.assimilation.estimation import COST_CHANGE
-from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
-from solvers.fem.boundary_conditions import dirichlet_conditions
-from solvers.fem.dolfinx_compat import DistributedSpace, NodeFunction
-from solvers.fem.equilibrium import QUADRATURE_DEGREE
-from solvers.fem.finite_strain.nested_path import coarser
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear_solvers import Factorisation
-from solvers.identification.body import Linearised
-from solvers.identification.contradiction import with_doubts
-from solvers.identification.field import IdentifiedField
-from solvers.identification.fit import Fit
-from solvers.identification.model import Response, ResponseModel
-from solvers.identification.nested_search import ROUGHLY, NestedSearch
-from solvers.identification.search import Identifier
-from solvers.identification.settings import IdentifyingSolver
-from solvers.identification.tracker import ForceTracker, LawTracker
-from solvers.identification.transfer import force_path
-from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Load, Problem
-from solvers.solution import Solution, Status
-from solvers.solver import Cost, Family, Progress, check_problem, silent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import Registration
+from pinnray.solvers.assimilation.estimation import COST_CHANGE
+from pinnray.solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
+from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions
+from pinnray.solvers.fem.dolfinx_compat import DistributedSpace, NodeFunction
+from pinnray.solvers.fem.equilibrium import QUADRATURE_DEGREE
+from pinnray.solvers.fem.finite_strain.nested_path import coarser
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear_solvers import Factorisation
+from pinnray.solvers.identification.body import Linearised
+from pinnray.solvers.identification.contradiction import with_doubts
+from pinnray.solvers.identification.field import IdentifiedField
+from pinnray.solvers.identification.fit import Fit
+from pinnray.solvers.identification.model import Response, ResponseModel
+from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
+from pinnray.solvers.identification.search import Identifier
+from pinnray.solvers.identification.settings import IdentifyingSolver
+from pinnray.solvers.identification.tracker import ForceTracker, LawTracker
+from pinnray.solvers.identification.transfer import force_path
+from pinnray.solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import Cost, Family, Progress, check_problem, silent
 
 
 class FemBody:
-    """Lagrange elements of degree 1 or 2 on the drawn mesh; see `solvers.identification.body.Body`.
+    """Lagrange elements of degree 1 or 2 on the drawn mesh; see `pinnray.solvers.identification.body.Body`.
 
     A state is the array of nodal displacements, shape (N, 2), mm.
     """

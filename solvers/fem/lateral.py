@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from solvers.extrusion import ExtrudedSpace
-from solvers.fem.boundary_conditions import DisplacementConstraints
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.problem import Load, Problem, contact_functional
-from solvers.solution import LateralStiffness
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.problem import Load, Problem, contact_functional
+from pinnray.solvers.solution import LateralStiffness
 
 
 def lateral_stiffness(problem: Problem, space: ExtrudedSpace, *, iterative: bool) -> LateralStiffness:

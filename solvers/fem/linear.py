@@ -4,16 +4,16 @@ import time
 from dataclasses import dataclass, replace
 from typing import get_args
 
-from geometry.errors import UserError
-from solvers.fem.boundary_conditions import reaction_by_residual_work
-from solvers.fem.equilibrium import DiscreteEquilibrium, linear_equilibrium
-from solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from solvers.fem.linear_solvers import LinearSolver
-from solvers.fem.ranks import on_all_ranks
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Load, Problem
-from solvers.solution import ErrorEstimate, Solution, Status
-from solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, linear_equilibrium
+from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice
+from pinnray.solvers.fem.linear_solvers import LinearSolver
+from pinnray.solvers.fem.ranks import on_all_ranks
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solution import ErrorEstimate, Solution, Status
+from pinnray.solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from weakref import finalize
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from solvers.fem.dolfinx_compat import DistributedSpace
-from solvers.petsc import PETSc
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
+from pinnray.solvers.petsc import PETSc
 
 LinearSolver = Literal["auto", "direct", "iterative"]
 

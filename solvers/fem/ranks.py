@@ -17,10 +17,10 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-import solvers.petsc  # noqa: F401 (on all ranks together: one alone would wait for the others when it solves)
-from geometry.processes import child_environment
-from solvers.problem import Problem
-from solvers.solver import Progress, silent
+import pinnray.solvers.petsc  # noqa: F401 (on all ranks together: one alone would wait for the others when it solves)
+from pinnray.geometry.processes import child_environment
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import Progress, silent
 
 TASK, DISMISSAL = 1, 2
 """Tags of messages from rank 0: a task with its problem, the exit code of the command."""

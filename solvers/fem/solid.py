@@ -8,21 +8,21 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.machine_memory import free_memory_gb
-from geometry.mesh.point_location import LocatedPoints
-from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
-from solvers.extrusion import ExtrudedSpace
-from solvers.fem.equilibrium import LoadState
-from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.lateral import lateral_stiffness
-from solvers.fem.linear_solvers import LinearSolver
-from solvers.fem.ranks import communicator, on_all_ranks
-from solvers.problem import Problem
-from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.machine_memory import free_memory_gb
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.fem.equilibrium import LoadState
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.lateral import lateral_stiffness
+from pinnray.solvers.fem.linear_solvers import LinearSolver
+from pinnray.solvers.fem.ranks import communicator, on_all_ranks
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution, Status, unstable_phrase
+from pinnray.solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
 
 Face = Literal["side", "middle"]
 

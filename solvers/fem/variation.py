@@ -11,17 +11,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from solvers.fem.boundary_conditions import reaction_by_residual_work
-from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
-from solvers.fem.finite_strain.nested_path import coarser
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem
-from solvers.solution import Solution, Status
-from solvers.solver import NoSolutionError, Progress, silent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
+from pinnray.solvers.fem.finite_strain.nested_path import coarser
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
 ROUNDS, SETTLED = 60, 1e-6
 """Updates of a cylinder's multipliers at most, and their last change over the largest; each halves it."""

@@ -1,6 +1,6 @@
 """Figures of a finger under its load, in its designer's units: force, tip, wrap, stress, compliance, mass."""
 
-from solvers.finger_figures.figures import (
+from pinnray.solvers.finger_figures.figures import (
     FRACTIONS,
     QUANTITIES,
     FingerFigures,

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from solvers.finger_figures.measures import (
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.solvers.finger_figures.measures import (
     Extreme,
     force_curve,
     front_ends,
@@ -17,12 +17,12 @@ from solvers.finger_figures.measures import (
     thinnest_wall,
     wrap_angle,
 )
-from solvers.problem import Load, Material, Problem
-from solvers.shared_work import shared
-from solvers.solution import LateralStiffness, Solution
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.shared_work import shared
+from pinnray.solvers.solution import LateralStiffness, Solution
 
 if TYPE_CHECKING:
-    from solvers.fem.linear import FactorisedProblem
+    from pinnray.solvers.fem.linear import FactorisedProblem
 
 DENSITY = 1.2
 """Of a printed polyurethane, g/cm^3: where the substance is not known."""
@@ -295,7 +295,7 @@ def figures_at_rest(
 
 
 def _prepared(problem: Problem, linear: Material) -> "FactorisedProblem":
-    from solvers.fem.linear import FemSolver
+    from pinnray.solvers.fem.linear import FemSolver
 
     still = replace(problem, material=linear, load=Load(position=problem.load.position), observations=None)
     return FemSolver(estimate=False).prepare(still)

@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from geometry.arrays import FloatArray
-from geometry.mesh.boundary import mean_thickness, singular_points
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.section.section import Section
-from geometry.section.thickness import cavity_widths, wall_thickness
-from solvers.problem import Problem, contact_ends, contact_nodes, front_points
-from solvers.solution import SmoothField, SolidField, Solution, State
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.boundary import mean_thickness, singular_points
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.section.section import Section
+from pinnray.geometry.section.thickness import cavity_widths, wall_thickness
+from pinnray.solvers.problem import Problem, contact_ends, contact_nodes, front_points
+from pinnray.solvers.solution import SmoothField, SolidField, Solution, State
 
 RAY_SPACING = 0.5
 """Distance of the points from which wall thickness and gaps are measured, mm."""
@@ -87,7 +87,7 @@ def largest_away_from_corners(solution: Solution) -> tuple[Extreme, Extreme]:
 
 
 def thinnest_wall(section: Section) -> float:
-    """Thickness of the thinnest wall or rib, mm; see `geometry.section.thickness`."""
+    """Thickness of the thinnest wall or rib, mm; see `pinnray.geometry.section.thickness`."""
     return float(wall_thickness(section, RAY_SPACING)[1].min(initial=np.inf))
 
 

@@ -7,27 +7,27 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.parameters import parameter_info
-from geometry.mesh.design_motion import MovingMesh
-from geometry.mesh.wall_motion import WallMotion
-from solvers.fem.variation import VariedProblem
-from solvers.finger_figures.figures import (
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.parameters import parameter_info
+from pinnray.geometry.mesh.design_motion import MovingMesh
+from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.solvers.fem.variation import VariedProblem
+from pinnray.solvers.finger_figures.figures import (
     QUANTITIES,
     FingerFigures,
     figures_at_rest,
     figures_of,
     unit_loads,
 )
-from solvers.problem import Load, Problem
-from solvers.solution import Solution
-from solvers.solver import Progress, silent
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Progress, silent
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from geometry.figure import Figure
+    from pinnray.geometry.figure import Figure
 
 STEP = 1e-4
 """Step of a parameter, mm, or of Young's modulus over its value; ten times as much of an angle, degrees, and
@@ -108,7 +108,7 @@ class LocalSensitivity:
 
     def plot(self, name: str = "force") -> "Figure":
         """A bar for each parameter: percent of a figure per percent of it, the largest on top."""
-        from geometry.figure import CONTACT, INK, WIDTH, figure
+        from pinnray.geometry.figure import CONTACT, INK, WIDTH, figure
 
         shares = {each: share for each, share in self.relative(name).items() if abs(share) >= LEAST}
         if not shares:

@@ -11,10 +11,10 @@ motion. F is the derivative of E by the rest of c.
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from geometry.arrays import FloatArray
-from geometry.mesh.point_location import LocatedPoints
-from solvers.elasticity import Lame
-from solvers.solution import DisplacementField
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.solvers.elasticity import Lame
+from pinnray.solvers.solution import DisplacementField
 
 
 class Linearised(NamedTuple):

@@ -6,15 +6,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.observations import Observations
-from geometry.registration import HAND_HELD
-from solvers.solution import Solution, Status
-from solvers.solver import NoSolutionError
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import HAND_HELD
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import NoSolutionError
 
 CONTRADICTED = 20.0
 """φ from which the markers are not those of the finger. It is 1 to 2 over the truths of
-`compare.evaluation.truths`, 60 with a clamp that gave by 0.5 degrees and 0.4 mm, and 270 to 410 with markers
+`comparison.evaluation.truths`, 60 with a clamp that gave by 0.5 degrees and 0.4 mm, and 270 to 410 with
+markers
 in another order."""
 EXPLAINED = 3.0
 """Factor by which another order or frame has to lower φ to be named; they are tried where it can."""

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import FloatArray
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.wall_motion import WallMotion
-from geometry.registration import Pictures
-from solvers.elasticity import deformation_jacobian
-from solvers.identification.body import Body
-from solvers.identification.boundary import RigidMotion
-from solvers.identification.model import Response, ResponseModel
-from solvers.identification.unknowns import doubt_of_the_plane
-from solvers.problem import Problem
-from solvers.solution import DisplacementField, State
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.geometry.registration import Pictures
+from pinnray.solvers.elasticity import deformation_jacobian
+from pinnray.solvers.identification.body import Body
+from pinnray.solvers.identification.boundary import RigidMotion
+from pinnray.solvers.identification.model import Response, ResponseModel
+from pinnray.solvers.identification.unknowns import doubt_of_the_plane
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import DisplacementField, State
 
 STEP = 1e-3
 """Difference quotient's step in standard errors: the error of first order is a thousandth of a deviation."""

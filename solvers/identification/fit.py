@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from geometry.arrays import FloatArray
-from geometry.mesh.boundary import mean_thickness
-from solvers.assimilation.estimation import LEVEL, Estimate
-from solvers.elasticity import LawName
-from solvers.identification.model import MarkerData, Response, ResponseModel
-from solvers.identification.unknowns import doubt_of_the_plane, log_prior
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.boundary import mean_thickness
+from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
+from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
+from pinnray.solvers.identification.unknowns import doubt_of_the_plane, log_prior
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from solvers.assimilation.estimation import Parameter, Prediction, estimate
-from solvers.elasticity import LawName
-from solvers.identification.fit import Fit
-from solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
-from solvers.solver import NoSolutionError, Progress, silent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estimate
+from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.identification.fit import Fit
+from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
+from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
 HELD = 1e-3
 """Factor of the standard deviation of a parameter that is held."""

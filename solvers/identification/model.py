@@ -9,24 +9,24 @@ where the base is held; at its feet c' is their motion, and ∂F/∂θ the force
 
 A marker is at a fixed place P of the drawn body; where the walls have moved by W, the material there was
 drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
-`geometry.registration` has what pictures show of that whose frames are unknown.
+`pinnray.geometry.registration` has what pictures show of that whose frames are unknown.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.errors import UserError
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.assimilation.estimation import Prediction
-from solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
-from solvers.constrained_elimination import ConstrainedElimination
-from solvers.identification.body import Body, Linearised
-from solvers.identification.boundary import Clamp, RigidMotion
-from solvers.identification.unknowns import Hypothesis, Unknowns
-from solvers.solver import NoSolutionError
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.assimilation.estimation import Prediction
+from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.identification.body import Body, Linearised
+from pinnray.solvers.identification.boundary import Clamp, RigidMotion
+from pinnray.solvers.identification.unknowns import Hypothesis, Unknowns
+from pinnray.solvers.solver import NoSolutionError
 
 MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""

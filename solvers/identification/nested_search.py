@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-from geometry.observations import Observations
-from solvers.identification.fit import Fit
-from solvers.identification.model import Response, ResponseModel
-from solvers.identification.result import Identified
-from solvers.identification.search import Identifier
-from solvers.solver import Progress, silent
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.identification.fit import Fit
+from pinnray.solvers.identification.model import Response, ResponseModel
+from pinnray.solvers.identification.result import Identified
+from pinnray.solvers.identification.search import Identifier
+from pinnray.solvers.solver import Progress, silent
 
 IMPROBABLE = 8.0
 """Logarithm of the ratio of probabilities by a coarse discretisation from which on a law is not carried to a

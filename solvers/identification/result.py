@@ -5,15 +5,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from solvers.assimilation.estimation import LEVEL, Estimate
-from solvers.assimilation.misfit import leave_one_out_displacements
-from solvers.elasticity import LawName
-from solvers.identification.contradiction import CONTRADICTED
-from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
-from solvers.identification.fit import NORMAL, Fit
-from solvers.problem import Problem
-from solvers.solution import Estimated, IdentifiedForce, Solution, Status, Uncertainty, unstable_phrase
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
+from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
+from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.identification.contradiction import CONTRADICTED
+from pinnray.solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
+from pinnray.solvers.identification.fit import NORMAL, Fit
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import (
+    Estimated,
+    IdentifiedForce,
+    Solution,
+    Status,
+    Uncertainty,
+    unstable_phrase,
+)
 
 WRAPPED = 0.5
 """Width of a contact over the front's extent from which its force is not believed: on a printed finger that

@@ -10,20 +10,20 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.observations import Observations
-from solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS
-from solvers.elasticity import LawName
-from solvers.identification.body import Body
-from solvers.identification.contradiction import MUCH_NEARER, likely_order
-from solvers.identification.fit import Fit
-from solvers.identification.law_fits import LawFits, LawModels
-from solvers.identification.model import MarkerData, MarkerModel, ResponseModel
-from solvers.identification.result import Identified
-from solvers.identification.settings import IdentifyingSolver
-from solvers.identification.unknowns import LAWS, Unknowns
-from solvers.problem import Problem
-from solvers.solver import NoSolutionError, Progress, silent
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS
+from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.identification.body import Body
+from pinnray.solvers.identification.contradiction import MUCH_NEARER, likely_order
+from pinnray.solvers.identification.fit import Fit
+from pinnray.solvers.identification.law_fits import LawFits, LawModels
+from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
+from pinnray.solvers.identification.result import Identified
+from pinnray.solvers.identification.settings import IdentifyingSolver
+from pinnray.solvers.identification.unknowns import LAWS, Unknowns
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
 QUICK, ROUGH = 4, 2
 """Steps in which a law is judged first, and rounds for φ in which the contacts to start from are."""

@@ -5,11 +5,11 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from geometry.errors import UserError
-from solvers.identification.transfer import transferred
-from solvers.identification.unknowns import DEFAULT, parse_unknowns
-from solvers.problem import Problem
-from solvers.solution import Solution
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.identification.transfer import transferred
+from pinnray.solvers.identification.unknowns import DEFAULT, parse_unknowns
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution
 
 LawChoice = Literal["evidence", "given"]
 

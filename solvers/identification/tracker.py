@@ -2,7 +2,7 @@
 
 Every frame has all unknowns of the inverse problem: the contact's place, width and force, and the finger's
 walls, clamp and Poisson's ratio. With the markers linearised about an equilibrium, y + A (z - z0) over the
-standard deviations, the estimate of `solvers.assimilation.estimation` is
+standard deviations, the estimate of `pinnray.solvers.assimilation.estimation` is
 
     (A^T A / φ² + P) (z - m) = A^T (d - y + A (z0 - m)) / φ²
 
@@ -20,13 +20,19 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri, ndtri
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import ShapeError, UserError
-from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation_of, quantile_of, values_of
-from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
-from solvers.elasticity import LawName
-from solvers.identification.model import MarkerData, MarkerModel, ResponseModel
-from solvers.identification.unknowns import CONTACT, SHARE, doubt_of_the_plane, log_prior
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import ShapeError, UserError
+from pinnray.solvers.assimilation.estimation import (
+    LEVEL,
+    degrees_of_freedom,
+    inflation_of,
+    quantile_of,
+    values_of,
+)
+from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
+from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
+from pinnray.solvers.identification.unknowns import CONTACT, SHARE, doubt_of_the_plane, log_prior
 
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness

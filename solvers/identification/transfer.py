@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from solvers.identification.field import IdentifiedField
-from solvers.identification.model import EXACT, Response, ResponseModel
-from solvers.problem import Problem, contact_ends
-from solvers.solution import Solution
-from solvers.solver import NoSolutionError
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.solvers.identification.field import IdentifiedField
+from pinnray.solvers.identification.model import EXACT, Response, ResponseModel
+from pinnray.solvers.problem import Problem, contact_ends
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import NoSolutionError
 
 
 def transferred(solution: Solution, problem: Problem, other: Problem) -> Solution:

@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.mesh.wall_motion import WallMotion
-from geometry.registration import PARTS, Homography, Pictures
-from solvers.assimilation.estimation import Parameter
-from solvers.assimilation.pictures import picture_parameters
-from solvers.elasticity import Lame, LawName, lame_derivatives
-from solvers.identification.boundary import Feet, FrontTraction
-from solvers.problem import Material, Problem, contact_ends
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.geometry.registration import PARTS, Homography, Pictures
+from pinnray.solvers.assimilation.estimation import Parameter
+from pinnray.solvers.assimilation.pictures import picture_parameters
+from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
+from pinnray.solvers.identification.boundary import Feet, FrontTraction
+from pinnray.solvers.problem import Material, Problem, contact_ends
 
 CONTACT = ("position", "width", "normal_force", "tangential_force", "eccentricity")
 SHARE = "tangential_share"
@@ -23,7 +23,7 @@ SHARE = "tangential_share"
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson", "feet")
 """What is found unless other names are given; the table of docs/how-to/force.md describes each. `feet` stands
-for all motions of `solvers.identification.boundary.Feet`."""
+for all motions of `pinnray.solvers.identification.boundary.Feet`."""
 NAMES = (*DEFAULT, "young")
 """Everything that can be found."""
 

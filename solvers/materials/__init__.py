@@ -1,7 +1,7 @@
 """Materials of printed and cast fingers: presets with their sources, and moduli from a tensile test."""
 
-from solvers.materials.presets import MATERIALS, MaterialPreset, preset
-from solvers.materials.tensile_test import TensileFit, TensileTest, fitted, read_tensile_test
+from pinnray.solvers.materials.presets import MATERIALS, MaterialPreset, preset
+from pinnray.solvers.materials.tensile_test import TensileFit, TensileTest, fitted, read_tensile_test
 
 __all__ = [
     "MATERIALS",

@@ -7,8 +7,8 @@ change its modulus by a third, so that the tensile test of a printed strip is be
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from geometry.errors import UserError
-from solvers.problem import Material, Substance
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.problem import Material, Substance
 
 STRETCH = 2.0 - 2.0**-2
 """λ - λ⁻² at the strain of 100 %, of an incompressible neo-Hookean bar in tension."""

@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from solvers.elasticity import LawName, lame_constants, stress_of
-from solvers.problem import Material
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.elasticity import LawName, lame_constants, stress_of
+from pinnray.solvers.problem import Material
 
 LAWS: tuple[LawName, ...] = ("linear", "neo-hookean", "st-venant-kirchhoff")
 STRAINS = {"strain": 1.0, "strain_percent": 0.01, "strain_%": 0.01}

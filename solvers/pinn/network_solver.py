@@ -3,11 +3,11 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import Misfit
-from solvers.problem import Problem
-from solvers.solution import Solution
-from solvers.solver import Family, FieldSettings, Progress, silent
+from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
+from pinnray.solvers.assimilation.misfit import Misfit
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Family, FieldSettings, Progress, silent
 
 
 class NetworkSolver(FieldSettings, ABC):

@@ -19,7 +19,7 @@ import torch
 from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
-from geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.arrays import FloatArray, IntArray
 
 CHUNK = 2**14
 """Numbers in one array of a chunk: an eighth of a megabyte."""

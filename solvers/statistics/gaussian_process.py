@@ -16,15 +16,15 @@ from scipy.linalg import cho_solve
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
-from geometry.arrays import FloatArray
-from geometry.mesh.boundary import evenly_spaced_points
-from geometry.observations import Observations
-from solvers.assimilation.misfit import standard_deviations
-from solvers.assimilation.pictures import FramedData, FreePictures
-from solvers.energy_and_force import energy_and_force
-from solvers.problem import Problem
-from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.boundary import evenly_spaced_points
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.assimilation.misfit import standard_deviations
+from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
+from pinnray.solvers.energy_and_force import energy_and_force
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution, Status, Uncertainty
+from pinnray.solvers.solver import (
     Cost,
     FieldSettings,
     Progress,
@@ -32,14 +32,14 @@ from solvers.solver import (
     check_problem,
     silent,
 )
-from solvers.statistics.kernel_field import (
+from pinnray.solvers.statistics.kernel_field import (
     Kernel,
     MarkerPrediction,
     correlation,
     derivative_by_log_length,
     with_markers_left_out,
 )
-from solvers.statistics.statistical_posterior import (
+from pinnray.solvers.statistics.statistical_posterior import (
     Hyperparameters,
     Posterior,
     StatFemData,

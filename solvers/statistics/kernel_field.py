@@ -11,10 +11,10 @@ from typing import Literal
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.mesh.point_location import LocatedPoints
-from solvers.assimilation.misfit import leave_one_out_displacements
-from solvers.solution import Solution
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
+from pinnray.solvers.solution import Solution
 
 MarkerPrediction = tuple[FloatArray, FloatArray]
 """Mean and standard deviation of an observation, each of shape (2,), mm."""

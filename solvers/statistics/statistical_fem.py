@@ -28,19 +28,19 @@ from typing import cast
 
 import numpy as np
 
-from geometry.errors import UserError
-from geometry.observations import Observations
-from solvers.assimilation.misfit import standard_deviations
-from solvers.assimilation.pictures import FramedData, FreePictures
-from solvers.energy_and_force import energy_and_force
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.lagrange import LagrangeField
-from solvers.problem import Load, Problem
-from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import Cost, ElementSettings, NoSolutionError, Progress, check_problem, silent
-from solvers.statistics.kernel_field import Kernel, MarkerPrediction, with_markers_left_out
-from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField, predicted
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.assimilation.misfit import standard_deviations
+from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
+from pinnray.solvers.energy_and_force import energy_and_force
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.lagrange import LagrangeField
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solution import Solution, Status, Uncertainty
+from pinnray.solvers.solver import Cost, ElementSettings, NoSolutionError, Progress, check_problem, silent
+from pinnray.solvers.statistics.kernel_field import Kernel, MarkerPrediction, with_markers_left_out
+from pinnray.solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField, predicted
 
 TANGENT_STEP = 0.1
 """Change of a prescribed displacement for its tangent at finite strain, mm."""

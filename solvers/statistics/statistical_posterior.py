@@ -1,6 +1,6 @@
 """Posterior of `statfem`: the model d = ρ B u + δ + e of the observations, conditioned on markers.
 
-See `solvers.statistics.statistical_fem` for the random variables and the source.
+See `pinnray.solvers.statistics.statistical_fem` for the random variables and the source.
 """
 
 import math
@@ -14,11 +14,11 @@ from scipy.linalg import cho_solve
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
-from geometry.arrays import FloatArray
-from geometry.mesh.point_location import LocatedPoints
-from solvers.assimilation.pictures import FreePictures
-from solvers.solution import DisplacementField
-from solvers.statistics.kernel_field import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.solvers.assimilation.pictures import FreePictures
+from pinnray.solvers.solution import DisplacementField
+from pinnray.solvers.statistics.kernel_field import (
     Kernel,
     KernelField,
     MarkerPrediction,

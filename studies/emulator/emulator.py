@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from compare.runtime.stages import Stages
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.finger.parameters import Parameters
-from geometry.finger.section import finger_section
-from geometry.section.section import Section
-from solvers.finger_figures import QUANTITIES, heading
-from solvers.finger_figures.measures import narrowest_gap, thinnest_wall
-from studies.emulator.gaussian_process import GaussianProcess
-from studies.emulator.inputs import Inputs, Numbers
-from studies.sweep.study import Study, Value, title
-from studies.sweep.sweep import Sweep
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.finger.section import finger_section
+from pinnray.geometry.section.section import Section
+from pinnray.solvers.finger_figures import QUANTITIES, heading
+from pinnray.solvers.finger_figures.measures import narrowest_gap, thinnest_wall
+from pinnray.studies.emulator.gaussian_process import GaussianProcess
+from pinnray.studies.emulator.inputs import Inputs, Numbers
+from pinnray.studies.sweep.study import Study, Value, title
+from pinnray.studies.sweep.sweep import Sweep
 
 FEWEST = 20
 """Least number of converged samples: of fewer, no residual is exceeded with a probability of 5 %."""
@@ -42,7 +42,7 @@ class Predictions:
     """Predicted quantities of n fingers.
 
     Attributes:
-        names: Of the q quantities, in the order of `solvers.finger_figures.QUANTITIES`.
+        names: Of the q quantities, in the order of `pinnray.solvers.finger_figures.QUANTITIES`.
         values: Predictions, shape (n, q), in the quantities' units.
         low: Lower ends of the 95 % intervals, shape (n, q); the value itself where it is exact.
         high: Upper ends, shape (n, q).

@@ -12,10 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.finger.parameters import Parameters
-from geometry.finger.section import back_line, base_line, front_line, rib_axes, tip_line
-from solvers.problem import Material
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.finger.section import back_line, base_line, front_line, rib_axes, tip_line
+from pinnray.solvers.problem import Material
 
 SHEAR_SHARE = 5 / 6
 """Shear correction factor of a rectangle."""

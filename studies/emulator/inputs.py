@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.finger.parameters import SYMBOLS, Parameters
-from geometry.finger.section import cavity_ends, rib_feet, rib_pitch
-from geometry.finger.validation import broken_rule
-from solvers.finger_figures import QUANTITIES
-from solvers.problem import Load, Material
-from studies.emulator.frame import BeamFrame
-from studies.sweep.job import LEAST_MARKERS
-from studies.sweep.study import PHYSICS, WHOLE, Range, Study, Value, physics_of, unit_of
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.parameters import SYMBOLS, Parameters
+from pinnray.geometry.finger.section import cavity_ends, rib_feet, rib_pitch
+from pinnray.geometry.finger.validation import broken_rule
+from pinnray.solvers.finger_figures import QUANTITIES
+from pinnray.solvers.problem import Load, Material
+from pinnray.studies.emulator.frame import BeamFrame
+from pinnray.studies.sweep.job import LEAST_MARKERS
+from pinnray.studies.sweep.study import PHYSICS, WHOLE, Range, Study, Value, physics_of, unit_of
 
 STILL = ("contact_position", "depth")
 """Parameters of a design that do not change its section."""

@@ -3,15 +3,15 @@
 import json
 from pathlib import Path
 
-from compare.runtime.provenance import package_versions
-from compare.runtime.stages import Stages
-from geometry.content_hash import content_hash, sources_digest
-from geometry.text_files import read_json
-from studies.emulator.arrays_file import keep_arrays, kept_arrays
-from studies.emulator.emulator import Emulator, Learnt, fitted_emulator
-from studies.emulator.gaussian_process import GaussianProcess
-from studies.emulator.inputs import Inputs
-from studies.sweep.sweep import STUDY_FILE, Sweep, load_sweep
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.content_hash import content_hash, sources_digest
+from pinnray.geometry.text_files import read_json
+from pinnray.studies.emulator.arrays_file import keep_arrays, kept_arrays
+from pinnray.studies.emulator.emulator import Emulator, Learnt, fitted_emulator
+from pinnray.studies.emulator.gaussian_process import GaussianProcess
+from pinnray.studies.emulator.inputs import Inputs
+from pinnray.studies.sweep.sweep import STUDY_FILE, Sweep, load_sweep
 
 FILE = "emulator.safetensors"
 PARTS = ("inputs", "weights", "factor", "lengths", "numbers")

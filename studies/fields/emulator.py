@@ -12,21 +12,21 @@ from math import hypot
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from compare.runtime.stages import Stages
-from geometry.arrays import FloatArray
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.elasticity import LawName
-from solvers.physics import Load, Material
-from solvers.problem import Problem
-from solvers.registry import make_solver
-from solvers.solver import with_law
-from studies.emulator.inputs import Inputs
-from studies.fields.gaussian_processes import Block
-from studies.fields.prediction import PredictedField
-from studies.fields.reader import FIGURES, FieldReader, stress_at
-from studies.fields.reduction import Modes
-from studies.fields.snapshots import Snapshots
-from studies.sweep.study import Study, Value
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.physics import Load, Material
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import with_law
+from pinnray.studies.emulator.inputs import Inputs
+from pinnray.studies.fields.gaussian_processes import Block
+from pinnray.studies.fields.prediction import PredictedField
+from pinnray.studies.fields.reader import FIGURES, FieldReader, stress_at
+from pinnray.studies.fields.reduction import Modes
+from pinnray.studies.fields.snapshots import Snapshots
+from pinnray.studies.sweep.study import Study, Value
 
 LEAST, LEAST_OF_PATHS = 1e-6, 1e-5
 """Shares of the squared displacement gradients, and of those of paths about their mean, below which modes are
@@ -151,7 +151,7 @@ class FieldEmulator:
 
     def problem(self, finger: Mapping[str, Value], stroke: float, at: FloatArray) -> Problem:
         """The problem that a prediction solves."""
-        from geometry.finger.design import Design
+        from pinnray.geometry.finger.design import Design
 
         shape = Design(**self.inputs.parameters(finger).model_dump())
         material, load = self.inputs.physics({**finger, "stroke": stroke})

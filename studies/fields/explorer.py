@@ -7,21 +7,21 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import to_hex
 
-from compare.runtime import html
-from compare.runtime.html import Packed
-from compare.runtime.provenance import package_versions
-from geometry.arrays import FloatArray
-from geometry.finger.parameters import SYMBOLS, Parameters
-from geometry.mesh.boundary import edge_paths
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.finger_figures import QUANTITIES
-from solvers.lagrange import LagrangeSpace
-from solvers.physics import Physics
-from studies.emulator.inputs import WIDE
-from studies.fields.emulator import FieldEmulator
-from studies.fields.gaussian_processes import Block
-from studies.fields.reader import FIGURES
-from studies.sweep.study import PHYSICS, Range, Value, unit_of
+from pinnray.comparison.runtime import html
+from pinnray.comparison.runtime.html import Packed
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.parameters import SYMBOLS, Parameters
+from pinnray.geometry.mesh.boundary import edge_paths
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.finger_figures import QUANTITIES
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.physics import Physics
+from pinnray.studies.emulator.inputs import WIDE
+from pinnray.studies.fields.emulator import FieldEmulator
+from pinnray.studies.fields.gaussian_processes import Block
+from pinnray.studies.fields.reader import FIGURES
+from pinnray.studies.sweep.study import PHYSICS, Range, Value, unit_of
 
 COLOURS = 32
 """Colours of the stress."""

@@ -13,8 +13,8 @@ from typing import Self
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from geometry.arrays import FloatArray
-from studies.fields.reduction import Modes
+from pinnray.geometry.arrays import FloatArray
+from pinnray.studies.fields.reduction import Modes
 
 WATCHED = 12
 """Leading modes whose standard deviations are predicted: they cost more than all other numbers."""

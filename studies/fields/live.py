@@ -15,18 +15,18 @@ from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import Any
 
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.parameters import Parameters
-from geometry.mesh.settings import MeshSettings
-from geometry.processes import Pool, ProcessFailed
-from studies.fields.emulator import FieldEmulator, grip_force
-from studies.fields.explorer import write_explorer
-from studies.fields.reader import FIGURES
-from studies.sweep.field_path import FieldPath, moved_mesh
-from studies.sweep.job import FieldOrder, Task, field_base
-from studies.sweep.measurement import Measurement, measured
-from studies.sweep.study import PHYSICS, physics_of
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.processes import Pool, ProcessFailed
+from pinnray.studies.fields.emulator import FieldEmulator, grip_force
+from pinnray.studies.fields.explorer import write_explorer
+from pinnray.studies.fields.reader import FIGURES
+from pinnray.studies.sweep.field_path import FieldPath, moved_mesh
+from pinnray.studies.sweep.job import FieldOrder, Task, field_base
+from pinnray.studies.sweep.measurement import Measurement, measured
+from pinnray.studies.sweep.study import PHYSICS, physics_of
 
 HOST = "127.0.0.1"
 TIME_LIMIT_S = 300.0

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from geometry.arrays import FloatArray
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem
-from solvers.solution import Solution, Status
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution, Status
 
 
 @dataclass(frozen=True, eq=False)

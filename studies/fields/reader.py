@@ -6,12 +6,12 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.mesh.boundary import mean_thickness, singular_points
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.elasticity import Lame, LawName, stress_of, von_mises
-from solvers.finger_figures.measures import turn
-from solvers.lagrange import EDGES, LagrangeSpace
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.geometry.mesh.boundary import mean_thickness, singular_points
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.elasticity import Lame, LawName, stress_of, von_mises
+from pinnray.solvers.finger_figures.measures import turn
+from pinnray.solvers.lagrange import EDGES, LagrangeSpace
 
 FIGURES = ("force", "tip_u", "tip_v", "wrap", "von_mises", "contact_width")
 """Figures of `solvers.finger_figures` that an emulator of fields gives, and the contact's width, mm."""

@@ -10,8 +10,8 @@ from typing import Self
 import numpy as np
 from scipy.linalg import eigh
 
-from geometry.arrays import FloatArray
-from solvers.lagrange import LagrangeSpace
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.lagrange import LagrangeSpace
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,17 +7,17 @@ from typing import Any, Self
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.text_files import read_json
-from solvers.lagrange import LagrangeSpace
-from studies.emulator.inputs import Inputs
-from studies.sweep.field_path import FieldPath, MovedMesh
-from studies.sweep.job import field_base, field_file
-from studies.sweep.study import Study, Value
-from studies.sweep.sweep import STUDY_FILE, load_sweep
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.text_files import read_json
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.studies.emulator.inputs import Inputs
+from pinnray.studies.sweep.field_path import FieldPath, MovedMesh
+from pinnray.studies.sweep.job import field_base, field_file
+from pinnray.studies.sweep.study import Study, Value
+from pinnray.studies.sweep.sweep import STUDY_FILE, load_sweep
 
 FEWEST = 20
 """Least number of samples with a field."""

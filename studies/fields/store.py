@@ -4,15 +4,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from compare.runtime.provenance import package_versions
-from compare.runtime.stages import Stages
-from geometry.arrays import FloatArray
-from geometry.content_hash import content_hash, sources_digest
-from studies.emulator.arrays_file import keep_arrays, kept_arrays
-from studies.fields.emulator import FieldEmulator, fitted_fields
-from studies.fields.gaussian_processes import Block
-from studies.fields.reduction import Modes
-from studies.fields.snapshots import KnownSamples, Snapshots
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.content_hash import content_hash, sources_digest
+from pinnray.studies.emulator.arrays_file import keep_arrays, kept_arrays
+from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields
+from pinnray.studies.fields.gaussian_processes import Block
+from pinnray.studies.fields.reduction import Modes
+from pinnray.studies.fields.snapshots import KnownSamples, Snapshots
 
 FILE = "fields.safetensors"
 ARRAYS = ("strength", "units", "known", "lost", "scales", "calibration", "errors")

@@ -5,19 +5,19 @@ from dataclasses import asdict
 
 from rich.table import Table
 
-from compare.runtime.output_folder import job_definition
-from compare.runtime.stages import Stages
-from compare.runtime.tables import NONE, Cell, terminal_table, write_csv
-from geometry.atomic import write_json
-from geometry.cache import finger_mesh
-from geometry.drawing.drawn_finger import finger_from
-from solvers.problem import Problem
-from studies.gridsearch.chart import draw_grid
-from studies.gridsearch.training_run import GridPoint, TrainingRun, best_of
-from studies.sweep.job import StudyJob
-from studies.sweep.quantities import TRAINING, quantity_heading
-from studies.sweep.study import Range, Study, Value, physics_of
-from studies.sweep.sweep import run_sweep
+from pinnray.comparison.runtime.output_folder import job_definition
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.comparison.runtime.tables import NONE, Cell, terminal_table, write_csv
+from pinnray.geometry.atomic import write_json
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.drawing.drawn_finger import finger_from
+from pinnray.solvers.problem import Problem
+from pinnray.studies.gridsearch.chart import draw_grid
+from pinnray.studies.gridsearch.training_run import GridPoint, TrainingRun, best_of
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.quantities import TRAINING, quantity_heading
+from pinnray.studies.sweep.study import Range, Study, Value, physics_of
+from pinnray.studies.sweep.sweep import run_sweep
 
 SOLVER = "pinn-std"
 

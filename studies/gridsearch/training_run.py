@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from studies.sweep.measurement import Measurement
-from studies.sweep.quantities import TRAINING
+from pinnray.studies.sweep.measurement import Measurement
+from pinnray.studies.sweep.quantities import TRAINING
 
 TRAINED, DIVERGED, FAILED = "trained", "diverged", "failed"
 

@@ -4,12 +4,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from geometry.atomic import write_text
-from geometry.drawing.drawn_finger import finger_from
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from studies.optimum.question import Question
-from studies.sweep.job import StudyJob, Task
+from pinnray.geometry.atomic import write_text
+from pinnray.geometry.drawing.drawn_finger import finger_from
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.studies.optimum.question import Question
+from pinnray.studies.sweep.job import StudyJob, Task
 
 COMMAND = "compare with the options in {}"
 """What a reader is told to do with a problem; the front door knows the option."""

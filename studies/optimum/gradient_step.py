@@ -9,21 +9,21 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.optimize import linprog
 
-from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.parameters import Parameters
-from geometry.finger.validation import broken_rule
-from solvers.finger_figures.measures import narrowest_gap, thinnest_wall
-from solvers.finger_figures.sensitivity import SMALLEST, sensitivity_of
-from solvers.problem import Problem
-from solvers.registry import make_solver
-from solvers.solver import with_law
-from studies.optimum.question import Question
-from studies.sweep.job import StudyJob, Task
-from studies.sweep.measurement import Measurement
-from studies.sweep.study import WHOLE, Value, physics_of
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.finger.validation import broken_rule
+from pinnray.solvers.finger_figures.measures import narrowest_gap, thinnest_wall
+from pinnray.solvers.finger_figures.sensitivity import SMALLEST, sensitivity_of
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import with_law
+from pinnray.studies.optimum.question import Question
+from pinnray.studies.sweep.job import StudyJob, Task
+from pinnray.studies.sweep.measurement import Measurement
+from pinnray.studies.sweep.study import WHOLE, Value, physics_of
 
 TRUST = 0.04
 """Longest change of a parameter over its range."""

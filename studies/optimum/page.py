@@ -6,25 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from compare.runtime.html import write_html
-from compare.runtime.tables import TextTable
-from geometry.atomic import write_text
-from geometry.cache import finger_mesh
-from geometry.drawing.drawn_finger import finger_from
-from solvers.finger_figures import QUANTITIES, heading
-from solvers.problem import Problem
-from solvers.registry import make_solver
-from solvers.solution import Solution
-from solvers.solver import solved, with_law
-from studies.optimum.designs import COMMAND, write_designs
-from studies.optimum.pictures import draw_front, draw_front_fingers, draw_growth
-from studies.optimum.question import Question
-from studies.optimum.search import Optimum
-from studies.sweep.job import StudyJob, Task
-from studies.sweep.page import slow_sentence
-from studies.sweep.study import physics_of, title, unit_of
-from studies.sweep.sweep import Sweep
-from studies.sweep.tables import failure_grid
+from pinnray.comparison.runtime.html import write_html
+from pinnray.comparison.runtime.tables import TextTable
+from pinnray.geometry.atomic import write_text
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.drawing.drawn_finger import finger_from
+from pinnray.solvers.finger_figures import QUANTITIES, heading
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import solved, with_law
+from pinnray.studies.optimum.designs import COMMAND, write_designs
+from pinnray.studies.optimum.pictures import draw_front, draw_front_fingers, draw_growth
+from pinnray.studies.optimum.question import Question
+from pinnray.studies.optimum.search import Optimum
+from pinnray.studies.sweep.job import StudyJob, Task
+from pinnray.studies.sweep.page import slow_sentence
+from pinnray.studies.sweep.study import physics_of, title, unit_of
+from pinnray.studies.sweep.sweep import Sweep
+from pinnray.studies.sweep.tables import failure_grid
 
 PAGE = "front.html"
 

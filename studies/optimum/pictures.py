@@ -6,13 +6,13 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 
-from compare.figures.style import HALO, axes_at, write_heading
-from geometry.arrays import FloatArray, IntArray
-from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
-from solvers.finger_figures import QUANTITIES
-from solvers.problem import Problem, contact_ends, front_points
-from solvers.solution import Solution
-from studies.optimum.search import Optimum, is_allowed
+from pinnray.comparison.figures.style import HALO, axes_at, write_heading
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.solvers.finger_figures import QUANTITIES
+from pinnray.solvers.problem import Problem, contact_ends, front_points
+from pinnray.solvers.solution import Solution
+from pinnray.studies.optimum.search import Optimum, is_allowed
 
 BLUE = "#0072b2"
 

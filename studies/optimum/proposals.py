@@ -8,12 +8,12 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
-from geometry.arrays import FloatArray
-from studies.emulator.emulator import Emulator
-from studies.optimum.front import hypervolume, unbeaten
-from studies.optimum.question import Question
-from studies.sweep.sampling import places_of, sample_at
-from studies.sweep.study import Value
+from pinnray.geometry.arrays import FloatArray
+from pinnray.studies.emulator.emulator import Emulator
+from pinnray.studies.optimum.front import hypervolume, unbeaten
+from pinnray.studies.optimum.question import Question
+from pinnray.studies.sweep.sampling import places_of, sample_at
+from pinnray.studies.sweep.study import Value
 
 POPULATION, GENERATIONS = 60, 25
 

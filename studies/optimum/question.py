@@ -6,11 +6,11 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from geometry.errors import UserError
-from geometry.finger.parameters import CheckedModel, bounded
-from geometry.text_files import read_toml
-from solvers.finger_figures import QUANTITIES
-from studies.sweep.study import Study
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.parameters import CheckedModel, bounded
+from pinnray.geometry.text_files import read_toml
+from pinnray.solvers.finger_figures import QUANTITIES
+from pinnray.studies.sweep.study import Study
 
 Sense = Literal["least", "largest"]
 

@@ -7,26 +7,26 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from compare.runtime.output_folder import check_resumable_folder, locked
-from compare.runtime.stages import Stages
-from geometry.arrays import FloatArray
-from geometry.atomic import write_json
-from geometry.errors import UserError
-from geometry.finger.parameters import Parameters
-from geometry.finger.validation import broken_rule
-from geometry.notebook import brief
-from studies.emulator.emulator import fitted_emulator
-from studies.emulator.inputs import Inputs
-from studies.optimum.front import hypervolume, reference_point, unbeaten
-from studies.optimum.gradient_step import stepped
-from studies.optimum.question import ENOUGH, Question
-from studies.sweep.job import StudyJob
-from studies.sweep.measurement import Measurement
-from studies.sweep.sampling import samples
-from studies.sweep.store import Journal, opened
-from studies.sweep.study import Value
-from studies.sweep.sweep import JOURNAL, Sweep, finish
-from studies.sweep.workers import Workers
+from pinnray.comparison.runtime.output_folder import check_resumable_folder, locked
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_json
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.finger.validation import broken_rule
+from pinnray.geometry.notebook import brief
+from pinnray.studies.emulator.emulator import fitted_emulator
+from pinnray.studies.emulator.inputs import Inputs
+from pinnray.studies.optimum.front import hypervolume, reference_point, unbeaten
+from pinnray.studies.optimum.gradient_step import stepped
+from pinnray.studies.optimum.question import ENOUGH, Question
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.measurement import Measurement
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.store import Journal, opened
+from pinnray.studies.sweep.study import Value
+from pinnray.studies.sweep.sweep import JOURNAL, Sweep, finish
+from pinnray.studies.sweep.workers import Workers
 
 QUESTION_FILE, FINGERS_FILE = "question.json", "fingers.json"
 
@@ -143,7 +143,7 @@ def _proposed(
     job: StudyJob[Question], fingers: list[dict[str, Value]], journal: Journal, count: int
 ) -> list[dict[str, Value]]:
     """The next fingers; further samples where the emulator has too few runs or none apart from the others."""
-    from studies.optimum.proposals import proposals
+    from pinnray.studies.optimum.proposals import proposals
 
     question, measured = job.study, journal.measurements()
     more = starting_fingers(job, len(fingers) + count)[len(fingers) :]

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import least_squares
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 MM = 1e-3
 """Metres in a millimetre."""

@@ -7,26 +7,26 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from compare.runtime.stages import Stages
-from compare.runtime.tables import write_csv
-from geometry.atomic import write_json, write_text
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from solvers.finger_figures.figures import DENSITY
-from solvers.finger_figures.measures import thinnest_wall
-from solvers.problem import Problem
-from studies.robots.chain import MM, Chain
-from studies.robots.mjcf import Damping, chain_mjcf, flex_mjcf, with_header
-from studies.robots.picture import draw_score
-from studies.robots.presses import PLACES, PressedFinger, at_rest, press
-from studies.robots.score import ModelScore, scored
-from studies.robots.simulation import Model, chain_front, check_mujoco, flex_front
-from studies.robots.sofa import sofa_scene
-from studies.robots.solid_files import write_material, write_msh, write_surface, write_vtk
-from studies.robots.solid_mesh import SolidMesh
-from studies.robots.springs import Springs, fitted_springs
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.comparison.runtime.tables import write_csv
+from pinnray.geometry.atomic import write_json, write_text
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.finger_figures.figures import DENSITY
+from pinnray.solvers.finger_figures.measures import thinnest_wall
+from pinnray.solvers.problem import Problem
+from pinnray.studies.robots.chain import MM, Chain
+from pinnray.studies.robots.mjcf import Damping, chain_mjcf, flex_mjcf, with_header
+from pinnray.studies.robots.picture import draw_score
+from pinnray.studies.robots.presses import PLACES, PressedFinger, at_rest, press
+from pinnray.studies.robots.score import ModelScore, scored
+from pinnray.studies.robots.simulation import Model, chain_front, check_mujoco, flex_front
+from pinnray.studies.robots.sofa import sofa_scene
+from pinnray.studies.robots.solid_files import write_material, write_msh, write_surface, write_vtk
+from pinnray.studies.robots.solid_mesh import SolidMesh
+from pinnray.studies.robots.springs import Springs, fitted_springs
 
 Kind = Literal["mujoco", "sofa", "mesh"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

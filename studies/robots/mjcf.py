@@ -8,11 +8,11 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import FloatArray
-from solvers.physics import Material
-from studies.robots.chain import MM, Chain
-from studies.robots.solid_mesh import SolidMesh
-from studies.robots.springs import Springs
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.physics import Material
+from pinnray.studies.robots.chain import MM, Chain
+from pinnray.studies.robots.solid_mesh import SolidMesh
+from pinnray.studies.robots.springs import Springs
 
 CHAIN_STEP, FLEX_STEP = 1e-3, 1e-3
 """Time steps, s."""

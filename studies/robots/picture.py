@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from compare.figures.style import axes_at, solver_colour, write_heading
-from geometry.figure import INK, MUTED, WIDTH, Figure, figure
-from studies.robots.presses import PressedFinger
-from studies.robots.score import ModelScore
+from pinnray.comparison.figures.style import axes_at, solver_colour, write_heading
+from pinnray.geometry.figure import INK, MUTED, WIDTH, Figure, figure
+from pinnray.studies.robots.presses import PressedFinger
+from pinnray.studies.robots.score import ModelScore
 
 SHOWN = (0, 2, 4)
 """Places, from the base, whose largest loads are drawn."""

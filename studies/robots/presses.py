@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from solvers.cylinder_contact import touching_centre
-from solvers.problem import Load, Problem
-from solvers.registry import make_solver
-from solvers.solution import Solution
-from solvers.solver import Progress, silent, solved, with_law
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.cylinder_contact import touching_centre
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Progress, silent, solved, with_law
 
 FIRST, LAST, PLACES = 0.2, 0.7, 6
 """Places of the cylinder for the fit, as fractions of the front face from base to tip, and their number.
@@ -150,7 +150,7 @@ def _half_and_full(along: Sequence[Press]) -> list[Press]:
 
 def at_rest(problem: Problem) -> PressedFinger:
     """A finger with small loads by `fem` only: 1 mm along it or into it, without a move in the other way."""
-    from solvers.fem.linear import FemSolver
+    from pinnray.solvers.fem.linear import FemSolver
 
     nodes = problem.mesh.points[np.unique(problem.mesh.boundary("front"))]
     front = nodes[nodes[:, 0].argsort()]

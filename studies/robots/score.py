@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from compare.runtime.tables import Cell, terminal_table
-from geometry.arrays import FloatArray
-from studies.robots.chain import MM
-from studies.robots.presses import Press, PressedFinger
-from studies.robots.simulation import Model, Rest, pressed_in_mujoco
+from pinnray.comparison.runtime.tables import Cell, terminal_table
+from pinnray.geometry.arrays import FloatArray
+from pinnray.studies.robots.chain import MM
+from pinnray.studies.robots.presses import Press, PressedFinger
+from pinnray.studies.robots.simulation import Model, Rest, pressed_in_mujoco
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from studies.robots.chain import MM, Chain
-from studies.robots.mjcf import HARDER
-from studies.robots.presses import Press
-from studies.robots.solid_mesh import SolidMesh
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.studies.robots.chain import MM, Chain
+from pinnray.studies.robots.mjcf import HARDER
+from pinnray.studies.robots.presses import Press
+from pinnray.studies.robots.solid_mesh import SolidMesh
 
 RAMP, HOLD = 0.1, 0.25
 """Times in which the cylinder moves and is held, s."""

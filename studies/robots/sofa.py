@@ -6,8 +6,8 @@ Component names are those of SOFA 24, from its own examples: `TetrahedronFEMForc
 
 from xml.etree import ElementTree as ET
 
-from solvers.physics import Material
-from studies.robots.solid_mesh import SolidMesh
+from pinnray.solvers.physics import Material
+from pinnray.studies.robots.solid_mesh import SolidMesh
 
 PLUGINS = (
     "Collision.Geometry",

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pyvista
 
-from geometry.atomic import atomic_path, write_json, write_text
-from solvers.physics import Material
-from studies.robots.solid_mesh import SolidMesh
+from pinnray.geometry.atomic import atomic_path, write_json, write_text
+from pinnray.solvers.physics import Material
+from pinnray.studies.robots.solid_mesh import SolidMesh
 
 GROUPS = ("base", "front")
 """Boundaries that are physical groups of triangles; `body` is the group of all tetrahedra."""

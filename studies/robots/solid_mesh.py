@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.extrusion import ExtrudedSpace
-from solvers.lagrange import LagrangeSpace
-from studies.robots.chain import MM
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.studies.robots.chain import MM
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from geometry.arrays import FloatArray
-from studies.robots.chain import MM, Chain
-from studies.robots.presses import PressedFinger
+from pinnray.geometry.arrays import FloatArray
+from pinnray.studies.robots.chain import MM, Chain
+from pinnray.studies.robots.presses import PressedFinger
 
 SMALL_WEIGHT = 0.01
 """Weight of a small load in the fit: they decide only what pressing does not, such as pulls along it."""

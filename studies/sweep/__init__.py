@@ -1,4 +1,4 @@
 """A parameter study: sampled fingers, solved by worker processes, and their quantities in one table.
 
-Imports `compare.figures`, `compare.evaluation`, `compare.runtime`.
+Imports `comparison.figures`, `comparison.evaluation`, `comparison.runtime`.
 """

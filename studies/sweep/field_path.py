@@ -9,19 +9,19 @@ from typing import Self
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from geometry.arrays import FloatArray
-from geometry.atomic import write_arrays
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.design_motion import MovingMesh
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.lagrange import LagrangeField
-from solvers.problem import Problem
-from solvers.solution import Solution
-from solvers.solver import Solver
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_arrays
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.design_motion import MovingMesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.lagrange import LagrangeField
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Solver
 
 NUMBERS = ("force_u", "force_v", "energy", "force_abscissa", "contact_width")
 """Of a body along its load path: force on it, N/mm, energy, N mm/mm, and where it is pressed, mm."""

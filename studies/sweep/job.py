@@ -8,18 +8,18 @@ from math import floor
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from compare.runtime.provenance import package_versions
-from geometry.cache import drawn_finger
-from geometry.content_hash import sources_digest
-from geometry.drawing.description import description_beside, load_description
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.parameters import Parameters, parameter_info
-from geometry.finger.presets import load_design
-from geometry.finger.rules import markers_apart, markers_fit
-from geometry.mesh.settings import MeshSettings
-from solvers.solver import check_load
-from studies.sweep.study import PHYSICS, Study, Value, physics_of
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.geometry.cache import drawn_finger
+from pinnray.geometry.content_hash import sources_digest
+from pinnray.geometry.drawing.description import description_beside, load_description
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.parameters import Parameters, parameter_info
+from pinnray.geometry.finger.presets import load_design
+from pinnray.geometry.finger.rules import markers_apart, markers_fit
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.solver import check_load
+from pinnray.studies.sweep.study import PHYSICS, Study, Value, physics_of
 
 LEAST_MARKERS = {name: float(parameter_info(name, "low")) for name in ("marker_diameter", "marker_height")}
 """Markers of the fingers of a study: their size changes no quantity, so that none is refused for it."""

@@ -6,22 +6,22 @@ from typing import Literal
 
 import numpy as np
 
-from compare.evaluation.deformed_body import THROUGH_ITSELF, DeformedBody
-from compare.evaluation.plausibility import problem_remarks
-from geometry.cache import finger_mesh
-from geometry.drawing.drawn_finger import finger_from
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.parameters import Parameters
-from geometry.finger.validation import broken_rule
-from solvers.finger_figures import FRACTIONS
-from solvers.problem import Problem
-from solvers.registry import make_solver
-from solvers.solver import Solver, TrainedSolver, TrainingContext, TrainingDiverged
-from studies.sweep.field_path import FieldPath, moved_mesh, stepping
-from studies.sweep.job import Task
-from studies.sweep.quantities import quantities
-from studies.sweep.study import physics_of
+from pinnray.comparison.evaluation.deformed_body import THROUGH_ITSELF, DeformedBody
+from pinnray.comparison.evaluation.plausibility import problem_remarks
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.drawing.drawn_finger import finger_from
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.finger.validation import broken_rule
+from pinnray.solvers.finger_figures import FRACTIONS
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Solver, TrainedSolver, TrainingContext, TrainingDiverged
+from pinnray.studies.sweep.field_path import FieldPath, moved_mesh, stepping
+from pinnray.studies.sweep.job import Task
+from pinnray.studies.sweep.quantities import quantities
+from pinnray.studies.sweep.study import physics_of
 
 OUT_OF_TIME = "stopped at the time limit"
 

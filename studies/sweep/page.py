@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from compare.runtime import html
-from studies.sweep.job import StudyJob
-from studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs, draw_sensitivity
-from studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
-from studies.sweep.study import Study
-from studies.sweep.sweep import Sweep
-from studies.sweep.tables import failure_grid, quantity_grid
+from pinnray.comparison.runtime import html
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs, draw_sensitivity
+from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
+from pinnray.studies.sweep.study import Study
+from pinnray.studies.sweep.sweep import Sweep
+from pinnray.studies.sweep.tables import failure_grid, quantity_grid
 
 PAGE = "sweep.html"
 

@@ -7,16 +7,16 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from compare.figures.style import axes_at, write_heading
-from geometry.arrays import FloatArray
-from geometry.drawing.drawn_finger import finger_from
-from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
-from geometry.finger.picture import draw_section
-from solvers.finger_figures import QUANTITIES
-from studies.sweep.job import StudyJob
-from studies.sweep.sensitivity import TRUSTED, Sensitivity
-from studies.sweep.study import Study, unit_of
-from studies.sweep.sweep import Sweep
+from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.drawing.drawn_finger import finger_from
+from pinnray.geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.geometry.finger.picture import draw_section
+from pinnray.solvers.finger_figures import QUANTITIES
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity
+from pinnray.studies.sweep.study import Study, unit_of
+from pinnray.studies.sweep.sweep import Sweep
 
 SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
 """Quantities of the pictures; the tables have all."""

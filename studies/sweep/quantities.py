@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from compare.evaluation.evaluation import field_difference
-from geometry.finger.finger import Finger
-from geometry.mesh.quadrature import body_quadrature, edge_quadrature
-from solvers.fem.linear import FemSolver
-from solvers.finger_figures import QUANTITIES, Quantity, figures_at_rest, figures_of
-from solvers.finger_figures import heading as heading_of
-from solvers.problem import Load, Problem, contact_functional
-from solvers.solution import Solution
-from solvers.solver import Progress, Solver, TrainedSolver, silent, solved, with_law
+from pinnray.comparison.evaluation.evaluation import field_difference
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.quadrature import body_quadrature, edge_quadrature
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.finger_figures import QUANTITIES, Quantity, figures_at_rest, figures_of
+from pinnray.solvers.finger_figures import heading as heading_of
+from pinnray.solvers.problem import Load, Problem, contact_functional
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Progress, Solver, TrainedSolver, silent, solved, with_law
 
 TRAINING: Mapping[str, Quantity] = {
     "rel_l2_displacement": Quantity("", "relative L2 difference of the displacement from that by fem"),

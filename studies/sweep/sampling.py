@@ -8,9 +8,9 @@ from math import prod
 import numpy as np
 from scipy.stats import qmc
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from studies.sweep.study import MOST, WHOLE, Range, Study, Value
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.studies.sweep.study import MOST, WHOLE, Range, Study, Value
 
 
 def samples(study: Study) -> list[dict[str, Value]]:

@@ -13,9 +13,9 @@ from math import comb
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from geometry.arrays import FloatArray, IntArray
-from studies.sweep.sampling import places_of
-from studies.sweep.sweep import Sweep
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.studies.sweep.sampling import places_of
+from pinnray.studies.sweep.sweep import Sweep
 
 DEGREES = (1, 2, 3, 4, 5)
 """Total degrees that are tried; the one with the smallest left-out error is taken."""

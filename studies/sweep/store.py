@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from geometry.errors import UserError
-from studies.sweep.measurement import Measurement
+from pinnray.geometry.errors import UserError
+from pinnray.studies.sweep.measurement import Measurement
 
 _NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")
 """End of a rollback journal that names another file. Source: SQLite, pager.c, `aJournalMagic`."""

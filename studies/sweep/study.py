@@ -7,8 +7,8 @@ from typing import Any, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from geometry.errors import UserError
-from geometry.finger.parameters import (
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.parameters import (
     SYMBOLS,
     CheckedModel,
     Parameters,
@@ -16,10 +16,10 @@ from geometry.finger.parameters import (
     parameter_info,
     unknown_parameter,
 )
-from geometry.text_files import read_toml
-from solvers.problem import Load, Material, Physics
-from solvers.registry import make_solver
-from solvers.solver import Solver, Traits
+from pinnray.geometry.text_files import read_toml
+from pinnray.solvers.problem import Load, Material, Physics
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Solver, Traits
 
 PHYSICS = tuple(Physics.model_fields)
 """Parameters of material and load."""

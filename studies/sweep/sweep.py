@@ -5,20 +5,20 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from compare.evaluation.deformed_body import ADVICE
-from compare.evaluation.plausibility import LOOKS_LIKE
-from compare.runtime.output_folder import check_links, check_resumable_folder, locked
-from compare.runtime.stages import Stages
-from geometry.atomic import write_json
-from geometry.errors import UserError
-from geometry.text_files import read_json
-from solvers.solver import Progress, silent
-from studies.sweep.job import StudyJob, Task
-from studies.sweep.measurement import OUT_OF_TIME, Measurement
-from studies.sweep.sampling import samples
-from studies.sweep.store import Journal, opened
-from studies.sweep.study import Study, Value
-from studies.sweep.workers import Workers
+from pinnray.comparison.evaluation.deformed_body import ADVICE
+from pinnray.comparison.evaluation.plausibility import LOOKS_LIKE
+from pinnray.comparison.runtime.output_folder import check_links, check_resumable_folder, locked
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.atomic import write_json
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.text_files import read_json
+from pinnray.solvers.solver import Progress, silent
+from pinnray.studies.sweep.job import StudyJob, Task
+from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.store import Journal, opened
+from pinnray.studies.sweep.study import Study, Value
+from pinnray.studies.sweep.workers import Workers
 
 STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
 

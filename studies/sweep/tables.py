@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from compare.runtime.tables import TextTable, plain
-from geometry.atomic import write_bytes, write_text
-from solvers.finger_figures import QUANTITIES, heading
-from studies.sweep.study import title
-from studies.sweep.sweep import Sweep
+from pinnray.comparison.runtime.tables import TextTable, plain
+from pinnray.geometry.atomic import write_bytes, write_text
+from pinnray.solvers.finger_figures import QUANTITIES, heading
+from pinnray.studies.sweep.study import title
+from pinnray.studies.sweep.sweep import Sweep
 
 FEW = 5
 """Numbers of samples that the table of failures lists for a reason."""

@@ -12,10 +12,10 @@ from itertools import islice, zip_longest
 from math import inf
 from typing import TYPE_CHECKING, Self
 
-from geometry.errors import UserError
-from geometry.processes import Pool, ProcessFailed
-from studies.sweep.job import Task
-from studies.sweep.measurement import OUT_OF_TIME, Measurement, measured
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.processes import Pool, ProcessFailed
+from pinnray.studies.sweep.job import Task
+from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, measured
 
 if TYPE_CHECKING:
     from distributed import Client

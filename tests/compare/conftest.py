@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import evaluated
-from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.problem import Problem
-from solvers.solution import DisplacementField, ErrorEstimate, Solution, Status
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import DisplacementField, ErrorEstimate, Solution, Status
 
 COLUMNS, ROWS = 24, 8
 

@@ -4,7 +4,7 @@ from functools import cache
 
 import pytest
 
-from geometry import Design, MeshSettings, TriangleMesh, load_design, preset_names
+from pinnray.geometry import Design, MeshSettings, TriangleMesh, load_design, preset_names
 
 COARSE = MeshSettings(size=1.0, coarsening=2)
 
@@ -24,7 +24,7 @@ CASES: dict[str, Design] = {
 
 @cache
 def coarse_mesh(case: str) -> TriangleMesh:
-    from geometry.mesh.mesher import build_mesh
+    from pinnray.geometry.mesh.mesher import build_mesh
 
     return build_mesh(CASES[case], COARSE)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.atomic import atomic_path, remove_partials, write_arrays, write_text
+from pinnray.geometry.atomic import atomic_path, remove_partials, write_arrays, write_text
 
 
 def test_the_new_file_is_on_the_disk_before_it_takes_the_name(tmp_path, monkeypatch):

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
-from geometry import Design, MeshSettings, UserError, cad_files, finger_mesh, worker
-from geometry.cache import cache_folder, cache_key, drawn_finger
-from geometry.drawing.description import Description
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.processes import Pool, child_environment
-from geometry.worker import perform, run_task
+from pinnray.geometry import Design, MeshSettings, UserError, cad_files, finger_mesh, worker
+from pinnray.geometry.cache import cache_folder, cache_key, drawn_finger
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.processes import Pool, child_environment
+from pinnray.geometry.worker import perform, run_task
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
 
@@ -34,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_second_call_is_read_from_the_cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("geometry.cache.run_task", None)  # a second run would fail
+    monkeypatch.setattr("pinnray.geometry.cache.run_task", None)  # a second run would fail
     mesh = finger_mesh(Design(name="another-name"), settings=COARSE, cache_dir=folder)
     assert len(mesh.markers) == 9
 
@@ -44,7 +44,7 @@ def test_nothing_but_the_result_is_left_in_the_cache(folder: Path) -> None:
 
 
 def test_worker_gives_the_same_mesh_as_meshing_here(folder: Path) -> None:
-    from geometry.mesh.mesher import build_mesh
+    from pinnray.geometry.mesh.mesher import build_mesh
 
     assert (
         finger_mesh(Design(), settings=COARSE, cache_dir=folder).digest == build_mesh(Design(), COARSE).digest
@@ -69,7 +69,7 @@ def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypat
         rebuilt.append(task["kind"])
         return mesh
 
-    monkeypatch.setattr("geometry.cache.run_task", run)
+    monkeypatch.setattr("pinnray.geometry.cache.run_task", run)
     entry.write_bytes(damage(good))
     with pytest.warns(RuntimeWarning, match="rebuilding mesh-.* is damaged"):
         finger_mesh(Design(), settings=COARSE, cache_dir=folder)
@@ -84,7 +84,7 @@ def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPa
         )
 
     keys = {key(), key(Design(rib_angle=19)), key(size=0.3), key(corner_size=0.1)}
-    monkeypatch.setattr("geometry.cache._version", lambda package: "0")
+    monkeypatch.setattr("pinnray.geometry.cache._version", lambda package: "0")
     keys.add(key())
     assert len(keys) == 5
     assert key(Design(name="x")) in keys
@@ -217,7 +217,7 @@ def test_meshing_works_under_mpirun(tmp_path: Path) -> None:
     mpirun = shutil.which("mpirun")
     assert mpirun, "mpirun comes with DOLFINx"
     code = (
-        "from pathlib import Path; from geometry import *; import os\n"
+        "from pathlib import Path; from pinnray.geometry import *; import os\n"
         "m = finger_mesh(Design(), settings=MeshSettings(size=2), "
         "cache_dir=Path(os.environ['CACHE']) / os.environ.get('OMPI_COMM_WORLD_RANK', '0'))\n"
         "print(m.digest)"
@@ -238,7 +238,7 @@ def test_meshing_works_under_mpirun(tmp_path: Path) -> None:
 
 def test_cad_files_come_from_the_cache_the_second_time(tmp_path, monkeypatch):
     first = cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
-    monkeypatch.setattr("geometry.cache.run_task", None)
+    monkeypatch.setattr("pinnray.geometry.cache.run_task", None)
     second = cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
     assert sorted(path.name for path in (tmp_path / "two").iterdir()) == ["section.svg"]
@@ -258,7 +258,7 @@ def test_cad_files_of_a_foreign_cache_stay_in_the_output_folder(name: str, tmp_p
 
 def test_import_needs_neither_cadquery_nor_gmsh() -> None:
     code = (
-        "import sys, geometry\n"
+        "import sys; from pinnray import geometry\n"
         "geometry.load_design('stiff'); geometry.finger_mesh\n"
         "print(*({'cadquery', 'gmsh', 'OCP'} & set(sys.modules)))"
     )
@@ -273,7 +273,7 @@ def test_import_needs_neither_cadquery_nor_gmsh() -> None:
 
 
 def test_every_public_name_can_be_imported() -> None:
-    import geometry
+    from pinnray import geometry
 
     for name in geometry.__all__:
         assert getattr(geometry, name) is not None

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry import Design, MeshSettings, cad, cad_files, load_design, marker_positions
-from geometry.mesh.mesher import build_mesh
+from pinnray.geometry import Design, MeshSettings, cad, cad_files, load_design, marker_positions
+from pinnray.geometry.mesh.mesher import build_mesh
 from tests.meshes import body_area, body_perimeter
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from geometry import content_hash
-from geometry.content_hash import file_digest, sources_digest
+from pinnray.geometry import content_hash
+from pinnray.geometry.content_hash import file_digest, sources_digest
 
 
 @pytest.fixture
@@ -32,9 +32,9 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.mark.parametrize(
     ("modules", "changed", "counts"),
     [
-        (["solvers.fem"], "solvers/law.py", True),  # its own package
-        (["solvers.fem"], "geometry/law.py", True),  # one that it may import
-        (["solvers.fem"], "compare/law.py", False),  # one that imports it
+        (["pinnray.solvers.fem"], "solvers/law.py", True),  # its own package
+        (["pinnray.solvers.fem"], "geometry/law.py", True),  # one that it may import
+        (["pinnray.solvers.fem"], "compare/law.py", False),  # one that imports it
         (["researchers.solver"], "researchers/deep/law.py", True),  # any module of others, loaded or not
         (["researchers.solver", "compare.metrics"], "geometry/law.py", True),
         (["single"], "single.py", True),  # a module without a package

@@ -14,7 +14,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from geometry.processes import (
+from pinnray.commands.launch import guarded
+from pinnray.geometry.processes import (
     PATIENCE_S,
     Pool,
     ProcessFailed,
@@ -22,8 +23,7 @@ from geometry.processes import (
     end_with_parent,
     known_to_children,
 )
-from pinnray.commands.launch import guarded
-from solvers.solver import Progress
+from pinnray.solvers.solver import Progress
 
 ROOT = Path(__file__).parents[2]
 
@@ -162,7 +162,7 @@ def test_a_process_stays_for_the_next_task():
 
 def test_a_process_that_ends_before_it_has_read_a_large_task_is_noticed(monkeypatch):
     """Its parent must not wait for a reader: the task is larger than a pipe holds."""
-    monkeypatch.setattr("geometry.processes._CHILD", "import os; os._exit(5)")
+    monkeypatch.setattr("pinnray.geometry.processes._CHILD", "import os; os._exit(5)")
     assert answers_of(half, {"a": bytes(2**22)}) == {"a": ProcessFailed(5)}
 
 
@@ -202,7 +202,7 @@ def test_processes_end_with_the_program_that_started_them(tmp_path):
         "import sys; sys.path[:0] = sys.argv[1:3]\n"
         "from pathlib import Path\n"
         "from test_processes import endless\n"
-        "from geometry.processes import Pool\n"
+        "from pinnray.geometry.processes import Pool\n"
         "def report(name, fraction, note): print(note, flush=True)\n"
         "list(Pool(1).answers(endless, {'a': Path(sys.argv[3])}, report=report))\n"  # without a guard
     )

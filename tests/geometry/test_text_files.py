@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from geometry.text_files import parse_toml, read_json, read_toml
+from pinnray.geometry.text_files import parse_toml, read_json, read_toml
 
 
 @pytest.mark.parametrize(

@@ -14,14 +14,14 @@ import pandas as pd
 import pytest
 
 import pinnray as pr
-from compare.figures.fields import VIEWED
-from geometry.finger.keywords import FingerKeywords
-from geometry.finger.parameters import Parameters
-from geometry.mesh.settings import MeshSettings
 from pinnray.arguments import LOAD, MATERIAL, JobKeywords, MeshKeywords, PhysicsKeywords
+from pinnray.comparison.figures.fields import VIEWED
+from pinnray.geometry.finger.keywords import FingerKeywords
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.solution import FieldName
-from solvers.finger_figures import figures_of
-from solvers.physics import Physics
+from pinnray.solvers.finger_figures import figures_of
+from pinnray.solvers.physics import Physics
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")
 
@@ -275,7 +275,7 @@ def test_the_rig_films_what_is_calibrated_tracked_and_weighed(tmp_path: Path):
 def test_a_notebook_shows_the_progress_in_one_line(monkeypatch: pytest.MonkeyPatch):
     from rich.console import Console
 
-    from compare.runtime.stages import NotebookLine, shown_stages
+    from pinnray.comparison.runtime.stages import NotebookLine, shown_stages
 
     texts: list[str] = []
 

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 import pinnray as pr
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.linear import FemSolver
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.linear import FemSolver
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 

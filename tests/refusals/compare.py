@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from compare.crossval.folds import load_cases_of
-from compare.evaluation.plausibility import check_positions, displacement_remarks
-from compare.evaluation.truths import TRUTHS, Truth, virtual_experiment
-from geometry.arrays import FloatArray
-from geometry.finger.design import Design
-from geometry.mesh.mesher import build_mesh
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Problem
+from pinnray.comparison.crossval.folds import load_cases_of
+from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks
+from pinnray.comparison.evaluation.truths import TRUTHS, Truth, virtual_experiment
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.mesher import build_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Problem
 
 FILES = {
     "empty/notes.txt": "mine",

@@ -6,15 +6,23 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry import Design, MeshSettings, Observations, TriangleMesh, cad_files, load_design, parse_overrides
-from geometry.drawing.description import Description, load_description
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.drawing.formats.msh import _numbers as msh_numbers
-from geometry.drawing.formats.planes import plane_of
-from geometry.drawing.load import finger_from_file, read_drawing
-from geometry.mesh.quadrature import triangle_rule
-from geometry.registration import Registration
-from geometry.text_files import read_json, read_toml
+from pinnray.geometry import (
+    Design,
+    MeshSettings,
+    Observations,
+    TriangleMesh,
+    cad_files,
+    load_design,
+    parse_overrides,
+)
+from pinnray.geometry.drawing.description import Description, load_description
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.drawing.formats.msh import _numbers as msh_numbers
+from pinnray.geometry.drawing.formats.planes import plane_of
+from pinnray.geometry.drawing.load import finger_from_file, read_drawing
+from pinnray.geometry.mesh.quadrature import triangle_rule
+from pinnray.geometry.registration import Registration
+from pinnray.geometry.text_files import read_json, read_toml
 from tests.geometry.drawing.files import (
     BEAM,
     FINRAY,

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 import pinnray as pr
-from solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.linear import FemSolver
 
 __all__ = ["FemSolver", "Path", "np"]
 

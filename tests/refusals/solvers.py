@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.cache import finger_mesh
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.adaptive_refinement import adapted
-from solvers.fem.solid import affordable
-from solvers.finger_figures import figures_of
-from solvers.finger_figures.sensitivity import sensitivity_of
-from solvers.materials import TensileTest, fitted, preset, read_tensile_test
-from solvers.physics import Physics
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solver import solved
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.adaptive_refinement import adapted
+from pinnray.solvers.fem.solid import affordable
+from pinnray.solvers.finger_figures import figures_of
+from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
+from pinnray.solvers.materials import TensileTest, fitted, preset, read_tensile_test
+from pinnray.solvers.physics import Physics
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import solved
 from tests.meshes import permuted
 from tests.solvers.conftest import SHORT, observed_at
 from tests.solvers.test_solver import Beam, Field, ended, spoilt

@@ -4,15 +4,15 @@
 
 from pathlib import Path
 
-from studies.emulator.inputs import Inputs
-from studies.emulator.store import emulator_of
-from studies.optimum.question import Question, load_question
-from studies.optimum.search import search_front
-from studies.sweep.job import StudyJob
-from studies.sweep.sampling import samples
-from studies.sweep.store import opened
-from studies.sweep.study import Study, load_study
-from studies.sweep.sweep import load_sweep
+from pinnray.studies.emulator.inputs import Inputs
+from pinnray.studies.emulator.store import emulator_of
+from pinnray.studies.optimum.question import Question, load_question
+from pinnray.studies.optimum.search import search_front
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.store import opened
+from pinnray.studies.sweep.study import Study, load_study
+from pinnray.studies.sweep.sweep import load_sweep
 from tests.studies.emulator.sweeps import solved_sweep
 
 RIBS = "[varied]\nrib_thickness = {from = 1, to = 2}\n"

@@ -11,8 +11,34 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from geometry.arrays import FloatArray
-from geometry.observations import Observations
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.observations import Observations
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera_calibration import calibrate_camera, calibrate_views
+from pinnray.vision.calibration.camera_file import load_camera, save_camera
+from pinnray.vision.calibration.charuco import parse_board
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.clicked_points import Clicks, clicked_points, read_clicks
+from pinnray.vision.discs.circle_proposals import propose_circles
+from pinnray.vision.discs.colour import read_colour
+from pinnray.vision.discs.colour_picker import pick_colour
+from pinnray.vision.discs.disc_fit import fit_discs
+from pinnray.vision.frames.decoder import PNG_HEADER
+from pinnray.vision.frames.formats import PNG
+from pinnray.vision.frames.sources import open_frames, photographs
+from pinnray.vision.frames.video import video_writer
+from pinnray.vision.measurements import read_measurements
+from pinnray.vision.rig.boards import board_poses, board_scene
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.motion import Motion
+from pinnray.vision.rig.virtual_camera import default_camera
+from pinnray.vision.tracking.camera_motion import find_camera_motion
+from pinnray.vision.tracking.fiducial_matching import identify_fiducials
+from pinnray.vision.tracking.layout_matching import match_layout
+from pinnray.vision.tracking.marker_plane import SIMILARITY
+from pinnray.vision.tracking.plane_fit import homography_plane
+from pinnray.vision.tracking.rest_detection import find_rest_intervals
+from pinnray.vision.tracking.workspace import Workspace, load_workspace
 from tests.vision.calibration.chessboards import BOARD, CAMERA, drawn, views
 from tests.vision.films import tracked
 from tests.vision.fingers import MARKERS, PRESSED
@@ -21,32 +47,6 @@ from tests.vision.test_clicked_points import found, picture
 from tests.vision.tracking.test_camera_motion import SCENE, START
 from tests.vision.tracking.test_camera_motion import discs as fiducials
 from tests.vision.tracking.test_trajectories import discs, tracking
-from vision.calibration.camera import Camera
-from vision.calibration.camera_calibration import calibrate_camera, calibrate_views
-from vision.calibration.camera_file import load_camera, save_camera
-from vision.calibration.charuco import parse_board
-from vision.calibration.chessboard import Board
-from vision.clicked_points import Clicks, clicked_points, read_clicks
-from vision.discs.circle_proposals import propose_circles
-from vision.discs.colour import read_colour
-from vision.discs.colour_picker import pick_colour
-from vision.discs.disc_fit import fit_discs
-from vision.frames.decoder import PNG_HEADER
-from vision.frames.formats import PNG
-from vision.frames.sources import open_frames, photographs
-from vision.frames.video import video_writer
-from vision.measurements import read_measurements
-from vision.rig.boards import board_poses, board_scene
-from vision.rig.exposure import Exposure
-from vision.rig.motion import Motion
-from vision.rig.virtual_camera import default_camera
-from vision.tracking.camera_motion import find_camera_motion
-from vision.tracking.fiducial_matching import identify_fiducials
-from vision.tracking.layout_matching import match_layout
-from vision.tracking.marker_plane import SIMILARITY
-from vision.tracking.plane_fit import homography_plane
-from vision.tracking.rest_detection import find_rest_intervals
-from vision.tracking.workspace import Workspace, load_workspace
 
 GREY = np.full((36, 64), 128, np.uint8)
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))

@@ -7,10 +7,10 @@ from math import cos, pi, radians, sin, tan
 import gmsh
 import numpy as np
 
-from geometry.mesh.mesher import add_section, session, triangulate
-from geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges, signed_areas
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.mesh.mesher import add_section, session, triangulate
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges, signed_areas
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
 
 
 def ring(radius: float = 20.0, thickness: float = 3.0, clamped: float = 60.0) -> tuple[Section, float]:

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
-from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.fem.linear import FemSolver
-from solvers.problem import Material, Problem
-from solvers.solution import Solution
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.solution import Solution
 
 SHORT = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
 """A short finger with one rib."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
 
 SIZE = 12
 

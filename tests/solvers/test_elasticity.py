@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from geometry.errors import UserError
-from solvers.elasticity import (
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.elasticity import (
     deformation_jacobian,
     energy_density_of,
     lame_constants,
@@ -15,8 +15,8 @@ from solvers.elasticity import (
     stress_of,
     von_mises,
 )
-from solvers.problem import Material, Problem
-from solvers.solution import State
+from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.solution import State
 
 YOUNG, POISSON = 11.4, 0.45
 LAME = lame_constants(YOUNG, POISSON, "strain")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.mesh.quadrature import body_quadrature
-from solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from tests.meshes import permuted
 
 

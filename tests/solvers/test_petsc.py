@@ -4,8 +4,8 @@ import os
 import subprocess
 import sys
 
-from geometry.processes import child_environment
-from solvers.petsc import wheels_mpi
+from pinnray.geometry.processes import child_environment
+from pinnray.solvers.petsc import wheels_mpi
 
 
 def test_the_mpi_beside_a_petsc_of_wheels_is_loaded(tmp_path):
@@ -25,7 +25,7 @@ def test_a_distributions_petsc_keeps_its_own_mpi(tmp_path):
 
 def test_a_closed_pipe_is_an_error_of_python_not_the_end_of_the_process():
     code = (
-        "import os, solvers.petsc\n"
+        "import os, pinnray.solvers.petsc\n"
         "reading_end, writing_end = os.pipe()\n"
         "os.close(reading_end)\n"
         "try:\n    os.write(writing_end, b'x')\n"

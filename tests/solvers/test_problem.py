@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.finger.design import Design
-from geometry.registration import Registration
-from solvers.problem import Load, Material, Problem, contact_ends, contact_functional, contact_nodes
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.registration import Registration
+from pinnray.solvers.problem import Load, Material, Problem, contact_ends, contact_functional, contact_nodes
 from tests.solvers.conftest import observed_at
 
 

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.certification import with_certificates
-from compare.evaluation.metrics import evaluated
-from geometry.finger.design import Design
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_solvers import Factorisation
-from solvers.finger_figures import figures_at_rest
-from solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalSolver, PinnStdSolver
-from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.problem import Load, Problem
-from solvers.shared_work import SharedWork, shared
-from solvers.statistics.statistical_fem import StatFemSolver
+from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.geometry.finger.design import Design
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.linear_solvers import Factorisation
+from pinnray.solvers.finger_figures import figures_at_rest
+from pinnray.solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalSolver, PinnStdSolver
+from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.shared_work import SharedWork, shared
+from pinnray.solvers.statistics.statistical_fem import StatFemSolver
 from tests.solvers.conftest import observed_at
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.problem import Problem
-from solvers.solution import Solution, Status
-from solvers.solver import Progress, SolverFailedError, refitter, silent, solved
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import Progress, SolverFailedError, refitter, silent, solved
 from tests.solvers.conftest import observed_at
 
 

@@ -9,18 +9,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.constrained_elimination import ConstrainedElimination
-from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.identification import FemBody
-from solvers.fem.solid import Fem3dSolver
-from solvers.identification.model import ResponseModel
-from solvers.identification.unknowns import Unknowns
-from solvers.pinn.finite_basis import newton
-from solvers.pinn.finite_basis.presets import PinnLocalSolver
-from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.problem import Load, Material, Problem
-from solvers.stability import ShiftedStep, aside, descended
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.identification import FemBody
+from pinnray.solvers.fem.solid import Fem3dSolver
+from pinnray.solvers.identification.model import ResponseModel
+from pinnray.solvers.identification.unknowns import Unknowns
+from pinnray.solvers.pinn.finite_basis import newton
+from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver
+from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.stability import ShiftedStep, aside, descended
 from tests.solvers.bodies import column, mesh_of
 
 HEIGHT, WIDTH, STROKE = 40.0, 2.0, 1.0

@@ -7,14 +7,14 @@ import pytest
 
 from benchmarks.verification.cases import calculix
 from benchmarks.verification.document import PAGE, page
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from solvers.extrusion import ExtrudedSpace
-from solvers.fem import equilibrium
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.fem import equilibrium
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem
 
 SHORT = Design(height=50, rib_count=1, tip_length=12, contact_position=20, depth=6.0)
 COARSE = MeshSettings(size=1.0)

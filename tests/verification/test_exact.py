@@ -8,8 +8,8 @@ from benchmarks.verification.cases.manufactured import waves
 from benchmarks.verification.cases.plate_with_hole import kirsch
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.hyperelastic import Hyperelastic
-from geometry.errors import UserError
-from solvers.problem import Material
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.problem import Material
 
 CLOSED_FORMS = {
     "waves": lambda material: waves(PlaneLaw.of(material)),

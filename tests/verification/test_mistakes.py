@@ -8,10 +8,10 @@ from benchmarks.verification.cases.cook import COOK
 from benchmarks.verification.cases.finite_strain import FINITE_STRAIN
 from benchmarks.verification.cases.manufactured import MANUFACTURED
 from benchmarks.verification.cases.plate_with_hole import KIRSCH
-from geometry.errors import UserError
-from solvers import elasticity
-from solvers.fem import equilibrium
-from solvers.problem import Material
+from pinnray.geometry.errors import UserError
+from pinnray.solvers import elasticity
+from pinnray.solvers.fem import equilibrium
+from pinnray.solvers.problem import Material
 
 pytestmark = pytest.mark.slow
 
@@ -56,7 +56,7 @@ def test_wrong_law_of_finite_strain(monkeypatch):
 
 @pytest.mark.parametrize("case", [COOK, KIRSCH], ids=lambda case: case.name)
 def test_plane_strain_for_plane_stress(case, monkeypatch):
-    monkeypatch.setattr("solvers.physics.lame_constants", plane_strain_always)
+    monkeypatch.setattr("pinnray.solvers.physics.lame_constants", plane_strain_always)
     assert not passes(case.measure(), degree=2, plane="stress")
 
 

@@ -8,7 +8,7 @@ from tests.vision.tracking.listed_discs import ListedDiscs
 @pytest.fixture
 def listed(monkeypatch: pytest.MonkeyPatch) -> ListedDiscs:
     """A detector that reads lists of discs, in place of that of the scene and of the tracker."""
-    from vision.tracking import frame_tracker, scene
+    from pinnray.vision.tracking import frame_tracker, scene
 
     detector = ListedDiscs()
     monkeypatch.setattr(scene, "detect_discs", detector.detect)

@@ -6,22 +6,22 @@ from typing import Any
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from vision.frames.frame import CapturedImage, Frames, Image
-from vision.rig.bench import Bench
-from vision.rig.exposure import Exposure
-from vision.rig.motion import Motion
-from vision.rig.occluders import cable
-from vision.rig.recording import Recording
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
-from vision.tracking.trajectories import Tracking
-from vision.tracking.workspace import default_workspace
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.vision.frames.frame import CapturedImage, Frames, Image
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.motion import Motion
+from pinnray.vision.rig.occluders import cable
+from pinnray.vision.rig.recording import Recording
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
+from pinnray.vision.tracking.trajectories import Tracking
+from pinnray.vision.tracking.workspace import default_workspace
 
 DESIGN = Design()
 WORKSPACE = default_workspace(DESIGN)

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from geometry.registration import HAND_HELD
-from vision.clicked_points import Clicks, clicked_points, read_clicks
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.registration import HAND_HELD
+from pinnray.vision.clicked_points import Clicks, clicked_points, read_clicks
 
 MARKERS = np.array(
     [[10.0, -1], [20, -1], [30, -1], [40, -1], [50, -1], [45, -8], [35, -14], [25, -20], [12, -29]]

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from geometry.observations import Observations
-from geometry.registration import FIXED, FREE, HAND_HELD, Registration
-from vision.measurements import read_measurements, write_measurements
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import FIXED, FREE, HAND_HELD, Registration
+from pinnray.vision.measurements import read_measurements, write_measurements
 
 HEADER = "x_mm,y_mm,u_mm,v_mm"
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from geometry.finger.markers import marker_positions
-from geometry.finger.presets import load_design
+from pinnray.geometry.finger.markers import marker_positions
+from pinnray.geometry.finger.presets import load_design
+from pinnray.vision.measurements import read_measurements
 from tests.test_docs import ROOT
-from vision.measurements import read_measurements
 
 FILE = ROOT / "examples" / "markers.csv"
 

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping, Sequence
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.calibration.chessboard import Board
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.frames.frame import GreyImage
 
 FEWEST_VIEWS = 4
 MAX_NAMED = 5

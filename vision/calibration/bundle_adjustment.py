@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.errors import UserError
-from vision.calibration.camera import Camera
-from vision.calibration.chessboard import Board
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.chessboard import Board
 
 FEWEST_JACKKNIFED = 10
 """Number of views from which on their scatter counts for the covariance."""

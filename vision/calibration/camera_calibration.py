@@ -14,12 +14,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.calibration.board_views import FEWEST_VIEWS, MAX_NAMED, coverage, find_views, unusable
-from vision.calibration.camera import Camera
-from vision.calibration.chessboard import Board
-from vision.calibration.lens_fit import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.board_views import FEWEST_VIEWS, MAX_NAMED, coverage, find_views, unusable
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.calibration.lens_fit import (
     LENS_CHOICES,
     LensChoice,
     UnusableViewsError,
@@ -27,7 +27,7 @@ from vision.calibration.lens_fit import (
     held_out_rms,
     rms,
 )
-from vision.frames.frame import GreyImage
+from pinnray.vision.frames.frame import GreyImage
 
 LEAST_COVERAGE = 0.6
 """Share of the image below which the distortion near its edges is extrapolated."""

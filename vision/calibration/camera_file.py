@@ -8,11 +8,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.atomic import write_text
-from geometry.errors import UserError
-from vision.calibration.camera import Camera
-from vision.calibration.camera_calibration import Calibration
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import write_text
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera_calibration import Calibration
 
 Entry = int | float | str | list[str] | FloatArray
 FORMATS = (".json", ".yml", ".yaml")

@@ -7,11 +7,11 @@ from itertools import product
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.calibration.chessboard import Board
-from vision.calibration.dot_grid import DotGrid
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.calibration.dot_grid import DotGrid
+from pinnray.vision.frames.frame import GreyImage
 
 MARKER_FREE = 0.6
 """Radius around a corner without markers, over the difference of the sides of square and marker."""
@@ -71,7 +71,7 @@ class CharucoBoard(Board):
         Source: S. Garrido-Jurado et al., "Automatic generation and detection of highly reliable fiducial
         markers under occlusion", Pattern Recognition 47, 2014, as in OpenCV,
         which before 4.14 puts corners half a pixel to the right and below; then
-        `vision.calibration.corner_refinement`.
+        `pinnray.vision.calibration.corner_refinement`.
         """
         settings = cv2.aruco.CharucoParameters()
         settings.tryRefineMarkers = True  # looks for missing markers where the others say they are

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from vision.calibration.corner_refinement import refine_corners
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.corner_refinement import refine_corners
+from pinnray.vision.frames.frame import GreyImage
 
 EDGE = 0.45
 """Radius around a corner in which only its own two edges lie, over a square's side."""
@@ -79,7 +79,7 @@ class Board:
         """Find `corners` in an image, shape (n, 2), pixels; None if it does not show the whole board.
 
         Source: A. Duda, U. Frese, "Accurate detection and localization of checkerboard corners for
-        calibration", BMVC 2018, as in OpenCV; then `vision.calibration.corner_refinement`.
+        calibration", BMVC 2018, as in OpenCV; then `pinnray.vision.calibration.corner_refinement`.
         """
         shrink = max(1.0, max(image.shape) / LARGE)
         for factor, flags in SEARCHES:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from vision.calibration.chessboard import Board, homography_jacobian
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.chessboard import Board, homography_jacobian
+from pinnray.vision.frames.frame import GreyImage
 
 SMALLEST_DOT = 20.0
 """Area of a dot, pixels."""

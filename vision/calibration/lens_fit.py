@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.calibration.bundle_adjustment import Adjustment, Poses, adjust
-from vision.calibration.camera import LENSES, Camera
-from vision.calibration.chessboard import Board
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.bundle_adjustment import Adjustment, Poses, adjust
+from pinnray.vision.calibration.camera import LENSES, Camera
+from pinnray.vision.calibration.chessboard import Board
 
 UNDETERMINED = (
     "the photographs do not determine the camera; take some with the board tilted by 20 to 45 degrees in "

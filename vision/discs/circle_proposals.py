@@ -11,10 +11,10 @@ from math import ceil
 import cv2
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from vision.discs.colour import DARK, Colour
-from vision.frames.frame import Image
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs.colour import DARK, Colour
+from pinnray.vision.frames.frame import Image
 
 PixelBox = tuple[int, int, int, int]
 """x0, y0, x1, y1, pixels; x1 and y1 are outside."""

@@ -12,9 +12,9 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.frames.frame import Image
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.frames.frame import Image
 
 Lab = tuple[float, float, float]
 

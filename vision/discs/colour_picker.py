@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from vision.discs.colour import HIGHEST, LOWEST, ColourRange
-from vision.frames.frame import Image
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs.colour import HIGHEST, LOWEST, ColourRange
+from pinnray.vision.frames.frame import Image
 
 ALIKE = 12.0
 """Largest difference in L*, a* and b* between a click and other pixels of the same marker."""

@@ -14,8 +14,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from vision.discs.disc_image_model import (
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.vision.discs.disc_image_model import (
     COUNT,
     EDGE,
     EDGES,
@@ -26,10 +26,10 @@ from vision.discs.disc_image_model import (
     disc_image,
     irregular_columns,
 )
-from vision.discs.edge_profile import edge_profile
-from vision.discs.fit_priors import Known, prior_and_limits
-from vision.discs.least_squares import FAINT, FULL, NONE, DiscFit, behind_clipping
-from vision.discs.pixel_windows import DARKEST, LIGHTEST, PixelWindows
+from pinnray.vision.discs.edge_profile import edge_profile
+from pinnray.vision.discs.fit_priors import Known, prior_and_limits
+from pinnray.vision.discs.least_squares import FAINT, FULL, NONE, DiscFit, behind_clipping
+from pinnray.vision.discs.pixel_windows import DARKEST, LIGHTEST, PixelWindows
 
 NEIGHBOURS = 3
 """Side of the squares whose sums show correlated noise, pixels."""

@@ -6,11 +6,11 @@ from typing import Literal, NamedTuple
 import cv2
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.circle_proposals import PixelBox, propose_circles
-from vision.discs.colour import Colour
-from vision.discs.disc_fit import fit_discs
-from vision.frames.frame import GreyImage, Image
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.vision.discs.circle_proposals import PixelBox, propose_circles
+from pinnray.vision.discs.colour import Colour
+from pinnray.vision.discs.disc_fit import fit_discs
+from pinnray.vision.frames.frame import GreyImage, Image
 
 DetectionMethod = Literal["precise", "hough"]
 METHODS: tuple[DetectionMethod, ...] = ("precise", "hough")

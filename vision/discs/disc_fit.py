@@ -10,14 +10,14 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import BoolArray, FloatArray, frozen_array
-from geometry.errors import UserError
-from vision.discs import disc_image_model as model
-from vision.discs.fit_priors import Known
-from vision.discs.fit_stages import fit_discs_of_one_size
-from vision.discs.least_squares import DiscFit
-from vision.discs.pixel_windows import LIGHTEST
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import BoolArray, FloatArray, frozen_array
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs import disc_image_model as model
+from pinnray.vision.discs.fit_priors import Known
+from pinnray.vision.discs.fit_stages import fit_discs_of_one_size
+from pinnray.vision.discs.least_squares import DiscFit
+from pinnray.vision.discs.pixel_windows import LIGHTEST
+from pinnray.vision.frames.frame import GreyImage
 
 KNOWN_RADIUS = 0.01
 """Relative standard deviation of a known radius: markers turn and change their distance a little."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from geometry.arrays import FloatArray
+from pinnray.geometry.arrays import FloatArray
 
 Array = NDArray[np.float32]
 

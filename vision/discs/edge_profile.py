@@ -13,8 +13,8 @@ Source: Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, "Orthogonal matching purs
 import numpy as np
 from scipy.special import ndtr
 
-from geometry.arrays import BoolArray, FloatArray
-from vision.discs.disc_image_model import (
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     DIRECTIONS,
@@ -30,7 +30,7 @@ from vision.discs.disc_image_model import (
     disc_image,
     outline,
 )
-from vision.discs.pixel_windows import LIGHTEST, QUANTISATION, PixelWindows
+from pinnray.vision.discs.pixel_windows import LIGHTEST, QUANTISATION, PixelWindows
 
 PROFILE = 0.25
 """Width of the classes of the distance from the edge, pixels."""

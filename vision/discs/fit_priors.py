@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import softmax
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.disc_image_model import (
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     EDGES,
@@ -23,8 +23,8 @@ from vision.discs.disc_image_model import (
     Y,
     irregular_columns,
 )
-from vision.discs.least_squares import DiscFit, DiscPrior
-from vision.discs.pixel_windows import LIGHTEST
+from pinnray.vision.discs.least_squares import DiscFit, DiscPrior
+from pinnray.vision.discs.pixel_windows import LIGHTEST
 
 DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.05}
 """Prior standard deviations, about zero but for the blur. They matter where little of the edge is seen."""

@@ -2,23 +2,23 @@
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from vision.discs.correlated_noise import correlated_noise
-from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, Array, X, Y
-from vision.discs.edge_profile import with_edges
-from vision.discs.fit_priors import Known, prior_and_limits
-from vision.discs.ground_texture import without_waves
-from vision.discs.hough import HoughVotes, sector, vote_for_centres
-from vision.discs.irregular_outlines import better_outlines
-from vision.discs.least_squares import (
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.vision.discs.correlated_noise import correlated_noise
+from pinnray.vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, Array, X, Y
+from pinnray.vision.discs.edge_profile import with_edges
+from pinnray.vision.discs.fit_priors import Known, prior_and_limits
+from pinnray.vision.discs.ground_texture import without_waves
+from pinnray.vision.discs.hough import HoughVotes, sector, vote_for_centres
+from pinnray.vision.discs.irregular_outlines import better_outlines
+from pinnray.vision.discs.least_squares import (
     NEAR,
     DiscFit,
     coherent_pixels,
     fit_disc_model,
     refined_fit,
 )
-from vision.discs.pixel_windows import QUANTISATION, PixelWindows, median_where
-from vision.frames.frame import GreyImage
+from pinnray.vision.discs.pixel_windows import QUANTISATION, PixelWindows, median_where
+from pinnray.vision.frames.frame import GreyImage
 
 MARGIN = 6
 """Pixels used on either side of the edge."""

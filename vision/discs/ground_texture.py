@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import erfc, ndtri
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.disc_image_model import (
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     COUNT,
@@ -28,7 +28,14 @@ from vision.discs.disc_image_model import (
     Y,
     disc_image,
 )
-from vision.discs.pixel_windows import DARKEST, LIGHTEST, QUANTISATION, SCALE, PixelWindows, median_where
+from pinnray.vision.discs.pixel_windows import (
+    DARKEST,
+    LIGHTEST,
+    QUANTISATION,
+    SCALE,
+    PixelWindows,
+    median_where,
+)
 
 SHARE = 0.2
 """Share of the variance of the ground that a wave must explain; the highest of white noise explains 0.15."""

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import FloatArray, IntArray
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.vision.frames.frame import GreyImage
 
 SECTORS = 16
 """Sectors of the edge whose votes are counted separately."""

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.correlated_noise import CorrelatedNoise, correlated_noise
-from vision.discs.disc_image_model import (
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.vision.discs.correlated_noise import CorrelatedNoise, correlated_noise
+from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     COUNT,
@@ -34,10 +34,10 @@ from vision.discs.disc_image_model import (
     outline,
     outline_centroid,
 )
-from vision.discs.edge_profile import with_edges
-from vision.discs.fit_priors import MISSING, Known, prior_and_limits
-from vision.discs.hough import SECTORS, sector
-from vision.discs.least_squares import (
+from pinnray.vision.discs.edge_profile import with_edges
+from pinnray.vision.discs.fit_priors import MISSING, Known, prior_and_limits
+from pinnray.vision.discs.hough import SECTORS, sector
+from pinnray.vision.discs.least_squares import (
     FAINT,
     NEAR,
     NONE,
@@ -48,7 +48,7 @@ from vision.discs.least_squares import (
     misfit,
     refined_fit,
 )
-from vision.discs.pixel_windows import DARKEST, LIGHTEST, PixelWindows
+from pinnray.vision.discs.pixel_windows import DARKEST, LIGHTEST, PixelWindows
 
 PENALTY = 40.0
 """Gain in logarithmic likelihood from which on an irregular outline is preferred to an ellipse: half of the

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import log_ndtr
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.disc_image_model import (
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     EDGE,
@@ -31,7 +31,14 @@ from vision.discs.disc_image_model import (
     disc_image,
     irregular_columns,
 )
-from vision.discs.pixel_windows import DARKEST, LIGHTEST, QUANTISATION, SCALE, PixelWindows, median_where
+from pinnray.vision.discs.pixel_windows import (
+    DARKEST,
+    LIGHTEST,
+    QUANTISATION,
+    SCALE,
+    PixelWindows,
+    median_where,
+)
 
 FULL, NONE = 3.0, 6.0
 """Residuals over the noise up to which a pixel has full weight, and from which on it has none."""
@@ -80,7 +87,7 @@ class DiscFit:
     """State of a fit.
 
     Attributes:
-        parameters: As in `vision.discs.disc_image_model`, relative to the origins, shape (n, m).
+        parameters: As in `pinnray.vision.discs.disc_image_model`, relative to the origins, shape (n, m).
         origins: Shape (n, 2), pixels.
         covariances: Of the centres, from the variance of the noise, shape (n, 2, 2), pixels².
         variance: Of the noise, shape (n,), grey levels².

@@ -6,9 +6,9 @@ from typing import Self
 import cv2
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.disc_image_model import RADIUS, Array, X, Y
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.vision.discs.disc_image_model import RADIUS, Array, X, Y
+from pinnray.vision.frames.frame import GreyImage
 
 QUANTISATION = 1 / 12
 """Variance of rounding to grey levels, the smallest possible variance of the noise."""

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from geometry.errors import UserError
-from vision.frames.formats import PNG, TIFF, pages, refusal, unread_format
-from vision.frames.frame import Image
+from pinnray.geometry.errors import UserError
+from pinnray.vision.frames.formats import PNG, TIFF, pages, refusal, unread_format
+from pinnray.vision.frames.frame import Image
 
 JPEG, PNG_END = b"\xff\xd8", b"\0\0\0\0IEND\xaeB`\x82"
 PNG_HEADER = 33

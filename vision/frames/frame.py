@@ -2,7 +2,7 @@
 
 Images are uint8, shape (height, width) in grey or (height, width, 3) in blue, green, red. They are as the
 sensor read them: a rotation in a file's metadata is ignored, in films and in photographs
-(`vision.frames.sources`), so that one calibration fits both.
+(`pinnray.vision.frames.sources`), so that one calibration fits both.
 """
 
 from collections.abc import Callable, Generator, Iterator
@@ -11,7 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import UserError
+from pinnray.geometry.errors import UserError
 
 Image = NDArray[np.uint8]
 GreyImage = NDArray[np.uint8]

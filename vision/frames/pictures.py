@@ -9,11 +9,11 @@ from pathlib import Path
 
 import cv2
 
-from geometry.atomic import write_bytes
-from geometry.errors import UserError
-from vision.frames.decoder import JPEG, PNG_HEADER, Decoder, content_of, picture_end
-from vision.frames.formats import HEAD, PNG, UNREAD_SUFFIXES, has_pages, refusal, unread_format
-from vision.frames.frame import RIG_MARK, CapturedImage, Image, ImageStream
+from pinnray.geometry.atomic import write_bytes
+from pinnray.geometry.errors import UserError
+from pinnray.vision.frames.decoder import JPEG, PNG_HEADER, Decoder, content_of, picture_end
+from pinnray.vision.frames.formats import HEAD, PNG, UNREAD_SUFFIXES, has_pages, refusal, unread_format
+from pinnray.vision.frames.frame import RIG_MARK, CapturedImage, Image, ImageStream
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
 ANIMATIONS = {".gif": "GIF"}

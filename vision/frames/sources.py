@@ -13,10 +13,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from geometry.errors import UserError
-from vision.frames.decoder import Decoder, content_of, silenced
-from vision.frames.formats import pages
-from vision.frames.frame import (
+from pinnray.geometry.errors import UserError
+from pinnray.vision.frames.decoder import Decoder, content_of, silenced
+from pinnray.vision.frames.formats import pages
+from pinnray.vision.frames.frame import (
     DEFAULT_RATE,
     MAX_RATE,
     CapturedImage,
@@ -26,8 +26,8 @@ from vision.frames.frame import (
     ImageStream,
     plausible_rate,
 )
-from vision.frames.pictures import images_of_files, images_of_pipe, is_picture, picture_paths
-from vision.frames.video import video_frames
+from pinnray.vision.frames.pictures import images_of_files, images_of_pipe, is_picture, picture_paths
+from pinnray.vision.frames.video import video_frames
 
 LIVE_SIZE = (1280, 720)
 """(width, height) that a camera is asked for, pixels."""

@@ -20,10 +20,18 @@ from av.container import InputContainer
 from av.video import VideoStream
 from av.video.reformatter import Colorspace, Interpolation, VideoReformatter
 
-from geometry.atomic import atomic_path
-from geometry.errors import ShapeError, UserError
-from vision import MOST_PIXELS
-from vision.frames.frame import MAX_RATE, RIG_MARK, CapturedImage, Frames, Image, ImageStream, plausible_rate
+from pinnray.geometry.atomic import atomic_path
+from pinnray.geometry.errors import ShapeError, UserError
+from pinnray.vision import MOST_PIXELS
+from pinnray.vision.frames.frame import (
+    MAX_RATE,
+    RIG_MARK,
+    CapturedImage,
+    Frames,
+    Image,
+    ImageStream,
+    plausible_rate,
+)
 
 MISSING_FRACTION = 0.02
 """Tolerance of a video's frame count, as a fraction: the number in its header may be that wrong."""

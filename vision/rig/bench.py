@@ -6,14 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.errors import ShapeError
-from geometry.finger.finger import Finger
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.triangle_mesh import TriangleMesh
-from vision.rig.print_layers import PrintLayers
-from vision.rig.shapes import CORNERS, Paint, Scene, Shape, blot, circle, closed, rectangle
-from vision.tracking.workspace import Workspace
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.errors import ShapeError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.vision.rig.print_layers import PrintLayers
+from pinnray.vision.rig.shapes import CORNERS, Paint, Scene, Shape, blot, circle, closed, rectangle
+from pinnray.vision.tracking.workspace import Workspace
 
 PAINTS: dict[str, Paint] = {
     "dark": (0.07, 0.065, 0.06),

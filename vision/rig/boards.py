@@ -6,14 +6,14 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from vision.calibration.camera import Camera, Pose
-from vision.calibration.charuco import DICTIONARIES, CharucoBoard
-from vision.calibration.chessboard import Board
-from vision.calibration.dot_grid import DotGrid
-from vision.rig.shapes import Scene, Shape, rectangle
-from vision.tracking.workspace import Workspace
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.calibration.charuco import DICTIONARIES, CharucoBoard
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.calibration.dot_grid import DotGrid
+from pinnray.vision.rig.shapes import Scene, Shape, rectangle
+from pinnray.vision.tracking.workspace import Workspace
 
 PAPER, INK, WALL = (0.90, 0.91, 0.90), (0.06, 0.06, 0.06), (0.35, 0.38, 0.40)
 MARGIN = 0.7

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from geometry.finger.parameters import CheckedModel, bounded
-from vision.frames.frame import Image
+from pinnray.geometry.finger.parameters import CheckedModel, bounded
+from pinnray.vision.frames.frame import Image
 
 LUMA = (0.114, 0.587, 0.299)
 """Weights of blue, green and red (ITU-R BT.601)."""

@@ -6,12 +6,12 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.errors import UserError
-from vision.calibration.camera import Camera, Pose
-from vision.rig.bench import Bench
-from vision.rig.motion import Course, Motion
-from vision.rig.render import pixel_coverage
-from vision.rig.shapes import Paint, Shape, area, closed, seen_edges
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.motion import Course, Motion
+from pinnray.vision.rig.render import pixel_coverage
+from pinnray.vision.rig.shapes import Paint, Shape, area, closed, seen_edges
 
 CABLES: dict[str, Paint] = {"dark": (0.10, 0.10, 0.11), "light": (0.52, 0.50, 0.50)}
 """Paints of cables: one like dark markers, and one unlike."""

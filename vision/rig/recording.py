@@ -8,16 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.observations import Observations
-from vision.calibration.camera import Camera, Pose
-from vision.frames.frame import Image
-from vision.rig.bench import Bench
-from vision.rig.exposure import Exposure, Light
-from vision.rig.motion import Course, Motion
-from vision.rig.occluders import share_seen
-from vision.rig.render import mean_light, noise_of
-from vision.rig.shapes import Shape, centroid
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.observations import Observations
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.exposure import Exposure, Light
+from pinnray.vision.rig.motion import Course, Motion
+from pinnray.vision.rig.occluders import share_seen
+from pinnray.vision.rig.render import mean_light, noise_of
+from pinnray.vision.rig.shapes import Shape, centroid
 
 STEP = 1.0
 """Longest step between the instants whose mean is an image with motion blur, pixels."""

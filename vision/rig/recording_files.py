@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.atomic import atomic_path, write_json, write_text
-from geometry.errors import UserError
-from vision.calibration.camera import Pose
-from vision.calibration.camera_file import save_camera
-from vision.frames.frame import RIG_MARK, Image
-from vision.frames.pictures import write_picture
-from vision.frames.video import CODECS, video_writer
-from vision.measurements import write_measurements
-from vision.rig.recording import Recording
-from vision.rig.render import render
-from vision.rig.shapes import Scene
-from vision.tracking.workspace import workspace_svg
+from pinnray.geometry.atomic import atomic_path, write_json, write_text
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.camera import Pose
+from pinnray.vision.calibration.camera_file import save_camera
+from pinnray.vision.frames.frame import RIG_MARK, Image
+from pinnray.vision.frames.pictures import write_picture
+from pinnray.vision.frames.video import CODECS, video_writer
+from pinnray.vision.measurements import write_measurements
+from pinnray.vision.rig.recording import Recording
+from pinnray.vision.rig.render import render
+from pinnray.vision.rig.shapes import Scene
+from pinnray.vision.tracking.workspace import workspace_svg
 
 PICTURES = "png"
 FILES = {codec.lower(): f"video{suffix}" for suffix, codec in CODECS.items()} | {PICTURES: "frames"}

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from vision.calibration.camera import Camera, Pose
-from vision.frames.frame import Image
-from vision.rig.exposure import Exposure, Light
-from vision.rig.shapes import Scene, seen_edges
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.rig.exposure import Exposure, Light
+from pinnray.vision.rig.shapes import Scene, seen_edges
 
 
 def render(

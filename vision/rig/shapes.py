@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import FloatArray
-from vision.calibration.camera import Camera, Pose
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera import Camera, Pose
 
 CORNERS = 512
 """Corners of the polygon that approximates a circle, within 0.0004 pixels at a radius of 20 pixels."""

@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from vision.calibration.camera import Camera, Pose
-from vision.tracking.workspace import Workspace
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.tracking.workspace import Workspace
 
 RIM = 0.06
 """Margin around the fiducials, as a share of the image."""

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import FloatArray
-from vision.frames.frame import Image
-from vision.tracking.frame_tracker import FrameDetections
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.tracking.frame_tracker import FrameDetections
 
 SEEN, LOST, FIXED, TRAJECTORY = (40, 150, 0), (0, 60, 230), (200, 110, 0), (190, 0, 190)
 """Colours, in blue, green, red, of markers, undetected markers, fiducials and trajectories."""

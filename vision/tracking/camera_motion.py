@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.discs.disc_detector import DiscDetections
-from vision.tracking.marker_plane import MarkerPlane
-from vision.tracking.plane_fit import pose_covariance
-from vision.tracking.scene import FilmedScene
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.tracking.marker_plane import MarkerPlane
+from pinnray.vision.tracking.plane_fit import pose_covariance
+from pinnray.vision.tracking.scene import FilmedScene
 
 FEWEST = 4
 """Number of fiducials that determines the pose of a camera."""

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.errors import UserError
-from vision.tracking.workspace import Workspace
+from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.tracking.workspace import Workspace
 
 GATE = 2.0
 """Largest distance of a fiducial from its disc, mm, which includes an unknown lens distortion."""

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtri
 
-from geometry.arrays import FloatArray, IntArray
-from vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
 
 LEAST_SHARE = 0.2
 """Smallest share of the frames at rest in which a visible marker is detected."""

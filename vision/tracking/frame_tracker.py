@@ -4,20 +4,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.errors import UserError
-from vision.discs.colour import DARK
-from vision.discs.disc_detector import DiscDetections, detect_discs, detect_discs_near
-from vision.frames.frame import Image
-from vision.tracking.data_association import (
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs.colour import DARK
+from pinnray.vision.discs.disc_detector import DiscDetections, detect_discs, detect_discs_near
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.tracking.data_association import (
     associate_markers,
     distance_from_base,
     rest_covariances,
     step_covariances,
     with_predictions,
 )
-from vision.tracking.scene import FilmedScene
-from vision.tracking.unplaced_markers import why_unplaced
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.unplaced_markers import why_unplaced
 
 FEWEST = 3
 """Number of markers that must be identified in the first frame."""

@@ -13,9 +13,9 @@ from typing import NamedTuple, Protocol
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.registration import Homography
-from vision.calibration.camera import Camera, Pose
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.registration import Homography
+from pinnray.vision.calibration.camera import Camera, Pose
 
 CORNERS = 24
 """Number of corners of the polygon that approximates a circle."""

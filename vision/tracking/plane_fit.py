@@ -6,10 +6,10 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.calibration.camera import Camera
-from vision.tracking.marker_plane import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.tracking.marker_plane import (
     HOMOGRAPHY,
     SIMILARITY,
     CameraProjection,

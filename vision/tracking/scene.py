@@ -4,18 +4,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from vision.calibration.camera import Camera
-from vision.discs.colour import DARK, Colour
-from vision.discs.disc_detector import DetectionMethod, DiscDetections, detect_discs
-from vision.frames.frame import Image
-from vision.tracking.fiducial_matching import UnseenError, identify_fiducials
-from vision.tracking.layout_matching import match_layout
-from vision.tracking.marker_plane import MarkerPlane
-from vision.tracking.plane_fit import camera_plane, homography_plane, plane_of_markers, similarity_plane
-from vision.tracking.workspace import Workspace
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.discs.colour import DARK, Colour
+from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections, detect_discs
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.tracking.fiducial_matching import UnseenError, identify_fiducials
+from pinnray.vision.tracking.layout_matching import match_layout
+from pinnray.vision.tracking.marker_plane import MarkerPlane
+from pinnray.vision.tracking.plane_fit import (
+    camera_plane,
+    homography_plane,
+    plane_of_markers,
+    similarity_plane,
+)
+from pinnray.vision.tracking.workspace import Workspace
 
 SMALLEST_VIEW = 0.25
 """Smallest share of the image's diagonal that the fiducials span."""

@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.errors import UserError
-from geometry.registration import HAND_HELD
-from vision.discs.disc_detector import FLOOR, DiscDetections
-from vision.frames.frame import Frame, Frames
-from vision.tracking.camera_motion import CameraMotion, find_camera_motion
-from vision.tracking.frame_means import mean_detections
-from vision.tracking.frame_tracker import FrameDetections, FrameTracker
-from vision.tracking.rest_detection import RestIntervals, find_rest_intervals
-from vision.tracking.scene import FilmedScene
-from vision.tracking.trajectories import Tracking
-from vision.tracking.unplaced_markers import zoom_clause
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.registration import HAND_HELD
+from pinnray.vision.discs.disc_detector import FLOOR, DiscDetections
+from pinnray.vision.frames.frame import Frame, Frames
+from pinnray.vision.tracking.camera_motion import CameraMotion, find_camera_motion
+from pinnray.vision.tracking.frame_means import mean_detections
+from pinnray.vision.tracking.frame_tracker import FrameDetections, FrameTracker
+from pinnray.vision.tracking.rest_detection import RestIntervals, find_rest_intervals
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.trajectories import Tracking
+from pinnray.vision.tracking.unplaced_markers import zoom_clause
 
 FAR = 0.5
 """Root mean square distance of the markers at rest from the design's, mm, that is worth a warning, ..."""

@@ -4,15 +4,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from geometry.finger.finger import Finger
-from geometry.observations import Observations
-from geometry.registration import FIXED, Registration
-from vision.discs.disc_detector import DetectionMethod, DiscDetections
-from vision.tracking.alignment import Alignment, align
-from vision.tracking.marker_plane import MarkerPlane
-from vision.tracking.rest_detection import RestIntervals
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import FIXED, Registration
+from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections
+from pinnray.vision.tracking.alignment import Alignment, align
+from pinnray.vision.tracking.marker_plane import MarkerPlane
+from pinnray.vision.tracking.rest_detection import RestIntervals
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,12 @@ from contextlib import suppress
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.discs.disc_detector import DiscDetections
-from vision.tracking.layout_matching import match_layout
-from vision.tracking.marker_plane import MarkerPlane
-from vision.tracking.scene import FilmedScene
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.tracking.layout_matching import match_layout
+from pinnray.vision.tracking.marker_plane import MarkerPlane
+from pinnray.vision.tracking.scene import FilmedScene
 
 MOST_ZOOM = 3.0
 """Largest ratio of two focal lengths that is told as a cause."""

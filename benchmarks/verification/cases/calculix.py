@@ -8,19 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.verification.record import Case, Row, at_most
-from geometry.arrays import FloatArray, IntArray
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from solvers.elasticity import check_known
-from solvers.extrusion import ExtrudedSpace
-from solvers.fem.boundary_conditions import dirichlet_conditions
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.fem.solid import Fem3dSolver
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.elasticity import check_known
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.solid import Fem3dSolver
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem
 
 PROGRAM = "ccx"
 SECONDS = 900.0

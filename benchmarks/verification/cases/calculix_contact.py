@@ -4,14 +4,14 @@ import numpy as np
 
 from benchmarks.verification.cases.calculix import PROGRAM, Answer, cells, solved
 from benchmarks.verification.record import Case, Row, at_most
-from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from solvers.cylinder_contact import CylinderContact
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.cylinder_contact import CylinderContact
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem
 
 RADIUS, TRAVEL = 10.0, 3.0
 """Of the cylinder, mm."""

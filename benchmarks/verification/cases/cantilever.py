@@ -8,9 +8,9 @@ from benchmarks.verification.boundary_value import BoundaryValue, Exact
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, about, at_most, between, slope_rows
-from geometry.arrays import FloatArray
-from solvers.lagrange import LagrangeField
-from solvers.problem import Material
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.lagrange import LagrangeField
+from pinnray.solvers.problem import Material
 
 LENGTH, DEPTH = 8.0, 2.0
 FORCE = 0.01

@@ -7,13 +7,13 @@ import numpy as np
 from benchmarks.verification.cases.hertz import FINEST, INDENTATION, RADIUS, block
 from benchmarks.verification.meshes import mapped_mesh
 from benchmarks.verification.record import Case, Row, about, at_most
-from geometry.arrays import FloatArray
-from solvers.cylinder_contact import ContactPoints, ContactRegion
-from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Material, Problem
-from solvers.solver import silent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.cylinder_contact import ContactPoints, ContactRegion
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solver import silent
 
 COEFFICIENT = 0.3
 LAYER = Material(poisson=0.0, law="neo-hookean")

@@ -4,10 +4,10 @@ import numpy as np
 
 from benchmarks.verification.meshes import mapped_mesh
 from benchmarks.verification.record import Case, Row, about, at_most
-from geometry.arrays import FloatArray
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.problem import Load, Material, Problem
 
 WIDTH, DEPTH = 60.0, 30.0
 MATERIAL = Material(poisson=0.3, law="neo-hookean")

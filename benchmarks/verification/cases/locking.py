@@ -2,12 +2,12 @@
 
 from benchmarks.verification.cases.cantilever import TIP, cantilever_problem, deflection, end_loaded
 from benchmarks.verification.record import Case, Row, about, at_most, between, slope_rows
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.error_estimate import locking_factor
-from solvers.fem.linear import FemSolver
-from solvers.problem import Material, Problem
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.error_estimate import locking_factor
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Material, Problem
 
 DEFLECTION = {0.3: about(0.946, 0.02), 0.45: about(0.892, 0.02), 0.499: at_most(0.35), 0.4999: at_most(0.15)}
 """Deflection with linear elements over the closed form, by Poisson's ratio."""

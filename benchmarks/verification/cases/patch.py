@@ -8,9 +8,9 @@ from benchmarks.verification.boundary_value import BoundaryValue, Exact
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, at_most
-from geometry.arrays import FloatArray
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material, Problem
 
 GRADIENT = np.array([[0.010, 0.004], [-0.007, 0.003]])
 SIDES = ("left", "right", "bottom", "top")

@@ -8,15 +8,15 @@ import ufl
 
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, about, at_most, slope_rows
-from geometry.arrays import FloatArray
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.elasticity import energy_density_of
-from solvers.extrusion import ExtrudedSpace
-from solvers.fem.dolfinx_compat import DistributedSpace
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_solvers import Factorisation
-from solvers.fem.solid import Fem3dSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.elasticity import energy_density_of
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.linear_solvers import Factorisation
+from pinnray.solvers.fem.solid import Fem3dSolver
+from pinnray.solvers.problem import Load, Material, Problem
 
 LENGTH, HEIGHT, DEPTH = 4.0, 2.0, 2.0
 CURVATURE = 0.01

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from ezdxf.lldxf.const import DXFError
 
-from geometry.drawing.formats.drawing import place
-from geometry.errors import UserError
+from pinnray.geometry.drawing.formats.drawing import place
+from pinnray.geometry.errors import UserError
 
 MOST = 100_000
 """Largest number of entities in all insertions."""

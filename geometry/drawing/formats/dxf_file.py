@@ -10,8 +10,8 @@ from ezdxf import recover
 from ezdxf.audit import AuditError
 from ezdxf.lldxf.const import DXFError
 
-from geometry.drawing.formats.drawing import UNITS, Scale
-from geometry.errors import UserError
+from pinnray.geometry.drawing.formats.drawing import UNITS, Scale
+from pinnray.geometry.errors import UserError
 
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else its notes go to the standard error
 

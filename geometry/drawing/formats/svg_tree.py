@@ -8,8 +8,8 @@ from xml.etree import ElementTree as ET
 
 import svgelements
 
-from geometry.drawing.formats.drawing import UNITS, Scale
-from geometry.errors import UserError
+from pinnray.geometry.drawing.formats.drawing import UNITS, Scale
+from pinnray.geometry.errors import UserError
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 LINK = "{http://www.w3.org/1999/xlink}href"

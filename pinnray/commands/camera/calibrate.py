@@ -5,10 +5,10 @@ from typing import Literal
 
 from rich.console import Console
 
-from compare.runtime.exits import say
-from compare.runtime.provenance import package_versions
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import say
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import Flag, OutputPath, Repeated
 
 VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
@@ -40,12 +40,12 @@ def command(
         without: Photograph to leave out; may be repeated.
         out: Camera file, .json or .yaml.
     """
-    from compare.camera.calibration_report import calibration_table, draw_calibration, view_table
-    from vision.calibration.camera_calibration import better_lens, calibrate_camera
-    from vision.calibration.camera_file import check_format, save_calibration
-    from vision.calibration.charuco import parse_board
-    from vision.calibration.lens_fit import LensChoice
-    from vision.frames.sources import photographs
+    from pinnray.comparison.camera.calibration_report import calibration_table, draw_calibration, view_table
+    from pinnray.vision.calibration.camera_calibration import better_lens, calibrate_camera
+    from pinnray.vision.calibration.camera_file import check_format, save_calibration
+    from pinnray.vision.calibration.charuco import parse_board
+    from pinnray.vision.calibration.lens_fit import LensChoice
+    from pinnray.vision.frames.sources import photographs
 
     check_format(out)
     if not images:

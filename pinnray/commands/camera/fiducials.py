@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from compare.runtime.exits import say
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import say
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
@@ -33,10 +33,10 @@ def command(
         dictionary: ArUco dictionary of a ChArUco board.
         out: Output folder.
     """
-    from geometry.atomic import write_json, write_text
-    from vision.calibration.charuco import parse_board
-    from vision.rig.boards import board_svg, largest_square
-    from vision.tracking.workspace import Workspace, default_workspace, workspace_svg
+    from pinnray.geometry.atomic import write_json, write_text
+    from pinnray.vision.calibration.charuco import parse_board
+    from pinnray.vision.rig.boards import board_svg, largest_square
+    from pinnray.vision.tracking.workspace import Workspace, default_workspace, workspace_svg
 
     design, _ = finger.read()
     chosen = parse_board(board, square, marker=marker, dictionary=dictionary)

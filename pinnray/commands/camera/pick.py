@@ -6,9 +6,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from compare.runtime.exits import say
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import say
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OutputPath
 
 AMBIGUOUS = 0.05
@@ -41,11 +41,11 @@ def command(
         frame: Number of the frame, from 0.
         out: Output picture.
     """
-    from vision.discs.circle_proposals import highlight_colour, propose_circles
-    from vision.discs.colour import read_colour
-    from vision.discs.colour_picker import pick_colour
-    from vision.frames.pictures import SUFFIXES, write_picture
-    from vision.frames.sources import open_frames
+    from pinnray.vision.discs.circle_proposals import highlight_colour, propose_circles
+    from pinnray.vision.discs.colour import read_colour
+    from pinnray.vision.discs.colour_picker import pick_colour
+    from pinnray.vision.frames.pictures import SUFFIXES, write_picture
+    from pinnray.vision.frames.sources import open_frames
 
     if out.suffix.lower() not in SUFFIXES:
         raise UserError(f"--out {out}: give the name of a picture, such as pick.png")

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import cast, get_args
 
-from geometry.errors import UserError
 from pinnray.commands.camera.pick import read_numbers
 from pinnray.commands.quiet import quietable
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
@@ -35,8 +35,8 @@ def command(
             millimetres per unit of both pictures, such as 0.21,0.22.
         out: Output file.
     """
-    from vision.clicked_points import LengthScale, clicked_points, read_clicks
-    from vision.measurements import write_measurements
+    from pinnray.vision.clicked_points import LengthScale, clicked_points, read_clicks
+    from pinnray.vision.measurements import write_measurements
 
     design, _ = finger.read()
     if out.suffix.lower() != ".csv":

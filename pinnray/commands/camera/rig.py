@@ -5,12 +5,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.geometry.errors import UserError
 from pinnray.options.camera import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
 from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
-from vision.rig.exposure import Exposure
-from vision.rig.motion import Motion
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.motion import Motion
 
 
 @quietable
@@ -43,15 +43,15 @@ def command(
         codec: ffv1 or png (lossless), mjpg or mp4v.
         out: Output folder.
     """
-    from compare.camera.filmed_force import filmed_course
-    from compare.camera.virtual_film import filmed_solution, write_film
-    from compare.pipeline.shared_mesh import shared_mesh
-    from compare.runtime.output_folder import check_output
-    from compare.runtime.stages import Stages
-    from vision.rig.occluders import cables, check_covers
-    from vision.rig.recording import Recording
-    from vision.rig.recording_files import check_codec
-    from vision.tracking.workspace import default_workspace
+    from pinnray.comparison.camera.filmed_force import filmed_course
+    from pinnray.comparison.camera.virtual_film import filmed_solution, write_film
+    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
+    from pinnray.comparison.runtime.output_folder import check_output
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.vision.rig.occluders import cables, check_covers
+    from pinnray.vision.rig.recording import Recording
+    from pinnray.vision.rig.recording_files import check_codec
+    from pinnray.vision.tracking.workspace import default_workspace
 
     design, mesh_settings = finger.read(options.preset)
     material, load = physics.read(options.preset)

@@ -8,12 +8,12 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.live import Live
 
-from compare.runtime.exits import say
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import say
+from pinnray.geometry.errors import UserError
 from pinnray.options.camera import FilmOptions, ForceOptions
 from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
-from solvers.registry import make_solver
+from pinnray.solvers.registry import make_solver
 
 
 @quietable
@@ -48,7 +48,7 @@ def command(
         without_video: Write no annotated video.
         out: Output folder.
     """
-    from compare.camera.force_estimate import (
+    from pinnray.comparison.camera.force_estimate import (
         MESH,
         LiveForce,
         force_table,
@@ -56,12 +56,12 @@ def command(
         forces_of,
         write_forces,
     )
-    from compare.camera.publication import Publisher
-    from compare.camera.track_film import displacement_line, track_film, track_table
-    from compare.pipeline.shared_mesh import shared_mesh
-    from compare.runtime.output_folder import check_output, replaced_folder, write_run
-    from compare.runtime.provenance import machine, package_versions
-    from compare.runtime.stages import Stages
+    from pinnray.comparison.camera.publication import Publisher
+    from pinnray.comparison.camera.track_film import displacement_line, track_film, track_table
+    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
+    from pinnray.comparison.runtime.output_folder import check_output, replaced_folder, write_run
+    from pinnray.comparison.runtime.provenance import machine, package_versions
+    from pinnray.comparison.runtime.stages import Stages
 
     if publish is not None and not live:
         raise UserError("--publish is for --live")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from compare.runtime.exits import NOT_CONVERGED, say
-from compare.runtime.provenance import cores
-from geometry.errors import UserError
+from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
+from pinnray.comparison.runtime.provenance import cores
+from pinnray.geometry.errors import UserError
 from pinnray.options.camera import FilmOptions
 from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
 from pinnray.options.shared import (
@@ -27,8 +27,8 @@ from pinnray.options.shared import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from compare.camera.film import Film
-    from solvers.solver import Solver
+    from pinnray.comparison.camera.film import Film
+    from pinnray.solvers.solver import Solver
 
 
 def command(
@@ -79,14 +79,14 @@ def command(
         quiet: Show no progress and no table.
         json_: Print metrics.json and nothing else.
     """
-    from compare.pipeline.job import Job
-    from compare.pipeline.pipeline import run
-    from compare.pipeline.shared_mesh import tolerance_reached
-    from compare.pipeline.solving import second_process, worth_starting
-    from compare.report.tables import body_table, marker_table
-    from compare.runtime.output_folder import RUN_FILE
-    from compare.runtime.stages import Stages
     from pinnray.commands.launch import on_ranks
+    from pinnray.comparison.pipeline.job import Job
+    from pinnray.comparison.pipeline.pipeline import run
+    from pinnray.comparison.pipeline.shared_mesh import tolerance_reached
+    from pinnray.comparison.pipeline.solving import second_process, worth_starting
+    from pinnray.comparison.report.tables import body_table, marker_table
+    from pinnray.comparison.runtime.output_folder import RUN_FILE
+    from pinnray.comparison.runtime.stages import Stages
     from pinnray.options.preset_jobs import job_defaults
 
     earlier = read_options_file(from_) if from_ else None
@@ -168,7 +168,7 @@ def _optional_solvers(
 
 def _truth(name: str | None, measurements: str | None) -> str:
     """The name of what is simulated; nothing is where there are measurements."""
-    from compare.evaluation.truths import SLIDING
+    from pinnray.comparison.evaluation.truths import SLIDING
 
     if name is not None and measurements is not None:
         raise UserError("--truth is for a simulated experiment; with --measurements leave it out")

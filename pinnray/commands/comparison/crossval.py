@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from compare.runtime.exits import NOT_CONVERGED, say
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -20,8 +20,8 @@ from pinnray.options.shared import (
 )
 
 if TYPE_CHECKING:
-    from compare.crossval.study import SolverVariant
-    from solvers.physics import Material
+    from pinnray.comparison.crossval.study import SolverVariant
+    from pinnray.solvers.physics import Material
 
 
 @quietable
@@ -65,13 +65,13 @@ def command(
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/crossval-DESIGN.
     """
-    from compare.crossval.cross_validation import cross_validate
-    from compare.crossval.folds import LOAD
-    from compare.crossval.study import SIZES, CrossvalStudy
-    from compare.crossval.tables import terminal_tables
-    from compare.runtime.stages import Stages
-    from geometry.registration import Registration
-    from vision.measurements import read_measurements
+    from pinnray.comparison.crossval.cross_validation import cross_validate
+    from pinnray.comparison.crossval.folds import LOAD
+    from pinnray.comparison.crossval.study import SIZES, CrossvalStudy
+    from pinnray.comparison.crossval.tables import terminal_tables
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.geometry.registration import Registration
+    from pinnray.vision.measurements import read_measurements
 
     design, mesh = finger.read(options.preset, SIZES)
     material, load = physics.read(options.preset)
@@ -114,7 +114,7 @@ def command(
 
 def read_variants(options: SolverOptions, names: str, material: "Material") -> "list[SolverVariant]":
     """The solvers and their variants; a single one where --solver-set chooses the weight of the markers."""
-    from compare.crossval.study import solver_variants
+    from pinnray.comparison.crossval.study import solver_variants
 
     keys = [text.partition("=")[0].split(".") for text in options.solver_set]
     fixed = [key[0] for key in keys if key[1:] in (["choose"], ["weights"])]

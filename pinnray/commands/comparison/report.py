@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from compare.runtime.exits import shown
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import shown
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OptionalOutputPath
 
 
@@ -23,7 +23,7 @@ def command(*runs: Path, out: OptionalOutputPath = None) -> int:
             a page runs.html and a table runs.csv with all of their numbers.
         out: Folder of the page and the table; default out/side-by-side.
     """
-    from compare.report.runs import read_runs, write_side_by_side
+    from pinnray.comparison.report.runs import read_runs, write_side_by_side
 
     if not runs:
         raise UserError("no run was given; name output folders of compare, such as out/default")

@@ -22,7 +22,7 @@ def command() -> int:
     """
     from rich.table import Table
 
-    from solvers.registry import PRESETS, make_solver, usable_solvers
+    from pinnray.solvers.registry import PRESETS, make_solver, usable_solvers
 
     table = Table("solver", "laws", "loads")
     table.add_column("settings", overflow="fold")

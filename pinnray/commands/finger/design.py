@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import FingerOptions, OutputPath, comma_list
 
 STEP = "finger"
@@ -28,12 +28,12 @@ def command(
         out: Output folder.
         formats: File formats, separated by commas: step, stl, dxf, svg.
     """
-    from compare.figures.design_drawing import draw_design
-    from compare.runtime.exits import say
-    from geometry.atomic import write_text
-    from geometry.cache import cad_files
-    from geometry.drawing.drawn_finger import DrawnFinger, description_lines
-    from geometry.finger.design import Design
+    from pinnray.comparison.figures.design_drawing import draw_design
+    from pinnray.comparison.runtime.exits import say
+    from pinnray.geometry.atomic import write_text
+    from pinnray.geometry.cache import cad_files
+    from pinnray.geometry.drawing.drawn_finger import DrawnFinger, description_lines
+    from pinnray.geometry.finger.design import Design
 
     chosen, _ = finger.read()
     stem = Path(chosen.file).stem if isinstance(chosen, DrawnFinger) else STEP

@@ -6,10 +6,10 @@ from typing import Literal
 
 from rich.console import Console
 
-from compare.runtime.exits import NOT_CONVERGED, say
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import FingerOptions, Flag, OutputPath, PhysicsOptions
-from solvers.registry import make_solver
+from pinnray.solvers.registry import make_solver
 
 
 @quietable
@@ -43,12 +43,12 @@ def command(
             fem-nonlinear.
         out: Output folder.
     """
-    from compare.pipeline.shared_mesh import shared_mesh
-    from compare.runtime.stages import Stages
-    from geometry.errors import UserError
-    from solvers.problem import Problem
-    from studies.robots.export import SIZES, ExportSettings, export_finger
-    from studies.robots.score import score_table
+    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.geometry.errors import UserError
+    from pinnray.solvers.problem import Problem
+    from pinnray.studies.robots.export import SIZES, ExportSettings, export_finger
+    from pinnray.studies.robots.score import score_table
 
     chosen, mesh = finger.read(usual=SIZES)
     if score and kind != "mujoco":

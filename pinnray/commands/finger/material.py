@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OutputPath
 
 
@@ -29,8 +29,8 @@ def command(
         strain: Largest strain that counts: that of the finger is 0.1 to 0.3. Default: all.
         out: PNG file of the curves; default: none.
     """
-    from compare.runtime.tables import number, percent
-    from solvers.materials import MATERIALS, fitted, read_tensile_test
+    from pinnray.comparison.runtime.tables import number, percent
+    from pinnray.solvers.materials import MATERIALS, fitted, read_tensile_test
 
     if test is None:
         width = max(map(len, MATERIALS))
@@ -62,7 +62,7 @@ def command(
         + ("" if best.law == "linear" else f" --law {best.law}")
     )
     if out is not None:
-        from compare.figures.tensile_test import draw_tensile_test
+        from pinnray.comparison.figures.tensile_test import draw_tensile_test
 
         draw_tensile_test(measured, fits).save(out)
         print(out)

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from compare.runtime.exits import NOT_CONVERGED
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import NOT_CONVERGED
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import Adapt, FingerOptions, OutputPath, PhysicsOptions
 
 
@@ -24,10 +24,10 @@ def command(
         adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
         out: Output folder.
     """
-    from compare.figures.mesh_drawing import draw_mesh
-    from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached, write_rounds
-    from compare.report.output_files import write_mesh
-    from compare.runtime.stages import Stages
+    from pinnray.comparison.figures.mesh_drawing import draw_mesh
+    from pinnray.comparison.pipeline.shared_mesh import shared_mesh, tolerance_reached, write_rounds
+    from pinnray.comparison.report.output_files import write_mesh
+    from pinnray.comparison.runtime.stages import Stages
 
     chosen, settings = finger.read()
     material, load = physics.read()

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from compare.runtime.exits import say
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import say
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
-from solvers.registry import make_solver
+from pinnray.solvers.registry import make_solver
 
 
 @quietable
@@ -31,14 +31,14 @@ def command(
     """
     import numpy as np
 
-    from compare.evaluation.deformed_body import DeformedBody
-    from compare.evaluation.plausibility import problem_remarks
-    from compare.pipeline.shared_mesh import shared_mesh
-    from compare.runtime.stages import Stages
-    from compare.runtime.tables import write_csv
-    from solvers.finger_figures import QUANTITIES
-    from solvers.finger_figures.sensitivity import sensitivity_of
-    from solvers.problem import Problem
+    from pinnray.comparison.evaluation.deformed_body import DeformedBody
+    from pinnray.comparison.evaluation.plausibility import problem_remarks
+    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.comparison.runtime.tables import write_csv
+    from pinnray.solvers.finger_figures import QUANTITIES
+    from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
+    from pinnray.solvers.problem import Problem
 
     if figure not in QUANTITIES:
         raise UserError(f"--figure {figure}: there are {', '.join(QUANTITIES)}")

@@ -3,9 +3,9 @@
 from functools import partial
 from pathlib import Path
 
-from compare.runtime.exits import NOT_CONVERGED, say
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import (
     Adapt,
     FingerOptions,
@@ -38,20 +38,24 @@ def command(
         strokes: Strokes at which to print the force, mm, separated by commas; default: the full one.
         out: VTU file of the fields.
     """
-    from compare.evaluation.certification import with_certificates
-    from compare.evaluation.deformed_body import with_body_checks
-    from compare.evaluation.metrics import evaluated, force_curves, write_force_displacement
-    from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-    from compare.figures.force_charts import draw_force_displacement
-    from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached
-    from compare.report.figures_table import figures_lines
-    from compare.report.output_files import write_vtu
-    from compare.runtime.stages import Stages
-    from solvers.finger_figures import break_warning
-    from solvers.problem import Problem
-    from solvers.registry import unknown_solver
-    from solvers.solver import Traits, solved, with_law
-    from vision.measurements import read_measurements
+    from pinnray.comparison.evaluation.certification import with_certificates
+    from pinnray.comparison.evaluation.deformed_body import with_body_checks
+    from pinnray.comparison.evaluation.metrics import evaluated, force_curves, write_force_displacement
+    from pinnray.comparison.evaluation.plausibility import (
+        check_positions,
+        displacement_remarks,
+        problem_remarks,
+    )
+    from pinnray.comparison.figures.force_charts import draw_force_displacement
+    from pinnray.comparison.pipeline.shared_mesh import shared_mesh, tolerance_reached
+    from pinnray.comparison.report.figures_table import figures_lines
+    from pinnray.comparison.report.output_files import write_vtu
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.solvers.finger_figures import break_warning
+    from pinnray.solvers.problem import Problem
+    from pinnray.solvers.registry import unknown_solver
+    from pinnray.solvers.solver import Traits, solved, with_law
+    from pinnray.vision.measurements import read_measurements
 
     if not solver:
         raise UserError(unknown_solver(solver))

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.geometry.errors import UserError
 
 
 @quietable
@@ -17,9 +17,9 @@ def command(sweep: Path, *, port: int = 8765, refit: bool = False) -> int:
         port: Of this machine; 0 takes any that is free.
         refit: Fit the emulator again.
     """
-    from compare.runtime.stages import Stages
-    from studies.fields.live import serve_explorer
-    from studies.fields.store import fields_of
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.studies.fields.live import serve_explorer
+    from pinnray.studies.fields.store import fields_of
 
     if not 0 <= port < 65536:
         raise UserError(f"--port {port}: give a number from 0 to 65535")

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OptionalOutputPath
 
 
@@ -19,9 +19,9 @@ def command(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False)
         out: HTML file; default: explore.html in that folder.
         refit: Fit the emulator again.
     """
-    from compare.runtime.stages import Stages
-    from studies.fields.explorer import write_explorer
-    from studies.fields.store import fields_of
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.studies.fields.explorer import write_explorer
+    from pinnray.studies.fields.store import fields_of
 
     path = out or sweep / "explore.html"
     if path.suffix.lower() != ".html":

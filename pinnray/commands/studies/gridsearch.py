@@ -7,9 +7,9 @@ from typing import Any
 
 from rich.console import Console
 
-from compare.runtime.exits import NOT_CONVERGED, say
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -53,12 +53,12 @@ def command(
         pictures: Formats of the picture besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/gridsearch-DESIGN.
     """
-    from compare.runtime.stages import Stages
-    from geometry.mesh.settings import MeshSettings
-    from solvers.registry import make_solver
-    from studies.gridsearch.search import grid_study, runs_table, search_grid
-    from studies.gridsearch.training_run import FAILED, best_of
-    from studies.sweep.job import StudyJob
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.geometry.mesh.settings import MeshSettings
+    from pinnray.solvers.registry import make_solver
+    from pinnray.studies.gridsearch.search import grid_study, runs_table, search_grid
+    from pinnray.studies.gridsearch.training_run import FAILED, best_of
+    from pinnray.studies.sweep.job import StudyJob
 
     design, sizes = finger.read(options.preset)
     mesh = sizes or MeshSettings()  # a run is given the finger's section, without the mesh of its file

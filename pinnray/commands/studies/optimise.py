@@ -22,11 +22,11 @@ def command(
     Args:
         question: TOML file with objectives, constraints, the ranges of the parameters and the solver.
     """
-    from compare.runtime.stages import Stages
-    from compare.runtime.tables import terminal_table
-    from studies.optimum.page import front_grid, write_front
-    from studies.optimum.question import load_question
-    from studies.optimum.search import search_front
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.comparison.runtime.tables import terminal_table
+    from pinnray.studies.optimum.page import front_grid, write_front
+    from pinnray.studies.optimum.question import load_question
+    from pinnray.studies.optimum.search import search_front
 
     formats = read_formats(options.pictures)
     read = load_question(question)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from geometry.errors import UserError
 from pinnray.commands.quiet import quietable
+from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OptionalOutputPath, Repeated, existing
 
 if TYPE_CHECKING:
-    from studies.emulator.emulator import Emulator, Predictions
-    from studies.sweep.study import Value
+    from pinnray.studies.emulator.emulator import Emulator, Predictions
+    from pinnray.studies.sweep.study import Value
 
 
 @quietable
@@ -37,10 +37,10 @@ def command(
         refit: Fit the emulator again.
         out: CSV file of the predictions for --csv; default: beside it, NAME-predicted.csv.
     """
-    from compare.runtime.stages import Stages
-    from geometry.atomic import write_text
-    from studies.emulator.emulator import prediction_table
-    from studies.emulator.store import emulator_of
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.geometry.atomic import write_text
+    from pinnray.studies.emulator.emulator import prediction_table
+    from pinnray.studies.emulator.store import emulator_of
 
     if bool(set) == (csv is not None):
         raise UserError(
@@ -67,7 +67,7 @@ def command(
 
 def finger_given(settings: tuple[str, ...]) -> tuple[int, dict[str, str]]:
     """The finger of the option --set."""
-    from geometry.finger.parameters import SYMBOLS
+    from pinnray.geometry.finger.parameters import SYMBOLS
 
     found: dict[str, str] = {}
     for setting in settings:
@@ -82,8 +82,8 @@ def finger_given(settings: tuple[str, ...]) -> tuple[int, dict[str, str]]:
 
 def read_rows(file: Path) -> list[tuple[int, dict[str, str]]]:
     """Numbers of the rows of a CSV file, and their cells by the headings, with or without units."""
-    from geometry.finger.parameters import Parameters
-    from studies.sweep.study import PHYSICS, title
+    from pinnray.geometry.finger.parameters import Parameters
+    from pinnray.studies.sweep.study import PHYSICS, title
 
     names = {title(name): name for name in (*Parameters.model_fields, *PHYSICS)}
     try:
@@ -118,8 +118,8 @@ def finger_of_options(emulator: "Emulator", settings: dict[str, str], where: str
 
 def print_table(emulator: "Emulator", found: "Predictions") -> None:
     """Print the quantities of one finger."""
-    from compare.runtime.tables import terminal_table
-    from solvers.finger_figures import QUANTITIES
+    from pinnray.comparison.runtime.tables import terminal_table
+    from pinnray.solvers.finger_figures import QUANTITIES
 
     headings = ["quantity", "unit", "value", "95 % interval", "meaning"]
     rows = []

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from compare.runtime.exits import NOT_CONVERGED, say
 from pinnray.commands.quiet import quietable
+from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 
 
@@ -22,12 +22,12 @@ def command(
     Args:
         study: TOML file with the ranges of the parameters, the sampling and the solver.
     """
-    from compare.runtime.stages import Stages
-    from compare.runtime.tables import terminal_table
-    from studies.sweep.page import write_page
-    from studies.sweep.study import load_study
-    from studies.sweep.sweep import run_sweep
-    from studies.sweep.tables import failure_grid, quantity_grid, write_tables
+    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.comparison.runtime.tables import terminal_table
+    from pinnray.studies.sweep.page import write_page
+    from pinnray.studies.sweep.study import load_study
+    from pinnray.studies.sweep.sweep import run_sweep
+    from pinnray.studies.sweep.tables import failure_grid, quantity_grid, write_tables
 
     formats = read_formats(options.pictures)
     read = load_study(study)

@@ -8,17 +8,17 @@ from functools import partial
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from solvers.cylinder_contact import ContactRegion, CylinderContact
-from solvers.extrusion import NodalSpace
-from solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
-from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
-from solvers.fem.finite_strain.newton import ConstrainedNewton
-from solvers.fem.linear_solvers import LinearSolver
-from solvers.problem import Problem
-from solvers.solver import Progress
-from solvers.stability import aside, descended
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.cylinder_contact import ContactRegion, CylinderContact
+from pinnray.solvers.extrusion import NodalSpace
+from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
+from pinnray.solvers.fem.finite_strain.newton import ConstrainedNewton
+from pinnray.solvers.fem.linear_solvers import LinearSolver
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import Progress
+from pinnray.solvers.stability import aside, descended
 
 BESIDE = 0.05
 """Largest distance of an equilibrium from that on coarser elements over the largest displacement; one that is

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.mesh.settings import MeshSettings
-from solvers.cylinder_contact import ContactRegion
-from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.problem import Problem
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.cylinder_contact import ContactRegion
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
+from pinnray.solvers.problem import Problem
 
 COARSE, ACROSS, FINE = 1.0, 2, 3000
 """Size of coarse elements, mm; their least number through a wall; triangles from which on they are used."""

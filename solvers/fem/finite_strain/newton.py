@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
-from solvers.petsc import PETSc
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
+from pinnray.solvers.petsc import PETSc
 
 
 class NewtonResult(NamedTuple):

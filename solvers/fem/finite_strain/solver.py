@@ -7,18 +7,18 @@ from functools import partial
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
-from solvers.fem.boundary_conditions import DisplacementConstraints
-from solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
-from solvers.fem.finite_strain.nested_path import NestedPath, coarser
-from solvers.fem.ranks import on_all_ranks
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem
-from solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
-from solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
+from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
+from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
+from pinnray.solvers.fem.finite_strain.nested_path import NestedPath, coarser
+from pinnray.solvers.fem.ranks import on_all_ranks
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
+from pinnray.solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
 
 MOST = 2 / 3
 """Coarse elements over the given ones up to which the load is followed on them."""

@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
-from solvers.assimilation.marker_forces import MarkerForces
-from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.constrained_elimination import ConstrainedElimination
-from solvers.pinn.finite_basis.energy import REGULARISATION, NetworkEnergy
-from solvers.pinn.finite_basis.load_conditions import load_conditions
-from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
-from solvers.pinn.finite_basis.sparse_cholesky import Factors
-from solvers.problem import Problem
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.assimilation.marker_forces import MarkerForces
+from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION, NetworkEnergy
+from pinnray.solvers.pinn.finite_basis.load_conditions import load_conditions
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
+from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
+from pinnray.solvers.problem import Problem
 
 INVERSE_ITERATIONS = 3
 """Enough to leave soft directions of an unstable equilibrium, not only the softest."""

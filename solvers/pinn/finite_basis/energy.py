@@ -15,12 +15,12 @@ import torch
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from geometry.arrays import FloatArray, IntArray
-from solvers.elasticity import Lame, LawName, check_known, deformation_jacobian, energy_density_of
-from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
-from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix, Factors
-from solvers.pinn.threading import boxes_around, imap_in_threads
-from solvers.problem import Material
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.solvers.elasticity import Lame, LawName, check_known, deformation_jacobian, energy_density_of
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
+from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix, Factors
+from pinnray.solvers.pinn.threading import boxes_around, imap_in_threads
+from pinnray.solvers.problem import Material
 
 REGULARISATION = 1e-12
 """Added to the unit diagonal of the scaled Hessian, against nearly dependent basis functions."""
@@ -33,7 +33,7 @@ computed anew for every evaluation.
 """
 
 LAWS: tuple[LawName, ...] = ("linear", "neo-hookean", "st-venant-kirchhoff")
-"""Those of `solvers.elasticity` that have a tangent here."""
+"""Those of `pinnray.solvers.elasticity` that have a tangent here."""
 
 CHUNK = 1024
 """Blocks that are turned into a tangent's at a time, which stay in a cache."""

@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 Points = TypeVar("Points", torch.Tensor, FloatArray)
 

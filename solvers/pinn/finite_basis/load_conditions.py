@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from solvers.problem import Problem, contact_functional, contact_nodes, front_points
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.problem import Problem, contact_functional, contact_nodes, front_points
 
 MOMENTS = 12
 """Moments of the displacement that a rigid patch prescribes for each component."""

@@ -13,11 +13,11 @@ from typing import ClassVar, Literal
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.point_location import LocatedPoints
-from solvers.pinn.finite_basis.hard_constraint import HardConstraint
-from solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
-from solvers.pinn.threading import boxes_around, cut_into_patches, imap_in_threads
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from pinnray.solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
+from pinnray.solvers.pinn.threading import boxes_around, cut_into_patches, imap_in_threads
 
 Windows = ShepardWindows | GateTree
 """A partition of unity by windows."""

@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
-from solvers.cylinder_contact import ContactRegion
-from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
-from solvers.pinn.finite_basis.energy import REGULARISATION
-from solvers.solver import Progress
-from solvers.stability import ShiftedStep, aside, descended
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.cylinder_contact import ContactRegion
+from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
+from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION
+from pinnray.solvers.solver import Progress
+from pinnray.solvers.stability import ShiftedStep, aside, descended
 
 FIRST_STEP, MAX_STEP, MIN_STEP = 0.1, 0.25, 1e-3
 """Fractions of the load in one step."""

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from geometry.arrays import FloatArray
-from geometry.mesh.boundary import boundary_widths, mean_thickness, re_entrant_points
-from geometry.mesh.quadrature import triangle_rule
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.pinn.finite_basis.load_conditions import contact_end_points
-from solvers.problem import Problem, contact_ends, contact_nodes
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.boundary import boundary_widths, mean_thickness, re_entrant_points
+from pinnray.geometry.mesh.quadrature import triangle_rule
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.pinn.finite_basis.load_conditions import contact_end_points
+from pinnray.solvers.problem import Problem, contact_ends, contact_nodes
 
 NARROW = 0.6
 """Spacing in places of less than half the largest width, relative to that by their width.

@@ -7,20 +7,20 @@ from typing import ClassVar, cast
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.observations import Observations
-from solvers.assimilation.misfit import MarkerSettings
-from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from solvers.pinn.finite_basis.network import FiniteBasisField
-from solvers.pinn.finite_basis.newton import LoadStep
-from solvers.pinn.finite_basis.solver import FiniteBasisSolver
-from solvers.pinn.finite_basis.training import with_trained_neurons
-from solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
-from solvers.problem import Problem
-from solvers.shared_work import SharedWork
-from solvers.solution import Solution
-from solvers.solver import Cost, Progress
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.assimilation.misfit import MarkerSettings
+from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
+from pinnray.solvers.pinn.finite_basis.newton import LoadStep
+from pinnray.solvers.pinn.finite_basis.solver import FiniteBasisSolver
+from pinnray.solvers.pinn.finite_basis.training import with_trained_neurons
+from pinnray.solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.shared_work import SharedWork
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Cost, Progress
 
 
 @dataclass(frozen=True, kw_only=True)

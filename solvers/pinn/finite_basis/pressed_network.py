@@ -12,17 +12,17 @@ import numpy as np
 import torch
 from scipy.sparse import csr_matrix
 
-from geometry.arrays import FloatArray, IntArray
-from solvers.constrained_elimination import ConstrainedElimination
-from solvers.cylinder_contact import ContactRegion, ContactState, CylinderContact
-from solvers.lagrange import LagrangeSpace
-from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
-from solvers.pinn.finite_basis.energy import REGULARISATION, piola_stress_and_tangent
-from solvers.pinn.finite_basis.network import FiniteBasisField
-from solvers.pinn.finite_basis.newton import FIRST_STEP, MIN_STEP, LoadStep
-from solvers.pinn.finite_basis.sparse_cholesky import Factors
-from solvers.problem import Problem
-from solvers.solver import Progress
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.cylinder_contact import ContactRegion, ContactState, CylinderContact
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
+from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION, piola_stress_and_tangent
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
+from pinnray.solvers.pinn.finite_basis.newton import FIRST_STEP, MIN_STEP, LoadStep
+from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import Progress
 
 STIFF, SOFT = 10.0, 0.3
 """k over Young's modulus, and the same with which the forces of a coarser network are taken over."""

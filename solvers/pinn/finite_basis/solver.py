@@ -8,31 +8,31 @@ from typing import ClassVar
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.mesh.quadrature import body_quadrature
-from solvers.assimilation.marker_forces import MarkerFit
-from solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
-from solvers.assimilation.pictures import FreePictures
-from solvers.cylinder_contact import CONTACT_AT_END
-from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from solvers.pinn.finite_basis.energy import LAWS, NetworkEnergy
-from solvers.pinn.finite_basis.hard_constraint import HardConstraint
-from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
-from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
-from solvers.pinn.finite_basis.point_spacing import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.solvers.assimilation.marker_forces import MarkerFit
+from pinnray.solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
+from pinnray.solvers.assimilation.pictures import FreePictures
+from pinnray.solvers.cylinder_contact import CONTACT_AT_END
+from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from pinnray.solvers.pinn.finite_basis.energy import LAWS, NetworkEnergy
+from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
+from pinnray.solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
+from pinnray.solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
     graded_quadrature,
     graded_triangles,
     spread_points,
 )
-from solvers.pinn.finite_basis.pressed_network import PressedNetwork
-from solvers.pinn.network_solver import NetworkSolver
-from solvers.pinn.threading import pool
-from solvers.problem import Problem
-from solvers.shared_work import shared
-from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import Cost, Progress, check_problem, silent
+from pinnray.solvers.pinn.finite_basis.pressed_network import PressedNetwork
+from pinnray.solvers.pinn.network_solver import NetworkSolver
+from pinnray.solvers.pinn.threading import pool
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.shared_work import shared
+from pinnray.solvers.solution import Solution, Status, unstable_phrase
+from pinnray.solvers.solver import Cost, Progress, check_problem, silent
 
 Train = Callable[[float, FiniteBasisField | None, Progress], tuple[ConstrainedNetwork, LoadStep]]
 """Trains one refinement level, of a scale of the spacings, starting from the coarser level's field."""

@@ -6,9 +6,9 @@ from weakref import finalize
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
-from geometry.errors import UserError
-from solvers.petsc import PETSc
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.petsc import PETSc
 
 PREFIX = "pinnray_network_"
 LEAST_FILL = 2

@@ -14,11 +14,11 @@ import numpy as np
 import torch
 from scipy.optimize import minimize
 
-from geometry.arrays import FloatArray
-from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium
-from solvers.pinn.finite_basis.windows import ShepardWindows
-from solvers.solver import NoSolutionError, Progress
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from pinnray.solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium
+from pinnray.solvers.pinn.finite_basis.windows import ShepardWindows
+from pinnray.solvers.solver import NoSolutionError, Progress
 
 MEMORY = 20
 """Steps that L-BFGS remembers."""

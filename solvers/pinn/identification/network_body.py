@@ -17,22 +17,22 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.wall_motion import WallMotion
-from solvers.elasticity import Lame, deformation_jacobian
-from solvers.identification.body import Linearised
-from solvers.pinn.finite_basis.energy import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.solvers.elasticity import Lame, deformation_jacobian
+from pinnray.solvers.identification.body import Linearised
+from pinnray.solvers.pinn.finite_basis.energy import (
     REGULARISATION,
     NetworkEnergy,
     energy_density,
     piola_stress_and_tangent,
 )
-from solvers.pinn.finite_basis.network import FiniteBasisField
-from solvers.pinn.finite_basis.solver import FiniteBasisSolver
-from solvers.pinn.finite_basis.sparse_cholesky import Factors
-from solvers.pinn.threading import pool
-from solvers.problem import Problem
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
+from pinnray.solvers.pinn.finite_basis.solver import FiniteBasisSolver
+from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
+from pinnray.solvers.pinn.threading import pool
+from pinnray.solvers.problem import Problem
 
 TOLERANCE = 1e-2
 """Relative error of a solve in the energy norm, and so of a Newton step."""
@@ -48,7 +48,7 @@ class WallMetric(NamedTuple):
 
 
 class NetworkBody:
-    """A finger of one law, clamped at its base, as a network; see `solvers.identification.body`.
+    """A finger of one law, clamped at its base, as a network; see `pinnray.solvers.identification.body`.
 
     The factors of one tangent serve as the preconditioner of conjugate gradients for the tangents after it,
     as long as these converge in a few iterations.

@@ -8,23 +8,23 @@ from typing import ClassVar
 
 import numpy as np
 
-from geometry.errors import UserError
-from geometry.observations import Observations
-from solvers.fem.finite_strain.nested_path import coarser
-from solvers.fem.identification import FemBody
-from solvers.identification.contradiction import with_doubts
-from solvers.identification.fit import Fit
-from solvers.identification.model import Response, ResponseModel
-from solvers.identification.nested_search import ROUGHLY, NestedSearch
-from solvers.identification.result import Identified
-from solvers.identification.search import Identifier
-from solvers.identification.settings import IdentifyingSolver
-from solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
-from solvers.pinn.finite_basis.presets import PinnLocalSolver
-from solvers.pinn.identification.network_body import NetworkBody
-from solvers.problem import Problem
-from solvers.solution import Solution, Status
-from solvers.solver import Cost, Family, Progress, check_problem, silent
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.fem.finite_strain.nested_path import coarser
+from pinnray.solvers.fem.identification import FemBody
+from pinnray.solvers.identification.contradiction import with_doubts
+from pinnray.solvers.identification.fit import Fit
+from pinnray.solvers.identification.model import Response, ResponseModel
+from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
+from pinnray.solvers.identification.result import Identified
+from pinnray.solvers.identification.search import Identifier
+from pinnray.solvers.identification.settings import IdentifyingSolver
+from pinnray.solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
+from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver
+from pinnray.solvers.pinn.identification.network_body import NetworkBody
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import Cost, Family, Progress, check_problem, silent
 
 WINDOWS = PinnLocalSolver(wall_spacing=0.65, corner_spacing=0.026, growth=0.65, cell=0.42)
 """On the default finger with elements of 0.25 and 0.5 mm the von Mises stress is 4.5 and 5.2 % from the truth

@@ -13,9 +13,9 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
-from geometry.arrays import FloatArray
-from geometry.atomic import atomic_path, write_bytes
-from geometry.errors import UserError
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.atomic import atomic_path, write_bytes
+from pinnray.geometry.errors import UserError
 
 FILE = "checkpoint.safetensors"
 

@@ -14,11 +14,11 @@ import numpy as np
 import torch
 import torch.distributed
 
-from geometry.arrays import FloatArray
-from solvers.elasticity import Lame, stress_of
-from solvers.pinn.paper.mlp_passes import MlpPass
-from solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
-from solvers.pinn.threading import map_in_threads, slices
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.elasticity import Lame, stress_of
+from pinnray.solvers.pinn.paper.mlp_passes import MlpPass
+from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
+from pinnray.solvers.pinn.threading import map_in_threads, slices
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import torch
 
-from solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
+from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
 
 
 class ForwardPass(NamedTuple):

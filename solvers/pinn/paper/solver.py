@@ -7,13 +7,13 @@ from typing import ClassVar, Literal
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
-from geometry.content_hash import content_hash
-from geometry.errors import UserError
-from solvers.assimilation.misfit import Weighting
-from solvers.pinn.network_solver import NetworkSolver
-from solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
-from solvers.pinn.paper.loss import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.content_hash import content_hash
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.assimilation.misfit import Weighting
+from pinnray.solvers.pinn.network_solver import NetworkSolver
+from pinnray.solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
+from pinnray.solvers.pinn.paper.loss import (
     ONE_PROCESS,
     DisplacementTerm,
     EnergyTerm,
@@ -22,18 +22,18 @@ from solvers.pinn.paper.loss import (
     ProcessGroup,
     stiffness_matrix,
 )
-from solvers.pinn.paper.modified_mlp import ModifiedMlp
-from solvers.pinn.paper.trained_field import MlpField, assess_training
-from solvers.pinn.paper.training import (
+from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
+from pinnray.solvers.pinn.paper.trained_field import MlpField, assess_training
+from pinnray.solvers.pinn.paper.training import (
     OPTIMISERS,
     CheckpointStore,
     Training,
     TrainingSettings,
 )
-from solvers.pinn.threading import pool, torch_threads
-from solvers.problem import Problem, contact_functional
-from solvers.solution import Solution
-from solvers.solver import Cost, Progress, TrainingContext, check_problem, silent
+from pinnray.solvers.pinn.threading import pool, torch_threads
+from pinnray.solvers.problem import Problem, contact_functional
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Cost, Progress, TrainingContext, check_problem, silent
 
 PRECISIONS = {"single": torch.float32, "double": torch.float64}
 

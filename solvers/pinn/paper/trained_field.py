@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
-from geometry.mesh.point_location import LocatedPoints
-from solvers.energy_and_force import energy_and_force
-from solvers.pinn.paper.mlp_passes import MlpPass
-from solvers.pinn.paper.modified_mlp import ModifiedMlp
-from solvers.pinn.paper.training import Training
-from solvers.pinn.threading import CHUNK, map_in_threads, slices
-from solvers.problem import Problem, contact_functional
-from solvers.solution import DisplacementField, Status
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.solvers.energy_and_force import energy_and_force
+from pinnray.solvers.pinn.paper.mlp_passes import MlpPass
+from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
+from pinnray.solvers.pinn.paper.training import Training
+from pinnray.solvers.pinn.threading import CHUNK, map_in_threads, slices
+from pinnray.solvers.problem import Problem, contact_functional
+from pinnray.solvers.solution import DisplacementField, Status
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
-from solvers.pinn.paper.checkpoint import HistoryFiles, load_checkpoint, save_checkpoint
-from solvers.pinn.paper.loss import Loss, LossEvaluation
-from solvers.solver import Progress, TrainingDiverged
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.pinn.paper.checkpoint import HistoryFiles, load_checkpoint, save_checkpoint
+from pinnray.solvers.pinn.paper.loss import Loss, LossEvaluation
+from pinnray.solvers.solver import Progress, TrainingDiverged
 
 OPTIMISERS: dict[str, Callable[..., torch.optim.Optimizer]] = {"adam": torch.optim.Adam}
 """By the names of the settings; called with the parameters and `lr`."""

@@ -3,11 +3,11 @@
 import cv2
 import numpy as np
 
-from compare.camera.calibration_report import draw_calibration, undistorted
+from pinnray.comparison.camera.calibration_report import draw_calibration, undistorted
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera_calibration import Calibration
+from pinnray.vision.calibration.chessboard import Board
 from tests.compare.figures.drawn_pages import page_of
-from vision.calibration.camera import Camera
-from vision.calibration.camera_calibration import Calibration
-from vision.calibration.chessboard import Board
 
 CAMERA = Camera(320, 240, 250.0, 250.0, 160.0, 120.0, distortion=(-0.3, 0.1, 0.0, 0.0, 0.0))
 CORNERS = Board(5, 4, 30.0).corners[:, :2] + (90, 70)

@@ -5,18 +5,18 @@ import csv
 import numpy as np
 import pytest
 
-from compare.camera.filmed_force import LONGEST_STEP, filmed_course, true_forces
-from compare.evaluation.truths import simulate
-from geometry.finger.design import Design
 from pinnray.cli import main
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
-from vision.rig.bench import Bench
-from vision.rig.motion import Motion
-from vision.rig.recording import Recording
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.workspace import default_workspace
+from pinnray.comparison.camera.filmed_force import LONGEST_STEP, filmed_course, true_forces
+from pinnray.comparison.evaluation.truths import simulate
+from pinnray.geometry.finger.design import Design
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.motion import Motion
+from pinnray.vision.rig.recording import Recording
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.workspace import default_workspace
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 

@@ -10,15 +10,15 @@ import cv2
 import numpy as np
 import pytest
 
-from compare.camera.force_estimate import FrameForce, LiveForce, force_rows
-from compare.camera.publication import FrameLine, PublishedForce, Publisher
-from geometry.errors import UserError
 from pinnray.cli import main
-from solvers.identification.tracker import ForceReading
-from vision.discs.disc_detector import DiscDetections
-from vision.frames.frame import Frame
-from vision.frames.sources import open_frames
-from vision.tracking.frame_tracker import FrameDetections
+from pinnray.comparison.camera.force_estimate import FrameForce, LiveForce, force_rows
+from pinnray.comparison.camera.publication import FrameLine, PublishedForce, Publisher
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.identification.tracker import ForceReading
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.frames.frame import Frame
+from pinnray.vision.frames.sources import open_frames
+from pinnray.vision.tracking.frame_tracker import FrameDetections
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")
 
@@ -181,7 +181,7 @@ def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(caps
 
 
 def test_a_reader_that_has_gone_is_told_in_one_line():
-    importlib.import_module("solvers.petsc")  # which would end the process at a closed pipe
+    importlib.import_module("pinnray.solvers.petsc")  # which would end the process at a closed pipe
     reading_end, writing_end = os.pipe()
     os.close(reading_end)
     frame = Frame(0, 0.0, np.zeros((2, 2), dtype=np.uint8))

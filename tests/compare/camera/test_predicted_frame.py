@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 
-from compare.camera import predicted_frame
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.registration import Homography
 from pinnray.cli import main
-from solvers.fem.linear import FemSolver
-from solvers.problem import Problem
+from pinnray.comparison.camera import predicted_frame
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.registration import Homography
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Problem
+from pinnray.vision.frames.sources import open_frames
 from tests.solvers.conftest import observed_at
-from vision.frames.sources import open_frames
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 

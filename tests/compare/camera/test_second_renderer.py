@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import pinnray as pr
-from compare.camera.film import Film
-from compare.camera.track_film import track_film
-from solvers.problem import Load
-from solvers.solver import silent
-from vision.frames.sources import open_frames
+from pinnray.comparison.camera.film import Film
+from pinnray.comparison.camera.track_film import track_film
+from pinnray.solvers.problem import Load
+from pinnray.solvers.solver import silent
+from pinnray.vision.frames.sources import open_frames
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Problem
-from solvers.solution import Solution
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solution import Solution
 
 NOISE = 0.005
 """Standard deviation of the markers' displacements, mm."""

@@ -13,22 +13,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compare.crossval.cross_validation import cross_validate
-from compare.crossval.folds import ALL, ONE
-from compare.crossval.study import CrossvalStudy, solver_variants
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.registration import HAND_HELD
 from pinnray.cli import main
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
-from solvers.registry import BUILT_IN, make_solver
-from solvers.solution import Solution, Status
-from solvers.solver import Progress, silent
+from pinnray.comparison.crossval.cross_validation import cross_validate
+from pinnray.comparison.crossval.folds import ALL, ONE
+from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.registration import HAND_HELD
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import BUILT_IN, make_solver
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import Progress, silent
+from pinnray.vision.measurements import write_measurements
 from tests.compare.crossval.conftest import NOISE
 from tests.solvers.conftest import observed_at
-from vision.measurements import write_measurements
 
 
 def run(line: str, out: Path) -> int:
@@ -228,7 +228,7 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
 
 OWN_SCRIPT = """
 import pinnray as pr
-from solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.linear import FemSolver
 
 class Own(FemSolver):
     name = {name!r}

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 from scipy.stats import t
 
-from compare.crossval.folds import (
+from pinnray.comparison.crossval.folds import (
     ALL,
     DRAWS,
     LOAD,
@@ -20,16 +20,16 @@ from compare.crossval.folds import (
     hide_markers,
     load_cases_of,
 )
-from compare.crossval.output_files import draw_fields, draw_held_out, draw_weight_sweeps
-from compare.crossval.result import Case, CaseResult, CrossvalResult
-from compare.crossval.scores import Difference, ScoreInterval, differences, of_scheme, score
-from compare.crossval.study import CrossvalStudy, solver_variants
-from compare.crossval.tables import truth_tables, verdict_sentences
-from compare.evaluation.truths import EVERY_TRUTH, TRUTHS
-from compare.runtime.tables import terminal_table
-from geometry.finger.design import Design
-from solvers.problem import Material, Problem
-from solvers.registry import make_solver
+from pinnray.comparison.crossval.output_files import draw_fields, draw_held_out, draw_weight_sweeps
+from pinnray.comparison.crossval.result import Case, CaseResult, CrossvalResult
+from pinnray.comparison.crossval.scores import Difference, ScoreInterval, differences, of_scheme, score
+from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
+from pinnray.comparison.crossval.tables import truth_tables, verdict_sentences
+from pinnray.comparison.evaluation.truths import EVERY_TRUTH, TRUTHS
+from pinnray.comparison.runtime.tables import terminal_table
+from pinnray.geometry.finger.design import Design
+from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.registry import make_solver
 from tests.compare.figures.drawn_pages import page_of
 
 

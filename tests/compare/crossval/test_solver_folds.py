@@ -6,23 +6,23 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from compare.crossval.folds import ALL, LOAD, ONE, RANDOM, Fold, FoldResult, LoadCase
-from compare.crossval.scores import score
-from compare.crossval.solver_folds import SolverTask, run_folds, sweep_weights
-from compare.crossval.study import CrossvalStudy, SolverVariant
-from compare.crossval.true_fields import FieldSampler, TrueContact, TrueField
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.quadrature import body_quadrature
-from geometry.registration import Homography, Pictures
-from solvers.assimilation.misfit import misfit_of
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solution import Estimated, IdentifiedForce, Solution, State, Uncertainty
-from solvers.solver import FieldSettings, Progress, silent
+from pinnray.comparison.crossval.folds import ALL, LOAD, ONE, RANDOM, Fold, FoldResult, LoadCase
+from pinnray.comparison.crossval.scores import score
+from pinnray.comparison.crossval.solver_folds import SolverTask, run_folds, sweep_weights
+from pinnray.comparison.crossval.study import CrossvalStudy, SolverVariant
+from pinnray.comparison.crossval.true_fields import FieldSampler, TrueContact, TrueField
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.registration import Homography, Pictures
+from pinnray.solvers.assimilation.misfit import misfit_of
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Estimated, IdentifiedForce, Solution, State, Uncertainty
+from pinnray.solvers.solver import FieldSettings, Progress, silent
 from tests.compare.crossval.conftest import NOISE
 
 QUICK = {"degree": 1, "law": "given", "parameters": "normal_force,position"}
@@ -241,7 +241,9 @@ def test_force_place_and_stated_intervals_are_judged_by_the_truth(task, coarse_m
         identified=IdentifiedForce(Estimated(force, 0.9 * force, 1.1 * force), Estimated(36.5, 35.5, 37.5)),
         uncertainty=Uncertainty(lambda location: np.zeros_like(location.points), deviation),
     )
-    monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_: lambda observations: stating)
+    monkeypatch.setattr(
+        "pinnray.comparison.crossval.solver_folds.refitter", lambda *_: lambda observations: stating
+    )
     full, one, _ = judged(task)
     assert full.force == pytest.approx(1.0)
     assert full.position == pytest.approx(1.5)
@@ -263,7 +265,9 @@ def test_errors_are_those_in_the_picture_whose_frame_was_found(task, truth, obse
     pictures = Pictures(turned, Homography(centre, np.zeros(6)))
     results = []
     for label, each in (("fixed", truth), ("turned", replace(truth, pictures=pictures))):
-        monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_, each=each: lambda _: each)
+        monkeypatch.setattr(
+            "pinnray.comparison.crossval.solver_folds.refitter", lambda *_, each=each: lambda _: each
+        )
         results.append(judged(replace(task, variant=replace(task.variant, label=label))))
     for fixed, found in zip(*results, strict=True):
         moved = observations.displacements if fixed.fold.load_case == 0 else 0.0
@@ -276,10 +280,11 @@ def test_errors_are_those_in_the_picture_whose_frame_was_found(task, truth, obse
 def test_the_stress_is_that_of_the_material_that_a_solver_has_found(task, truth, monkeypatch):
     softer = replace(truth.problem, material=Material(young=5.7))
     monkeypatch.setattr(
-        "compare.crossval.solver_folds.refitter", lambda *_: lambda _: replace(truth, problem=softer)
+        "pinnray.comparison.crossval.solver_folds.refitter",
+        lambda *_: lambda _: replace(truth, problem=softer),
     )
     halved = judged(task)[0].fields
-    monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_: lambda _: truth)
+    monkeypatch.setattr("pinnray.comparison.crossval.solver_folds.refitter", lambda *_: lambda _: truth)
     own = judged(replace(task, variant=replace(task.variant, label="own")))[0].fields
     assert halved["displacement"] == own["displacement"]
     assert halved["von_mises"] > own["von_mises"] + 0.1  # 0.69 and 0.48
@@ -291,7 +296,7 @@ def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monke
     def again(*_: object) -> None:
         raise RuntimeError("solved again")
 
-    monkeypatch.setattr("compare.crossval.solver_folds.refitter", again)
+    monkeypatch.setattr("pinnray.comparison.crossval.solver_folds.refitter", again)
     assert [outcome.errors for outcome in judged(task)] == [outcome.errors for outcome in first]
     with pytest.raises(RuntimeError, match="solved again"):
         judged(replace(task, variant=variant("gp", clamp=True)))
@@ -315,7 +320,7 @@ def test_the_curve_of_weights_is_what_solving_again_with_them_gives(task, coarse
 def test_an_error_that_is_no_number_is_in_no_mean(task, monkeypatch):
     """A displacement that is not finite at the markers alone, where no mesh node is."""
     monkeypatch.setattr(
-        "compare.crossval.solver_folds.FieldSampler.of_solution",
+        "pinnray.comparison.crossval.solver_folds.FieldSampler.of_solution",
         lambda *_: replace(TrueField.load(task.truths[0]).sampled, markers=np.full((9, 2), np.nan)),
     )
     assert run_folds(replace(task, variant=variant("fem"))) == (

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.branches import with_branches
-from compare.evaluation.evaluation import Evaluation
-from geometry.section.loop import Loop
-from geometry.section.section import Section
-from solvers.fem.finite_strain.solver import FemNonlinearSolver, equilibria_near
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Load, Material, Problem
+from pinnray.comparison.evaluation.branches import with_branches
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver, equilibria_near
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.bodies import mesh_of
 
 HEIGHT, HALF, BOW = 40.0, 1.0, 0.05
@@ -83,13 +83,13 @@ def test_an_inexact_result_is_no_branch(problem, solutions):
 
 def test_results_that_agree_are_not_looked_at(problem, solutions, monkeypatch):
     own, _ = solutions
-    monkeypatch.setattr("solvers.fem.finite_strain.solver.equilibria_near", None)
+    monkeypatch.setattr("pinnray.solvers.fem.finite_strain.solver.equilibria_near", None)
     assert with_branches(evaluations(problem, own, replace(own, solver="again")), problem)[1] == []
 
 
 def test_a_result_beside_which_there_is_no_equilibrium_is_said(problem, solutions, monkeypatch):
     found = equilibria_near(problem, [solutions[0].field.values])
-    monkeypatch.setattr("solvers.fem.finite_strain.solver.equilibria_near", lambda *_: [*found, None])
+    monkeypatch.setattr("pinnray.solvers.fem.finite_strain.solver.equilibria_near", lambda *_: [*found, None])
     judged, remarks = with_branches(evaluations(problem, *solutions), problem)
     assert all("several" not in evaluation.message for evaluation in judged)
     (remark,) = remarks
@@ -101,10 +101,10 @@ def test_where_newton_leaps_away_the_energy_is_followed_down(problem, solutions,
     own, _ = solutions
     space = LagrangeSpace(problem.mesh, 2)
     share = 1 - 0.5 * np.sin(np.pi * space.nodes[:, 1:] / HEIGHT) ** 2
-    monkeypatch.setattr("solvers.fem.finite_strain.solver.ITERATIONS", 3)
+    monkeypatch.setattr("pinnray.solvers.fem.finite_strain.solver.ITERATIONS", 3)
     start = own.field.values * np.hstack([share, np.ones_like(share)])
     (found,) = equilibria_near(problem, [start])
     assert found is not None
     assert found.energy == pytest.approx(own.energy, rel=1e-6)
-    monkeypatch.setattr("solvers.fem.finite_strain.load_path.descended", lambda *_: None)
+    monkeypatch.setattr("pinnray.solvers.fem.finite_strain.load_path.descended", lambda *_: None)
     assert equilibria_near(problem, [start]) == [None]

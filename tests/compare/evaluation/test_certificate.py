@@ -9,22 +9,22 @@ import skfem
 from scipy.sparse import csr_matrix
 from skfem.models.elasticity import linear_elasticity
 
-from compare.evaluation.certification import Certifier, body_regions, with_certificates
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import reference_differences
-from compare.report.text import certificate_sentences
-from geometry.arrays import FloatArray, IntArray
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.mesher import build_mesh
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.boundary_conditions import DisplacementConstraints
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.fem.linear import FemSolver
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Load, Material, Problem
-from solvers.solution import Solution
+from pinnray.comparison.evaluation.certification import Certifier, body_regions, with_certificates
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import reference_differences
+from pinnray.comparison.report.text import certificate_sentences
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.mesher import build_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import Solution
 from tests.compare.conftest import closed_form
 from tests.fingers import ring
 

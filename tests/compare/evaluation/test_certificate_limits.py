@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.certificate import Certificate, Region
-from compare.evaluation.certification import with_certificate
+from pinnray.comparison.evaluation.certificate import Certificate, Region
+from pinnray.comparison.evaluation.certification import with_certificate
 
 GOOD = Certificate(
     energy=4.04,

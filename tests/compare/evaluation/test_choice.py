@@ -3,10 +3,10 @@ from typing import ClassVar
 
 import pytest
 
-from compare.evaluation.comparison import supported_solvers, unsupported_remarks
-from solvers.problem import Load, Material, Problem
-from solvers.solution import Solution
-from solvers.solver import Progress, UnsupportedProblemError, silent
+from pinnray.comparison.evaluation.comparison import supported_solvers, unsupported_remarks
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Progress, UnsupportedProblemError, silent
 
 
 @dataclass

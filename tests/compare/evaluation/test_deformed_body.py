@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.deformed_body import DeformedBody, with_body_checks
-from compare.evaluation.evaluation import Evaluation
-from compare.report.html_report import report_html
-from compare.report.output_files import metrics
-from geometry import MeshSettings, finger_mesh, load_design
-from geometry.arrays import FloatArray
-from geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.cli import main
+from pinnray.comparison.evaluation.deformed_body import DeformedBody, with_body_checks
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.report.html_report import report_html
+from pinnray.comparison.report.output_files import metrics
+from pinnray.geometry import MeshSettings, finger_mesh, load_design
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 SELF = "THE BODY GOES THROUGH ITSELF"
 

@@ -3,9 +3,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from compare.evaluation.evaluation import Evaluation
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.solution import Uncertainty
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.solution import Uncertainty
 from tests.compare.conftest import closed_form
 from tests.meshes import permuted
 

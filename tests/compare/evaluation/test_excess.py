@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.certificate import Certificate, Region
-from compare.evaluation.certification import with_certificate
-from compare.evaluation.evaluation import Evaluation
-from compare.figures.fields import DECADES, draw_excess, excess_scale
-from compare.report.text import certificate_sentences
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.evaluation.certificate import Certificate, Region
+from pinnray.comparison.evaluation.certification import with_certificate
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.figures.fields import DECADES, draw_excess, excess_scale
+from pinnray.comparison.report.text import certificate_sentences
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from tests.compare.evaluation.test_certificate_limits import GOOD
 
 

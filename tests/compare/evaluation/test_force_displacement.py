@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import ForceCurve, force_curves, write_force_displacement
-from compare.figures.force_charts import draw_force_displacement
-from geometry.figure import MEASURED
-from solvers.problem import Load
-from solvers.solution import Estimated, IdentifiedForce
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import ForceCurve, force_curves, write_force_displacement
+from pinnray.comparison.figures.force_charts import draw_force_displacement
+from pinnray.geometry.figure import MEASURED
+from pinnray.solvers.problem import Load
+from pinnray.solvers.solution import Estimated, IdentifiedForce
 from tests.compare.figures.drawn_pages import page_of
 from tests.compare.tables import rows_of
 

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.evaluation import field_difference, weighted_percentile
-from compare.evaluation.metrics import (
+from pinnray.comparison.evaluation.evaluation import field_difference, weighted_percentile
+from pinnray.comparison.evaluation.metrics import (
     MEANS,
     force_error,
     held_out_errors,

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-from compare.evaluation.truths import virtual_experiment
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.problem import Load, Material, Problem
+from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
+from pinnray.comparison.evaluation.truths import virtual_experiment
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.problem import Load, Material, Problem
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,13 @@ import re
 import numpy as np
 import pytest
 
-from compare.evaluation.plausibility import problem_remarks
-from geometry.cache import finger_mesh
-from geometry.drawing.description import Description
-from geometry.drawing.load import finger_from_file
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.problem import Problem
+from pinnray.comparison.evaluation.plausibility import problem_remarks
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.drawing.load import finger_from_file
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.problem import Problem
 from tests.geometry.drawing.files import BEAM, write_dxf
 
 

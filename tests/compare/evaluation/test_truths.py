@@ -5,19 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.crossval.folds import LoadCase
-from compare.crossval.study import CrossvalStudy
-from compare.crossval.true_fields import FieldSampler, TrueField, TruthTask, simulate_truth
-from compare.evaluation.truths import LAWS, SLIDING, TRUTHS, WALLS, Truth, experiment_source, simulate
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.section import rib_axes
-from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.wall_motion import WallMotion
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
+from pinnray.comparison.crossval.folds import LoadCase
+from pinnray.comparison.crossval.study import CrossvalStudy
+from pinnray.comparison.crossval.true_fields import FieldSampler, TrueField, TruthTask, simulate_truth
+from pinnray.comparison.evaluation.truths import (
+    LAWS,
+    SLIDING,
+    TRUTHS,
+    WALLS,
+    Truth,
+    experiment_source,
+    simulate,
+)
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.section import rib_axes
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
 from tests.fingers import beam
 
 FULL = LoadCase("full", Load(), 1.0, 35.0)
@@ -144,7 +152,7 @@ def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkey
     def again(*_: object) -> None:
         raise RuntimeError("simulated again")
 
-    monkeypatch.setattr("compare.crossval.true_fields.simulate", again)
+    monkeypatch.setattr("pinnray.comparison.crossval.true_fields.simulate", again)
     assert true_field(study, truth).contact == found.contact
     half = replace(FULL, name="half", share=0.5)
     with pytest.raises(RuntimeError, match="simulated again"):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compare.evaluation.metrics import indistinct, reference_differences
+from pinnray.comparison.evaluation.metrics import indistinct, reference_differences
 
 
 def test_it_is_the_difference_of_the_improved_solution(estimated):

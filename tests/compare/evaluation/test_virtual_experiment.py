@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.truths import TRUTHS, UnfinishedExperimentError, virtual_experiment
-from compare.pipeline.job import Job
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solution import Solution, Status
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.truths import TRUTHS, UnfinishedExperimentError, virtual_experiment
+from pinnray.comparison.pipeline.job import Job
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Solution, Status
 from tests.compare.pipeline.runs import compare
 from tests.compare.tables import rows_of
 from tests.meshes import permuted
@@ -123,9 +123,9 @@ def test_another_problem_is_simulated_again(problem, solutions, changes, simulat
 
 def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(problem, solutions, monkeypatch):
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr("compare.evaluation.truths.package_versions", lambda: {"numpy": "9"})
+    monkeypatch.setattr("pinnray.comparison.evaluation.truths.package_versions", lambda: {"numpy": "9"})
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr("compare.evaluation.truths.sources_digest", lambda *_: "other")
+    monkeypatch.setattr("pinnray.comparison.evaluation.truths.sources_digest", lambda *_: "other")
     virtual_experiment(problem, 0.8)
     assert len(solutions) == 3
 
@@ -156,7 +156,7 @@ def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache
 
 def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, monkeypatch):
     """It is sampled on the shared mesh, and differs from plane strain as the depth makes it differ."""
-    monkeypatch.setattr("compare.evaluation.truths.SOLID_SIZE", 2.5)
+    monkeypatch.setattr("pinnray.comparison.evaluation.truths.SOLID_SIZE", 2.5)
     design = Design(height=40, rib_count=0, tip_length=12, contact_position=18)
     short = finger_mesh(design, settings=MeshSettings(size=2.0))
     known = Problem(short, load=Load(displacement=(0.0, -0.5)), finger=design)
@@ -171,7 +171,7 @@ def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, mo
 
 
 def test_without_the_finite_element_library_measurements_are_asked_for(problem, cache, monkeypatch):
-    monkeypatch.setitem(sys.modules, "solvers.fem.finite_strain.solver", None)
+    monkeypatch.setitem(sys.modules, "pinnray.solvers.fem.finite_strain.solver", None)
     with pytest.raises(UserError, match=r"'fem-nonlinear' cannot be loaded: .*; or give measurements"):
         virtual_experiment(problem, 0.8)
 
@@ -183,7 +183,7 @@ def unfinished(monkeypatch: pytest.MonkeyPatch) -> None:
     def stops(*_: object) -> None:
         raise UnfinishedExperimentError("the virtual experiment stopped at 67.5% of the load")
 
-    monkeypatch.setattr("compare.pipeline.pipeline.virtual_experiment", stops)
+    monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.virtual_experiment", stops)
 
 
 def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Results:

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.metrics import evaluated
-from compare.figures.gallery import draw
-from compare.report.html_report import report_html
-from geometry.finger.finger import Finger
-from geometry.finger.presets import load_design
-from geometry.mesh.mesher import build_mesh
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.comparison.figures.gallery import draw
+from pinnray.comparison.report.html_report import report_html
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.presets import load_design
+from pinnray.geometry.mesh.mesher import build_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
 from tests.compare.conftest import BendingField, closed_form
 from tests.compare.figures.drawn_pages import Page, page_of
 from tests.fingers import beam, ring

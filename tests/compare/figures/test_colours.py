@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.evaluation import Evaluation
-from compare.figures.body import ColourScale, diverging, sequential, symmetric
-from compare.figures.fields import QUANTITIES, difference_scale, field_scale, max_principal
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.figures.body import ColourScale, diverging, sequential, symmetric
+from pinnray.comparison.figures.fields import QUANTITIES, difference_scale, field_scale, max_principal
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 VON_MISES, XY = QUANTITIES[0], QUANTITIES[-1]
 

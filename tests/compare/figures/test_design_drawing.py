@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from compare.figures.design_drawing import draw_design
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.finger.design import Design
-from geometry.finger.presets import load_design, preset_names
+from pinnray.comparison.figures.design_drawing import draw_design
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.presets import load_design, preset_names
 from tests.compare.figures.drawn_pages import page_of
 from tests.fingers import beam, ring
 

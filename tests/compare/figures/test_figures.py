@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from compare.evaluation.certification import with_certificates
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import held_out_errors, marker_errors
-from compare.figures import FORMATS, draw_all, pictures_beside
-from compare.figures.fields import QUANTITIES, draw_field
-from compare.figures.gallery import GALLERY, Illustration, draw
-from compare.figures.overlay import overlay_extent
-from geometry.errors import UserError
-from geometry.figure import DPI, WIDTH
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.processes import Pool, ProcessFailed
-from solvers.problem import Problem
+from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import held_out_errors, marker_errors
+from pinnray.comparison.figures import FORMATS, draw_all, pictures_beside
+from pinnray.comparison.figures.fields import QUANTITIES, draw_field
+from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
+from pinnray.comparison.figures.overlay import overlay_extent
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.figure import DPI, WIDTH
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.processes import Pool, ProcessFailed
+from pinnray.solvers.problem import Problem
 from tests.compare.figures.drawn_pages import Page, page_of
 
 
@@ -56,7 +56,7 @@ def pages(drawings: dict[str, Illustration]) -> dict[str, Page]:
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
     """In letters, not in pixels; and the same file every time."""
-    monkeypatch.setattr("compare.figures.gallery.GALLERY", {"energy": GALLERY["energy"]})
+    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", {"energy": GALLERY["energy"]})
     first, second = (
         [path.read_bytes() for path in sorted(folder.glob(f"*.{kind}"))]
         for folder in (tmp_path / "first", tmp_path / "second")
@@ -86,7 +86,7 @@ ALL = (
 def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawings, tmp_path, monkeypatch):
     """Each is as wide as a page, and not blank; progress goes from none to all."""
     drawn = {name: (title, lambda _, name=name: drawings.get(name)) for name, (title, _) in GALLERY.items()}
-    monkeypatch.setattr("compare.figures.gallery.GALLERY", drawn)
+    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", drawn)
     said: list[float] = []
     pictures = draw_all(tmp_path, comparison, lambda done, _: said.append(done))
     assert [picture.path.stem for picture in pictures] == list(ALL) == list(drawings)
@@ -106,10 +106,10 @@ def test_a_second_process_draws_half_as_this_one_and_its_end_does_not_lose_them(
     comparison, tmp_path, monkeypatch
 ):
     chosen = {name: GALLERY[name] for name in ("marker_errors", "von_mises", "strain_xx", "mesh")}
-    monkeypatch.setattr("compare.figures.gallery.GALLERY", chosen)
-    monkeypatch.setattr("compare.figures.fields.QUANTITIES", [QUANTITIES[0], QUANTITIES[2]])
-    monkeypatch.setattr("compare.figures.BESIDE", ("marker_errors",))
-    monkeypatch.setattr("compare.figures.LARGE", 0)
+    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", chosen)
+    monkeypatch.setattr("pinnray.comparison.figures.fields.QUANTITIES", [QUANTITIES[0], QUANTITIES[2]])
+    monkeypatch.setattr("pinnray.comparison.figures.BESIDE", ("marker_errors",))
+    monkeypatch.setattr("pinnray.comparison.figures.LARGE", 0)
     alone, died = tmp_path / "alone", ProcessFailed(-9)
     expected = [replace(each, path=each.path.name) for each in draw_all(alone, comparison)]
     with Pool(1) as pool:

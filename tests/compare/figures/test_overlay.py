@@ -9,11 +9,11 @@ from matplotlib.patches import Circle
 from matplotlib.quiver import Quiver
 from matplotlib.text import Text
 
-from compare.evaluation.evaluation import Evaluation
-from compare.figures.overlay import draw_overlay
-from geometry.observations import Observations
-from geometry.registration import Homography, Pictures
-from solvers.problem import Load
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.figures.overlay import draw_overlay
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import Homography, Pictures
+from pinnray.solvers.problem import Load
 from tests.compare.conftest import BendingField, closed_form
 from tests.compare.figures.drawn_pages import page_of
 

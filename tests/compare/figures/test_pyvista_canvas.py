@@ -3,8 +3,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from compare.figures.pyvista_canvas import Canvas, Extent
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 RED, BLUE = (200, 10, 20), (10, 20, 200)
 

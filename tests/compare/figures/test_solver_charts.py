@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.figures.solver_charts import (
+from pinnray.comparison.figures.solver_charts import (
     approaches_reference,
     draw_convergence,
     draw_energy,

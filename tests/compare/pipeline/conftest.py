@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from compare.pipeline.job import Job
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
+from pinnray.comparison.pipeline.job import Job
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
 
 
 @pytest.fixture

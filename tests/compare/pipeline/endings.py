@@ -10,17 +10,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from compare.pipeline import solving
-from compare.pipeline.job import Job
-from compare.runtime.exits import interruptible
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from solvers.problem import Problem
-from solvers.solution import Solution
-from solvers.solver import Progress, UnsupportedProblemError, silent
+from pinnray.comparison.pipeline import solving
+from pinnray.comparison.pipeline.job import Job
+from pinnray.comparison.runtime.exits import interruptible
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Progress, UnsupportedProblemError, silent
 
 DESIGN = Design()
 MESH = finger_mesh(DESIGN, settings=MeshSettings(size=1.5))

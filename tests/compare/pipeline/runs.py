@@ -4,10 +4,10 @@ from io import StringIO
 
 from rich.console import Console
 
-from compare.evaluation.comparison import Results
-from compare.pipeline.job import Job
-from compare.pipeline.pipeline import run
-from compare.runtime.stages import Stages
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.pipeline.job import Job
+from pinnray.comparison.pipeline.pipeline import run
+from pinnray.comparison.runtime.stages import Stages
 
 
 def quiet() -> Stages:

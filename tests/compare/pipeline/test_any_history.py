@@ -19,13 +19,13 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
-from compare.pipeline.job import Job
-from geometry.errors import UserError
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.linear import FemSolver
-from solvers.problem import Problem
-from solvers.solution import Solution
-from solvers.solver import Progress, silent
+from pinnray.comparison.pipeline.job import Job
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Progress, silent
 from tests.compare.pipeline.runs import compare as run_quietly
 from tests.solvers.conftest import SHORT
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from compare.pipeline.job import Job
-from compare.pipeline.pipeline import run
-from compare.runtime.stages import Stages
-from geometry.errors import UserError
-from solvers.problem import Load
-from solvers.registry import make_solver
-from solvers.solver import Progress
+from pinnray.comparison.pipeline.job import Job
+from pinnray.comparison.pipeline.pipeline import run
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.problem import Load
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Progress
 from tests.compare.pipeline.runs import compare
 
 pytestmark = pytest.mark.usefixtures("few_elements")

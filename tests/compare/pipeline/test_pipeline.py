@@ -13,22 +13,22 @@ import numpy as np
 import pytest
 import pyvista
 
-from compare.pipeline.job import Job
-from compare.report.output_files import metrics
-from compare.runtime.provenance import package_versions
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
-from geometry.registration import FIXED, HAND_HELD
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
-from solvers.solution import Solution, Status
-from solvers.solver import NoSolutionError, Progress, silent
+from pinnray.comparison.pipeline.job import Job
+from pinnray.comparison.report.output_files import metrics
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import FIXED, HAND_HELD
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import NoSolutionError, Progress, silent
+from pinnray.vision.measurements import read_measurements
 from tests.compare.pipeline.runs import compare
 from tests.compare.tables import rows_of
-from vision.measurements import read_measurements
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 
@@ -306,7 +306,7 @@ def test_another_job_is_not_resumed_from(job, measured, monkeypatch, changes):
     ((name, value),) = changes.items()
     again = {"resume": True}
     if name in ("package_versions", "sources_digest"):
-        monkeypatch.setattr(f"compare.pipeline.solving.{name}", lambda *_: value)
+        monkeypatch.setattr(f"pinnray.comparison.pipeline.solving.{name}", lambda *_: value)
     elif name == "degree":
         first.degree = value
     elif name == "measured":
@@ -369,7 +369,7 @@ def test_a_result_that_its_solver_believes_in_but_finite_elements_do_not_is_mark
     """Linear elements on a coarse mesh: in JSON, both CSV files, report, fields and what pictures get."""
     drawn = []
     monkeypatch.setattr(
-        "compare.pipeline.pipeline.draw_all",
+        "pinnray.comparison.pipeline.pipeline.draw_all",
         lambda _, comparison, *rest: drawn.extend(comparison.evaluations) or [],
     )
     asked = job(FemSolver(), Scripted("linear", degree=1))

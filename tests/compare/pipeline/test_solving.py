@@ -15,18 +15,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compare.evaluation.evaluation import Evaluation
-from compare.pipeline import solving
-from compare.pipeline.job import Job
-from compare.pipeline.solving import Outcome, solve_all
-from compare.runtime.stages import Stages
-from geometry.errors import UserError
-from geometry.processes import Pool
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.problem import Material
-from solvers.registry import make_solver
-from solvers.solver import Traits
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.pipeline import solving
+from pinnray.comparison.pipeline.job import Job
+from pinnray.comparison.pipeline.solving import Outcome, solve_all
+from pinnray.comparison.runtime.stages import Stages
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.processes import Pool
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Material
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Traits
 from tests.compare.pipeline.endings import DESIGN, MARKERS, PROBLEM, Ending
 
 ROOT = Path(__file__).parents[3]

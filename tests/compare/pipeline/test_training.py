@@ -5,10 +5,10 @@ from typing import ClassVar
 
 import pytest
 
-from solvers.fem.linear import FemSolver
-from solvers.problem import Material, Problem
-from solvers.solution import Solution
-from solvers.solver import Progress, TrainingContext, silent
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Progress, TrainingContext, silent
 from tests.compare.pipeline.runs import compare
 
 

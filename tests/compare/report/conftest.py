@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from compare.evaluation.evaluation import Evaluation
-from compare.figures import Picture
-from compare.figures.gallery import draw
-from compare.report.html_report import write_report
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.figures import Picture
+from pinnray.comparison.figures.gallery import draw
+from pinnray.comparison.report.html_report import write_report
 from tests.compare.report.browser import SOFTWARE_WEBGL, chromium
 
 TITLES = {"marker_errors": "Errors at the markers", "von_mises": "Von Mises stress"}

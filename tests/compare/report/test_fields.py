@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import pyvista
 
-from compare.evaluation.evaluation import Evaluation
-from compare.report.output_files import write_mesh, write_vtu
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.report.output_files import write_mesh, write_vtu
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
 
 @pytest.fixture

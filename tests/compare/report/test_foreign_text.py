@@ -9,18 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from compare.evaluation.comparison import Results
-from compare.figures import Picture
-from compare.pipeline.job import Job, checked
-from compare.report.html_report import report_html
-from compare.report.output_files import metrics
-from compare.report.runs import read_runs, write_side_by_side
-from compare.runtime.html import PNG, SMALL, template_environment
-from geometry import Design, UserError
-from geometry.atomic import write_json
-from geometry.drawing.description import Description
 from pinnray.cli import main
-from solvers.registry import make_solver
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.figures import Picture
+from pinnray.comparison.pipeline.job import Job, checked
+from pinnray.comparison.report.html_report import report_html
+from pinnray.comparison.report.output_files import metrics
+from pinnray.comparison.report.runs import read_runs, write_side_by_side
+from pinnray.comparison.runtime.html import PNG, SMALL, template_environment
+from pinnray.geometry import Design, UserError
+from pinnray.geometry.atomic import write_json
+from pinnray.geometry.drawing.description import Description
+from pinnray.solvers.registry import make_solver
 
 ROOT = Path(__file__).parents[3]
 HOSTILE = """</script></table><x-evil onerror="x()">&amp; ' "><img src=x onerror=x()>"""

@@ -7,16 +7,16 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from compare.evaluation.certification import with_certificates
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.figures import Picture
-from compare.report.html_report import report_html
-from compare.report.text import sentence, solve_numbers, stat
-from compare.runtime.tables import percent
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.adaptive_refinement import Adaptation, RefinementRound
-from solvers.problem import Load, Problem
+from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.figures import Picture
+from pinnray.comparison.report.html_report import report_html
+from pinnray.comparison.report.text import sentence, solve_numbers, stat
+from pinnray.comparison.runtime.tables import percent
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.adaptive_refinement import Adaptation, RefinementRound
+from pinnray.solvers.problem import Load, Problem
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from compare.evaluation.evaluation import Evaluation
-from compare.runtime.html import write_html
-from compare.runtime.tables import TextTable
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.runtime.html import write_html
+from pinnray.comparison.runtime.tables import TextTable
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from tests.compare.report.browser import TIMEOUT, Opened, opened
 
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.report.output_files import metrics
-from compare.report.summary import RunAnswer, answers
-from compare.report.text import truth_sentences
-from geometry.observations import Observations
-from solvers.solution import Estimated, IdentifiedForce
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.report.output_files import metrics
+from pinnray.comparison.report.summary import RunAnswer, answers
+from pinnray.comparison.report.text import truth_sentences
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.solution import Estimated, IdentifiedForce
 
 TRUST, MARKERS = "May the network be trusted here?", "Did the markers help?"
 CONVERGED = "What is not converged?"

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation.certification import with_certificates
-from compare.evaluation.metrics import MEANS, marker_errors, reference_differences
-from compare.report.output_files import metrics
-from compare.report.summary import answers
-from solvers.problem import Problem
+from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.metrics import MEANS, marker_errors, reference_differences
+from pinnray.comparison.report.output_files import metrics
+from pinnray.comparison.report.summary import answers
+from pinnray.solvers.problem import Problem
 
 KEYS = Path(__file__).with_name("metrics.txt")
 """The entries of `metrics.json`, sorted."""
@@ -83,7 +83,7 @@ def test_held_out_errors_are_those_of_markers_that_the_solver_was_not_given(numb
 
 
 def test_without_dolfinx_no_result_is_certified_and_a_warning_says_so(estimated, mesh, monkeypatch):
-    monkeypatch.setitem(sys.modules, "solvers.fem.linear", None)
+    monkeypatch.setitem(sys.modules, "pinnray.solvers.fem.linear", None)
     with pytest.warns(UserWarning, match="no result is certified: solver 'fem' cannot be loaded"):
         (plain,) = with_certificates([estimated], Problem(mesh))
     assert plain.certificate is None

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from compare.report.output_files import metrics
-from compare.report.runs import differing_settings, read_runs
-from geometry.atomic import write_json
 from pinnray.cli import main
-from solvers.solution import Estimated, IdentifiedForce
+from pinnray.comparison.report.output_files import metrics
+from pinnray.comparison.report.runs import differing_settings, read_runs
+from pinnray.geometry.atomic import write_json
+from pinnray.solvers.solution import Estimated, IdentifiedForce
 from tests.compare.tables import rows_of
 
 Save = Callable[..., Path]

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Results
-from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import RIGID, marker_errors, reference_differences
-from compare.report.output_files import metrics
-from compare.report.tables import (
+from pinnray.comparison.evaluation.comparison import Results
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.metrics import RIGID, marker_errors, reference_differences
+from pinnray.comparison.report.output_files import metrics
+from pinnray.comparison.report.tables import (
     PRINTED,
     marker_table,
     printed_rows,
@@ -19,9 +19,9 @@ from compare.report.tables import (
     write_summary,
     write_table_one,
 )
-from geometry import Design, load_design
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.registration import FIXED, HAND_HELD
+from pinnray.geometry import Design, load_design
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.registration import FIXED, HAND_HELD
 from tests.compare.tables import rows_of
 
 Rows = list[dict[str, str]]

@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
-from compare.evaluation.evaluation import Evaluation
-from geometry.arrays import FloatArray
-from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from tests.compare.report.browser import opened
 
 CANVAS = "document.getElementById('viewer-canvas')"

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from compare.runtime.exits import INTERRUPTED, interruptible
 from pinnray.commands.launch import launched
+from pinnray.comparison.runtime.exits import INTERRUPTED, interruptible
 from pinnray.options.shared import going_on_from
 
 

@@ -7,7 +7,7 @@ from time import sleep
 
 import pytest
 
-from compare.camera.force_estimate import NewestOnly
+from pinnray.comparison.camera.force_estimate import NewestOnly
 
 
 def test_the_newest_item_is_taken_and_those_before_it_are_passed_over():

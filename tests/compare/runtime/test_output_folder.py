@@ -9,9 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from compare.runtime import output_folder
-from compare.runtime.output_folder import MARK, check_output, locked, replaced_folder, take_training
-from geometry.errors import UserError
+from pinnray.comparison.runtime import output_folder
+from pinnray.comparison.runtime.output_folder import (
+    MARK,
+    check_output,
+    locked,
+    replaced_folder,
+    take_training,
+)
+from pinnray.geometry.errors import UserError
 
 
 def tree(folder: Path) -> dict[str, str]:

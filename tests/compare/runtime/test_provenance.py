@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-from compare.runtime.provenance import PACKAGES, package_versions
+from pinnray.comparison.runtime.provenance import PACKAGES, package_versions
 
 
 def test_versions_of_python_and_of_every_package(monkeypatch):
@@ -11,5 +11,5 @@ def test_versions_of_python_and_of_every_package(monkeypatch):
     assert versions["python"] == ".".join(str(number) for number in sys.version_info[:3])
     assert set(versions) == {"python", *PACKAGES}
     assert versions["numpy"] == importlib.import_module("numpy").__version__
-    monkeypatch.setattr("compare.runtime.provenance.PACKAGES", ("no-such-package",))
+    monkeypatch.setattr("pinnray.comparison.runtime.provenance.PACKAGES", ("no-such-package",))
     assert package_versions()["no-such-package"] == "unknown"

@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from compare.runtime.output_folder import check_resumable_folder
-from geometry.atomic import atomic_path
-from geometry.errors import UserError
-from studies.sweep import sweep
-from studies.sweep.job import StudyJob
-from studies.sweep.study import Range, Study
-from studies.sweep.sweep import run_sweep
+from pinnray.comparison.runtime.output_folder import check_resumable_folder
+from pinnray.geometry.atomic import atomic_path
+from pinnray.geometry.errors import UserError
+from pinnray.studies.sweep import sweep
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.study import Range, Study
+from pinnray.studies.sweep.sweep import run_sweep
 
 
 class Killed(BaseException):

@@ -6,7 +6,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from compare.runtime.stages import Stages
+from pinnray.comparison.runtime.stages import Stages
 
 
 def console(*, terminal: bool) -> Console:

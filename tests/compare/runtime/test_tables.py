@@ -5,7 +5,7 @@ from math import nan
 
 import pytest
 
-from compare.runtime.tables import distance, number, percent, plain, write_csv
+from pinnray.comparison.runtime.tables import distance, number, percent, plain, write_csv
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from geometry.content_hash import file_digest
 from pinnray.cli import main
+from pinnray.geometry.content_hash import file_digest
 from tests.pinnray.commands.programs import FEW_ELEMENTS, WITHOUT_PICTURES
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("few_elements")]

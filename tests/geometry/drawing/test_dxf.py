@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from ezdxf.document import Drawing as Document
 
-from geometry import UserError
-from geometry.drawing.checks import body
-from geometry.drawing.formats.dxf_file import HEADER_UNITS
-from geometry.drawing.load import read_drawing
+from pinnray.geometry import UserError
+from pinnray.geometry.drawing.checks import body
+from pinnray.geometry.drawing.formats.dxf_file import HEADER_UNITS
+from pinnray.geometry.drawing.load import read_drawing
 from tests.geometry.drawing.files import BEAM, broken_dxf, rectangle, write_dxf
 
 HOLE = rectangle(20, -7, 10, 4)
@@ -194,7 +194,7 @@ def test_markers_drawn_of_arcs_are_circles(tmp_path):
 def test_ezdxf_is_silent(tmp_path):
     """Its notes about a unit that it does not know went to the standard error."""
     write_dxf(tmp_path / "a.dxf", [BEAM])
-    code = "import sys, logging; from geometry.drawing.formats.dxf import read_dxf; from pathlib import Path;"
+    code = "import logging; from pathlib import Path\nfrom pinnray.geometry.drawing.formats.dxf import read_dxf\n"
     code += f"read_dxf(Path({str(tmp_path / 'a.dxf')!r})); logging.getLogger('ezdxf').warning('a note')"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stderr == ""

@@ -6,13 +6,13 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import UserError
-from geometry.drawing.checks import body
-from geometry.drawing.description import Description
-from geometry.drawing.drawn_finger import description_lines
-from geometry.drawing.formats.closed_loops import closed_loops
-from geometry.drawing.formats.pieces import line
-from geometry.drawing.load import finger_from_file, read_drawing
+from pinnray.geometry import UserError
+from pinnray.geometry.drawing.checks import body
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.drawing.drawn_finger import description_lines
+from pinnray.geometry.drawing.formats.closed_loops import closed_loops
+from pinnray.geometry.drawing.formats.pieces import line
+from pinnray.geometry.drawing.load import finger_from_file, read_drawing
 from tests.geometry.drawing.files import BEAM, write_dxf
 
 ROUND = 0.4

@@ -7,13 +7,13 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import MeshSettings, UserError
-from geometry.cache import expected_triangles, finger_mesh
-from geometry.drawing.checks import least_thickness
-from geometry.drawing.description import Description, load_description
-from geometry.drawing.drawn_finger import DrawnFinger, description_lines
-from geometry.drawing.load import finger_from_file
-from geometry.mesh.mesher import build_mesh
+from pinnray.geometry import MeshSettings, UserError
+from pinnray.geometry.cache import expected_triangles, finger_mesh
+from pinnray.geometry.drawing.checks import least_thickness
+from pinnray.geometry.drawing.description import Description, load_description
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger, description_lines
+from pinnray.geometry.drawing.load import finger_from_file
+from pinnray.geometry.mesh.mesher import build_mesh
 from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, rectangle, write_beam_mesh, write_dxf, write_svg
 
 FILES = [*sorted(FINRAY.glob("*.stp")), CSIRO]

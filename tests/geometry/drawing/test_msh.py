@@ -6,10 +6,10 @@ import gmsh
 import numpy as np
 import pytest
 
-from geometry import UserError
-from geometry.drawing.checks import body
-from geometry.drawing.load import read_drawing
-from geometry.mesh.mesher import session
+from pinnray.geometry import UserError
+from pinnray.geometry.drawing.checks import body
+from pinnray.geometry.drawing.load import read_drawing
+from pinnray.geometry.mesh.mesher import session
 
 
 def write_mesh(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from geometry.drawing.formats.closed_loops import closed_loops, nearest_piece, straightened
-from geometry.drawing.formats.pieces import DEVIATION, arc_through, arcs_along, full_circle, line
-from geometry.errors import UserError
-from geometry.section.loop import Loop
+from pinnray.geometry.drawing.formats.closed_loops import closed_loops, nearest_piece, straightened
+from pinnray.geometry.drawing.formats.pieces import DEVIATION, arc_through, arcs_along, full_circle, line
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.section.loop import Loop
 
 
 def ellipse(parameters):

@@ -8,11 +8,11 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, UserError
-from geometry.cad import write_step as export_step
-from geometry.drawing.checks import body
-from geometry.drawing.formats.drawing import Drawing
-from geometry.drawing.load import read_drawing
+from pinnray.geometry import Design, UserError
+from pinnray.geometry.cad import write_step as export_step
+from pinnray.geometry.drawing.checks import body
+from pinnray.geometry.drawing.formats.drawing import Drawing
+from pinnray.geometry.drawing.load import read_drawing
 from tests.geometry.drawing.files import CSIRO, FINRAY, write_beam_mesh, write_svg
 
 

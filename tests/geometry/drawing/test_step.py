@@ -6,13 +6,13 @@ import cadquery as cq
 import numpy as np
 import pytest
 
-from geometry import UserError
-from geometry.cache import drawn_finger
-from geometry.drawing.checks import body
-from geometry.drawing.description import Description
-from geometry.drawing.formats import step_parts
-from geometry.drawing.formats.planes import plane_of, plane_text
-from geometry.drawing.load import finger_from_file, read_drawing
+from pinnray.geometry import UserError
+from pinnray.geometry.cache import drawn_finger
+from pinnray.geometry.drawing.checks import body
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.drawing.formats import step_parts
+from pinnray.geometry.drawing.formats.planes import plane_of, plane_text
+from pinnray.geometry.drawing.load import finger_from_file, read_drawing
 from tests.geometry.drawing.files import FINRAY
 
 BODY = cq.Solid.makeBox(60, 20, 12)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.drawing.checks import body
-from geometry.drawing.load import read_drawing
+from pinnray.geometry.drawing.checks import body
+from pinnray.geometry.drawing.load import read_drawing
 from tests.geometry.drawing.files import write_svg
 
 BODY = '<rect width="60" height="10"/>'

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from geometry import Section, load_design
-from geometry.drawing.load import finger_from_file
+from pinnray.geometry import Section, load_design
+from pinnray.geometry.drawing.load import finger_from_file
 
 MESH = Path(__file__).parents[2] / "data" / "csiro-finger" / "finray_test_vol.msh"
 WITHIN = 1e-3

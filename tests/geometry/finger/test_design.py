@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from geometry import Design, UserError
-from geometry.finger.parameters import SYMBOLS, Parameters, parameter_info
-from geometry.finger.rules import Rule, RuleResult
-from geometry.finger.validation import RULES, STEP, advice, obeys
+from pinnray.geometry import Design, UserError
+from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, parameter_info
+from pinnray.geometry.finger.rules import Rule, RuleResult
+from pinnray.geometry.finger.validation import RULES, STEP, advice, obeys
 
 BAD_DESIGNS = [
     # parameters, parameter that the message must give a range for

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from geometry import Design, load_design, parse_overrides, preset_names
+from pinnray.geometry import Design, load_design, parse_overrides, preset_names
 
 
 def test_default_comes_first_of_at_least_four_presets() -> None:

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry import Design, load_design
-from geometry.drawing.load import finger_from_file
 from pinnray.cli import main
+from pinnray.geometry import Design, load_design
+from pinnray.geometry.drawing.load import finger_from_file
 
 FINGERS = {
     "default": [],

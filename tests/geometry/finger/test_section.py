@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point, Polygon
 
-from geometry import Design, finger_section, marker_positions
-from geometry.finger.section import cells, rib_axes, ribs
+from pinnray.geometry import Design, finger_section, marker_positions
+from pinnray.geometry.finger.section import cells, rib_axes, ribs
 from tests.meshes import body_area, body_perimeter, polygon_area
 
 THICKNESS = {"front": "front_thickness", "back": "back_thickness", "base": "base_thickness"}

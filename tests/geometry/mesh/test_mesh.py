@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon
 
-from geometry import Design, OutsideBodyError, TriangleMesh
-from geometry.finger.section import cells
-from geometry.mesh.mesher import build_mesh
-from geometry.mesh.settings import MeshSettings
-from solvers.lagrange import LagrangeSpace
+from pinnray.geometry import Design, OutsideBodyError, TriangleMesh
+from pinnray.geometry.finger.section import cells
+from pinnray.geometry.mesh.mesher import build_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.lagrange import LagrangeSpace
 from tests.refusals.geometry import square
 
 

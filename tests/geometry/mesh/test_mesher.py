@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_through_thickness
-from geometry import marker_positions as positions_of
-from geometry.mesh.boundary import boundary_loops
-from geometry.mesh.mesher import build_mesh
+from pinnray.geometry import Design, MeshSettings, TriangleMesh, UserError, elements_through_thickness
+from pinnray.geometry import marker_positions as positions_of
+from pinnray.geometry.mesh.boundary import boundary_loops
+from pinnray.geometry.mesh.mesher import build_mesh
 from tests.meshes import body_area, boundary_lengths
 
 

@@ -5,8 +5,8 @@ from math import factorial
 import numpy as np
 import pytest
 
-from geometry import TriangleMesh, body_quadrature, edge_quadrature
-from geometry.mesh.quadrature import triangle_rule
+from pinnray.geometry import TriangleMesh, body_quadrature, edge_quadrature
+from pinnray.geometry.mesh.quadrature import triangle_rule
 
 DEGREES = [1, 2, 3, 4]
 

@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from geometry import Design, TriangleMesh, finger_section
-from geometry.mesh.refinement import refined
+from pinnray.geometry import Design, TriangleMesh, finger_section
+from pinnray.geometry.mesh.refinement import refined
 from tests.meshes import smallest_angle
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import shapely
 
-from geometry import Design, MeshSettings, load_design
-from geometry.finger.section import apex_angle, base_corners, cells, rib_axes, ribs
-from geometry.mesh.boundary import boundary_loops
-from geometry.mesh.mesher import build_mesh
+from pinnray.geometry import Design, MeshSettings, load_design
+from pinnray.geometry.finger.section import apex_angle, base_corners, cells, rib_axes, ribs
+from pinnray.geometry.mesh.boundary import boundary_loops
+from pinnray.geometry.mesh.mesher import build_mesh
 from tests.meshes import corner_area
 
 TILTED = Design(base_tilt=9.9)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
-from geometry.mesh.wall_motion import WallMotion
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from pinnray.geometry.mesh.wall_motion import WallMotion
 from tests.solvers.conftest import bar_mesh
 
 SETTINGS = MeshSettings(size=1.0)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geometry.section.loop import Loop
-from geometry.section.section import Section
-from geometry.section.thickness import _Pieces, _samples, cavity_widths, through, wall_thickness
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
+from pinnray.geometry.section.thickness import _Pieces, _samples, cavity_widths, through, wall_thickness
 
 
 def disc(radius: float, pieces: int = 2) -> Loop:

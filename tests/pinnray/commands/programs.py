@@ -9,11 +9,13 @@ ROOT = Path(__file__).parents[3]
 
 COMMAND = "import sys; from pinnray.cli import main; sys.exit(main(sys.argv[1:]))"
 
-WITHOUT_PICTURES = f"import compare.pipeline.pipeline as p; p.draw_all = lambda *_, **__: []; {COMMAND}"
+WITHOUT_PICTURES = (
+    f"import pinnray.comparison.pipeline.pipeline as p; p.draw_all = lambda *_, **__: []; {COMMAND}"
+)
 """Pictures take most of the time of a small comparison, and have tests of their own."""
 
 
-FEW_ELEMENTS = "from geometry.cache import finger_mesh as f; f.__kwdefaults__['across'] = 1; "
+FEW_ELEMENTS = "from pinnray.geometry.cache import finger_mesh as f; f.__kwdefaults__['across'] = 1; "
 """Goes before one of these, as the fixture `few_elements`."""
 
 

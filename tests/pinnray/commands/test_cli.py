@@ -14,18 +14,18 @@ from pathlib import Path
 import pytest
 import pyvista
 
-from compare.runtime.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
-from geometry.cache import cad_files, finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.cli import compare_main, main
+from pinnray.comparison.runtime.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
+from pinnray.geometry.cache import cad_files, finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.options.preset_jobs import JOBS, JobDefaults, job_defaults
 from pinnray.options.shared import FingerOptions, PhysicsOptions, SolverOptions
-from solvers.fem import adaptive_refinement as adapt
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.registry import PRESETS, solver_names
-from solvers.solution import Solution, Status
+from pinnray.solvers.fem import adaptive_refinement as adapt
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.registry import PRESETS, solver_names
+from pinnray.solvers.solution import Solution, Status
 from tests.pinnray.commands.programs import run_python
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
@@ -177,7 +177,7 @@ def test_a_design_with_many_changes_still_has_a_name():
 
 def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsys, monkeypatch):
     """Two are known before anything is solved, for their law, and one once the markers are."""
-    monkeypatch.setattr("compare.pipeline.pipeline.draw_all", lambda *_: [])
+    monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.draw_all", lambda *_: [])
     monkeypatch.setitem(JOBS, "", JobDefaults(solvers="gp,fem-id,fem,fem-nonlinear"))
     options = ["--load", "patch", "--plane", "stress", "--mesh-size", "1", "--measurements", "good.csv"]
     assert main(["compare", *options]) == 0
@@ -212,7 +212,7 @@ def ends(monkeypatch: pytest.MonkeyPatch, end: BaseException | Callable[[Solutio
 
     monkeypatch.setattr(FemSolver, "solve", scripted)
     # The check of the measurements solves with `fem`, too.
-    monkeypatch.setattr("compare.pipeline.pipeline.displacement_remarks", lambda *_: [])
+    monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.displacement_remarks", lambda *_: [])
 
 
 def test_an_interrupted_run_says_how_to_go_on(folder, capsys, monkeypatch, without_pictures):
@@ -261,7 +261,7 @@ def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, w
 
     cache = folder / "absent" / "cache"
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
-    monkeypatch.setattr("compare.report.html_report.write_report", full)
+    monkeypatch.setattr("pinnray.comparison.report.html_report.write_report", full)
     monkeypatch.setattr(
         "pinnray.commands.launch._space", lambda path: 10**3 if path.is_relative_to(cache) else 10**9
     )
@@ -270,7 +270,7 @@ def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, w
 
 
 def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "solvers.pinn.finite_basis.presets", None)
+    monkeypatch.setitem(sys.modules, "pinnray.solvers.pinn.finite_basis.presets", None)
     assert main(["compare", "--solvers", "pinn-std"]) == BAD_INPUT
     assert capsys.readouterr().err.startswith("error: solver 'pinn-std' cannot be loaded: ")
 

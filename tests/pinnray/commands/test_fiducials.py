@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pinnray.cli import main
-from vision.calibration.charuco import parse_board
-from vision.tracking.workspace import default_workspace, load_workspace
+from pinnray.vision.calibration.charuco import parse_board
+from pinnray.vision.tracking.workspace import default_workspace, load_workspace
 
 PIXELS_PER_MM = 4
 SVG = "{http://www.w3.org/2000/svg}"
@@ -69,7 +69,7 @@ def test_a_board_that_is_larger_than_the_films_picture_is_told(options, fitting,
 
 
 def test_the_fiducials_are_those_of_the_design_at_the_height_of_its_markers(tmp_path, capsys):
-    from geometry.finger.presets import load_design
+    from pinnray.geometry.finger.presets import load_design
 
     design = load_design("slender")
     options = ["--design", "slender", "--marker-plane", "20", "--out", str(tmp_path)]

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from compare.runtime.exits import INTERRUPTED
-from geometry.processes import child_environment
+from pinnray.comparison.runtime.exits import INTERRUPTED
+from pinnray.geometry.processes import child_environment
 
 ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
@@ -32,7 +32,7 @@ WHILE_MESHING = """
 import sys
 from pathlib import Path
 from pinnray.cli import main
-from geometry import Design, MeshSettings, finger_mesh
+from pinnray.geometry import Design, MeshSettings, finger_mesh
 
 def command():
     finger_mesh(Design(), settings=MeshSettings(size=0.02), cache_dir=Path(sys.argv[1]))  # minutes
@@ -66,7 +66,11 @@ def started(
 def workers(parent: int) -> list[int]:
     """The children that run the worker; libraries start others while they are imported."""
     found = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    return [int(word) for word in found if "geometry.processes" in Path(f"/proc/{word}/cmdline").read_text()]
+    return [
+        int(word)
+        for word in found
+        if "pinnray.geometry.processes" in Path(f"/proc/{word}/cmdline").read_text()
+    ]
 
 
 def runs(process: int) -> bool:

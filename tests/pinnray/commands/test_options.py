@@ -10,7 +10,7 @@ import pytest
 from pinnray.cli import main
 from pinnray.commands.app import COMMANDS, pinnray
 from pinnray.options.shared import PhysicsOptions
-from solvers.problem import Physics
+from pinnray.solvers.problem import Physics
 
 HOMES = {command.rpartition(".")[2]: f"pinnray.commands.{command}" for command in COMMANDS}
 NAMES = [name for name in pinnray if not name.startswith("-")]

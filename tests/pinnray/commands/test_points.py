@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.validation.printed_finger import FINGERS
-from geometry.registration import HAND_HELD
 from pinnray.cli import main
-from vision.measurements import read_measurements
+from pinnray.geometry.registration import HAND_HELD
+from pinnray.vision.measurements import read_measurements
 
 FINGER = FINGERS[1]
 GIVEN = ["points", *map(str, FINGER.clicks), "--section", str(FINGER.drawing)]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pinnray.cli import main
-from vision.calibration.chessboard import Board
-from vision.frames.sources import open_frames, photographs
-from vision.measurements import read_measurements
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.frames.sources import open_frames, photographs
+from pinnray.vision.measurements import read_measurements
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 

@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
-from compare.camera.publication import FrameLine
-from compare.runtime.exits import BAD_INPUT
 from pinnray.cli import main
-from vision.frames.pictures import write_picture
-from vision.frames.sources import open_frames
-from vision.measurements import read_measurements
+from pinnray.comparison.camera.publication import FrameLine
+from pinnray.comparison.runtime.exits import BAD_INPUT
+from pinnray.vision.frames.pictures import write_picture
+from pinnray.vision.frames.sources import open_frames
+from pinnray.vision.measurements import read_measurements
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import shapely
 
-from geometry.finger.presets import load_design
-from solvers.assimilation.misfit import (
+from pinnray.geometry.finger.presets import load_design
+from pinnray.solvers.assimilation.misfit import (
     MarkerSettings,
     disc_quadrature,
     leave_one_out_displacements,
     misfit_of,
     radius_within,
 )
-from solvers.problem import Problem
-from solvers.registry import make_solver
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
 from tests.solvers.conftest import observed_at
 
 

@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import binom, chi2, lognorm, norm, t
 
-from geometry.arrays import FloatArray
-from solvers.assimilation.estimation import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.solvers.assimilation.estimation import (
     Estimate,
     Parameter,
     Prediction,

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
-from solvers.assimilation.pictures import FreePictures
-from solvers.problem import Load, Problem
-from solvers.registry import make_solver
+from pinnray.geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
+from pinnray.solvers.assimilation.pictures import FreePictures
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.registry import make_solver
 from tests.solvers.conftest import hiding, observed_at
 from tests.solvers.contract.test_contract import QUICK
 

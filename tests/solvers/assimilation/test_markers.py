@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from solvers.assimilation.marker_forces import MarkerForces
-from solvers.assimilation.marker_weighting import FACTORS, MarkerWeighting
-from solvers.assimilation.misfit import misfit_of
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.assimilation.marker_forces import MarkerForces
+from pinnray.solvers.assimilation.marker_weighting import FACTORS, MarkerWeighting
+from pinnray.solvers.assimilation.misfit import misfit_of
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import observed_at
 
 MARKERS, UNKNOWNS = 3, 9

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from compare.evaluation.evaluation import Evaluation
-from compare.runtime.provenance import package_versions
-from geometry.finger.design import Design
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solver import Traits, with_law
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.runtime.provenance import package_versions
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Traits, with_law
 
 DATA = Path(__file__).parents[2] / "data"
 NUMBERS, MESH = DATA / "golden.json", DATA / "golden-mesh.npz"

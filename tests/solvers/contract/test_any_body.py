@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from geometry.mesh.quadrature import body_quadrature
-from solvers.energy_and_force import energy_and_force, harmonic_slope, section_slope
-from solvers.problem import Load, Material, Problem, contact_functional
-from solvers.registry import make_solver, usable_solvers
-from solvers.solution import Solution
-from solvers.solver import Traits, with_law
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.solvers.energy_and_force import energy_and_force, harmonic_slope, section_slope
+from pinnray.solvers.problem import Load, Material, Problem, contact_functional
+from pinnray.solvers.registry import make_solver, usable_solvers
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Traits, with_law
 from tests.solvers.bodies import BODIES, body_mesh, mesh_of, ring
 from tests.solvers.conftest import distances, observed_at
 from tests.solvers.contract.test_contract import QUICK
@@ -171,8 +171,8 @@ def test_a_rigid_patch_moves_a_curved_front_as_a_whole(body):
 
 def test_a_cylinder_starts_where_it_touches_a_curved_front_from_outside():
     """At R + r from the centre of a ring of radius R, on its top and beside it."""
-    from solvers.cylinder_contact import CylinderContact
-    from solvers.lagrange import LagrangeSpace
+    from pinnray.solvers.cylinder_contact import CylinderContact
+    from pinnray.solvers.lagrange import LagrangeSpace
 
     mesh = body_mesh("ring", 0.4)
     load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -0.5))
@@ -190,8 +190,8 @@ def test_a_cylinder_starts_where_it_touches_a_curved_front_from_outside():
 
 @pytest.mark.parametrize("body", BODIES)
 def test_the_certificate_of_finite_elements_has_no_fault_on_any_body(body):
-    from compare.evaluation.certification import Certifier
-    from compare.evaluation.evaluation import Evaluation
+    from pinnray.comparison.evaluation.certification import Certifier
+    from pinnray.comparison.evaluation.evaluation import Evaluation
 
     solution = by_fem(body, COARSE)
     found = Certifier(solution.problem).certificate(Evaluation.of(solution, solution.problem.mesh))

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import OutsideBodyError, UserError
-from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.problem import Load, Material, Problem, contact_functional
-from solvers.registry import make_solver, solver_names, usable_solvers
-from solvers.solver import Solver, with_law
+from pinnray.geometry.errors import OutsideBodyError, UserError
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.problem import Load, Material, Problem, contact_functional
+from pinnray.solvers.registry import make_solver, solver_names, usable_solvers
+from pinnray.solvers.solver import Solver, with_law
 from tests.meshes import permuted
 from tests.solvers.conftest import bar_mesh, beam_compliance, check_gradient
 from tests.solvers.plugin.pinnray_skfem import SkfemSolver

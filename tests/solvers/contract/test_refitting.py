@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Problem
-from solvers.registry import make_solver
-from solvers.solver import Refittable, refitter
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Refittable, refitter
 from tests.solvers.conftest import observed_at
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from geometry.errors import UserError
-from solvers.registry import (
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.registry import (
     BUILT_IN,
     FORMER,
     PRESETS,
@@ -14,7 +14,7 @@ from solvers.registry import (
     solver_names,
     usable_solvers,
 )
-from solvers.solver import Traits
+from pinnray.solvers.solver import Traits
 
 
 def test_settings_are_converted_from_text():
@@ -63,7 +63,7 @@ def test_a_solver_of_ours_has_its_family_and_its_twin_assimilates_too(name):
 
 
 def test_a_missing_library_is_said_and_the_other_solvers_work(monkeypatch):
-    monkeypatch.setitem(sys.modules, "solvers.fem.linear", None)
+    monkeypatch.setitem(sys.modules, "pinnray.solvers.fem.linear", None)
     with pytest.raises(MissingLibraryError, match=r"solver 'fem' cannot be loaded: .*solvers\.fem\.linear"):
         make_solver("fem")
     with pytest.warns(UserWarning, match="solver 'fem' is left out"):
@@ -71,8 +71,8 @@ def test_a_missing_library_is_said_and_the_other_solvers_work(monkeypatch):
 
 
 def test_a_missing_dolfinx_is_said_with_the_ways_to_it(monkeypatch):
-    monkeypatch.delitem(sys.modules, "solvers.petsc", raising=False)
-    for module in [name for name in sys.modules if name.startswith("solvers.fem")]:
+    monkeypatch.delitem(sys.modules, "pinnray.solvers.petsc", raising=False)
+    for module in [name for name in sys.modules if name.startswith("pinnray.solvers.fem")]:
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "petsc4py", None)
     with pytest.raises(

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from geometry.errors import UserError
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem import ranks
-from solvers.fem.ranks import communicator, lead, on_all_ranks
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solution import Solution
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem import ranks
+from pinnray.solvers.fem.ranks import communicator, lead, on_all_ranks
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Solution
 
 ranks.PATIENCE_S = 0.5  # for ranks that never come
 RANK = MPI.COMM_WORLD.rank

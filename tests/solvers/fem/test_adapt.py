@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.finger.section import finger_section
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.adaptive_refinement import adapted, largest
-from solvers.fem.linear import FemSolver
-from solvers.problem import Problem
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.section import finger_section
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.adaptive_refinement import adapted, largest
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Problem
 
 
 @pytest.fixture(scope="module")

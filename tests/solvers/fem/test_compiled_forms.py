@@ -8,9 +8,9 @@ from pathlib import Path
 import dolfinx.jit
 import pytest
 
-from solvers.fem import dolfinx_compat
-from solvers.fem.dolfinx_compat import DistributedSpace
-from solvers.lagrange import LagrangeSpace
+from pinnray.solvers.fem import dolfinx_compat
+from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
+from pinnray.solvers.lagrange import LagrangeSpace
 
 
 @pytest.fixture

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from solvers.cylinder_contact import ContactState, CylinderContact
-from solvers.extrusion import ExtrudedSpace
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.fem.finite_strain.load_path import PENETRATION
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.solid import Fem3dSolver
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Material, Problem, contact_ends
+from pinnray.solvers.cylinder_contact import ContactState, CylinderContact
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.fem.finite_strain.load_path import PENETRATION
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.solid import Fem3dSolver
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem, contact_ends
 from tests.solvers.conftest import bar_mesh
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
-from solvers.fem.finite_strain.newton import ConstrainedNewton, NewtonResult
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Material, Problem
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
+from pinnray.solvers.fem.finite_strain.newton import ConstrainedNewton, NewtonResult
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import bar_mesh
 
 LAWS = ("neo-hookean", "st-venant-kirchhoff")

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.fem.error_estimate import ErrorEstimator, GradientRecovery
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Load, Material, Problem
-from solvers.solution import Solution, State
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.fem.error_estimate import ErrorEstimator, GradientRecovery
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import Solution, State
 from tests.solvers.conftest import SHORT, bar_mesh, distances
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material, Problem
 
 
 @pytest.mark.slow

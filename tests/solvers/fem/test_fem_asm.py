@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.assimilation.marker_weighting import FACTORS
-from solvers.assimilation.misfit import MarkerSettings, misfit_of
-from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Material, Problem, contact_functional
+from pinnray.solvers.assimilation.marker_weighting import FACTORS
+from pinnray.solvers.assimilation.misfit import MarkerSettings, misfit_of
+from pinnray.solvers.fem.assimilating import FemAsmSolver
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load, Material, Problem, contact_functional
 from tests.solvers.conftest import distances, hiding, observed_at
 
 LOADS = ("mean", "point", "patch")

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.assimilation.misfit import MarkerSettings, misfit_of
-from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.boundary_conditions import DisplacementConstraints
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.problem import Load, Material, Problem, contact_functional
+from pinnray.solvers.assimilation.misfit import MarkerSettings, misfit_of
+from pinnray.solvers.fem.assimilating import FemAsmSolver
+from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.problem import Load, Material, Problem, contact_functional
 from tests.solvers.conftest import bar_mesh, distances, hiding, observed_at
 
 MESH = bar_mesh(20.0, 2.0, 20, 2, contact=(16.0, 20.0))

@@ -7,13 +7,13 @@ import sys
 
 import pytest
 
-from geometry.processes import child_environment
+from pinnray.geometry.processes import child_environment
 
 PROGRAM = """
 import numpy as np
-from geometry import Design, MeshSettings, Observations, finger_mesh
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
+from pinnray.geometry import Design, MeshSettings, Observations, finger_mesh
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
 
 design = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
 mesh = finger_mesh(design, settings=MeshSettings(size=1.5), across=1)

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from solvers.fem import equilibrium, linear_solvers
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_solvers import Factorisation
-from solvers.problem import Load, Problem
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.fem import equilibrium, linear_solvers
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.linear_solvers import Factorisation
+from pinnray.solvers.problem import Load, Problem
 
 
 @pytest.fixture

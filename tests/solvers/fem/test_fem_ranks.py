@@ -6,9 +6,9 @@ import signal
 import numpy as np
 import pytest
 
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material, Problem
 
 pytestmark = pytest.mark.mpi
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.physics import Load, Material
-from solvers.problem import Problem
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.physics import Load, Material
+from pinnray.solvers.problem import Problem
 from tests.solvers.conftest import bar_mesh
 
 SOFT, STIFF = (10.0, 0.3), (200.0, 0.3)

@@ -5,24 +5,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.finger.section import rib_pitch
-from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.linear import FemSolver
-from solvers.finger_figures import QUANTITIES, break_warning, figures_of
-from solvers.finger_figures.measures import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.section import rib_pitch
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.finger_figures import QUANTITIES, break_warning, figures_of
+from pinnray.solvers.finger_figures.measures import (
     force_curve,
     largest_away_from_corners,
     narrowest_gap,
     thinnest_wall,
     wrap_angle,
 )
-from solvers.problem import Load, Material, Physics, Problem, Substance
-from solvers.registry import make_solver
-from solvers.solution import Solution, Status
+from pinnray.solvers.problem import Load, Material, Physics, Problem, Substance
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Solution, Status
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 import pinnray as pr
-from geometry.cache import finger_mesh
-from geometry.finger.svg import section_svg
-from geometry.mesh.design_motion import MovingMesh
-from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.linear import FemSolver
-from solvers.finger_figures import figures_of
-from solvers.finger_figures.sensitivity import _parameters, sensitivity_of
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.svg import section_svg
+from pinnray.geometry.mesh.design_motion import MovingMesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.finger_figures import figures_of
+from pinnray.solvers.finger_figures.sensitivity import _parameters, sensitivity_of
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.registry import make_solver
 from tests.solvers.conftest import SHORT
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
@@ -47,7 +47,7 @@ def test_the_derivatives_are_those_of_solved_problems(monkeypatch, mesh, law, lo
     """Central differences with a step of 0.0005 mm are within 1e-4: rounding and the step's square."""
     problem = Problem(mesh, Material(law=law), load, None, SHORT)
     found = sensitivity_of(problem)
-    monkeypatch.setattr("solvers.finger_figures.sensitivity.STEP", 5e-4)
+    monkeypatch.setattr("pinnray.solvers.finger_figures.sensitivity.STEP", 5e-4)
     chosen = [each for each in _parameters(problem) if each.name in names]
     assert len(chosen) == len(names)
     for each in chosen:

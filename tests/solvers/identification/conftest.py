@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from solvers.problem import Load, Material, Problem
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.identification.twins import TRUE, marked, model_of, sought, twin
 
 

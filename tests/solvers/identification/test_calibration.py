@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2, norm
 
-from geometry.registration import Registration
-from solvers.fem.identification import FemBody, FemIdSolver
-from solvers.identification.model import MarkerModel
-from solvers.identification.search import Identifier
-from solvers.problem import Material, Problem
+from pinnray.geometry.registration import Registration
+from pinnray.solvers.fem.identification import FemBody, FemIdSolver
+from pinnray.solvers.identification.model import MarkerModel
+from pinnray.solvers.identification.search import Identifier
+from pinnray.solvers.problem import Material, Problem
 from tests.solvers.conftest import observed_at
 
 NOISE, DRAWS = 0.01, 16

@@ -5,16 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from geometry.registration import FIXED, HAND_HELD, Registration
-from solvers.identification.contradiction import (
+from pinnray.geometry.registration import FIXED, HAND_HELD, Registration
+from pinnray.solvers.identification.contradiction import (
     CONTRADICTED,
     EXPLAINED,
     likely_order,
     order_words,
     with_doubts,
 )
-from solvers.solution import Status
-from solvers.solver import NoSolutionError
+from pinnray.solvers.solution import Status
+from pinnray.solvers.solver import NoSolutionError
 from tests.solvers.conftest import observed_at
 
 EXPECTED = np.array([[0.1, -1.0], [0.3, -2.0], [0.2, -4.0], [-0.1, -5.0], [-0.4, -3.0], [-0.5, -0.5]])

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.identification.boundary import Feet
-from solvers.identification.model import EXACT, MarkerData, MarkerModel
-from solvers.identification.unknowns import DEFAULT, SHARE, Unknowns
-from solvers.problem import Load, Material, Problem
+from pinnray.solvers.identification.boundary import Feet
+from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel
+from pinnray.solvers.identification.unknowns import DEFAULT, SHARE, Unknowns
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.test_model import check_taylor

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import ShapeError, UserError
-from solvers.fem.identification import FemBody, fem_law_tracker
-from solvers.identification.model import EXACT, ResponseModel
-from solvers.identification.tracker import ForceTracker
-from solvers.identification.unknowns import DEFAULT, Unknowns
-from solvers.problem import Material
+from pinnray.geometry.errors import ShapeError, UserError
+from pinnray.solvers.fem.identification import FemBody, fem_law_tracker
+from pinnray.solvers.identification.model import EXACT, ResponseModel
+from pinnray.solvers.identification.tracker import ForceTracker
+from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
+from pinnray.solvers.problem import Material
 
 NOISE, RADIUS = 0.005, 0.8
 FORCE, POSITION = (0.2, 0.03), 37.0

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.quadrature import body_quadrature
-from geometry.registration import FIXED, HAND_HELD, Homography, Registration
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.identification import FemBody, FemIdSolver
-from solvers.identification.model import EXACT
-from solvers.identification.search import Identifier
-from solvers.identification.unknowns import DEFAULT, PARTS
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.registration import FIXED, HAND_HELD, Homography, Registration
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.identification import FemBody, FemIdSolver
+from pinnray.solvers.identification.model import EXACT
+from pinnray.solvers.identification.search import Identifier
+from pinnray.solvers.identification.unknowns import DEFAULT, PARTS
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Load
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.twins import NOISE, TRUE, marked, model_of, sought, twin
 

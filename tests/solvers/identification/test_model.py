@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.registration import Registration
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.identification.model import EXACT, MarkerData, MarkerModel
-from solvers.identification.unknowns import CONTACT, DEFAULT, PARTS
+from pinnray.geometry.registration import Registration
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel
+from pinnray.solvers.identification.unknowns import CONTACT, DEFAULT, PARTS
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.twins import NAMES, NOISE, VALUES, model_of, values_of
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from geometry.mesh.wall_motion import WallMotion
-from solvers.elasticity import lame_constants
-from solvers.pinn.finite_basis.presets import PinnStdSolver
-from solvers.pinn.identification import network_body
-from solvers.pinn.identification.network_body import TOLERANCE, NetworkBody
-from solvers.problem import Material, Problem
+from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.solvers.elasticity import lame_constants
+from pinnray.solvers.pinn.finite_basis.presets import PinnStdSolver
+from pinnray.solvers.pinn.identification import network_body
+from pinnray.solvers.pinn.identification.network_body import TOLERANCE, NetworkBody
+from pinnray.solvers.problem import Material, Problem
 
 COARSE = PinnStdSolver(wall_spacing=1.0, corner_spacing=0.2, neurons=4)
 LAME = lame_constants(11.4, 0.4, "strain")

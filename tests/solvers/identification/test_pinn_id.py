@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.identification import FemIdSolver
-from solvers.identification.law_fits import LawFits
-from solvers.identification.model import EXACT, ResponseModel
-from solvers.identification.unknowns import Unknowns
-from solvers.pinn.identification import solver as pinn_id
-from solvers.pinn.identification.network_body import NetworkBody
-from solvers.pinn.identification.solver import PinnIdSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.identification import FemIdSolver
+from pinnray.solvers.identification.law_fits import LawFits
+from pinnray.solvers.identification.model import EXACT, ResponseModel
+from pinnray.solvers.identification.unknowns import Unknowns
+from pinnray.solvers.pinn.identification import solver as pinn_id
+from pinnray.solvers.pinn.identification.network_body import NetworkBody
+from pinnray.solvers.pinn.identification.solver import PinnIdSolver
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import SHORT, distances, observed_at
 
 NOISE = 0.01

@@ -9,7 +9,7 @@ import pinnray as pr
 from benchmarks.validation import fingers
 from benchmarks.validation.fingers import Experiment, distance
 from benchmarks.validation.printed_finger import FINGERS, FRICTION
-from solvers.problem import Load
+from pinnray.solvers.problem import Load
 
 
 @pytest.fixture(autouse=True)

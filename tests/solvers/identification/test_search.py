@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.boundary import mean_thickness
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.finite_strain import nested_path
-from solvers.fem.identification import FemBody, FemIdSolver
-from solvers.identification.law_fits import MOST_LOST, LawFits
-from solvers.identification.model import ResponseModel
-from solvers.identification.result import Identified
-from solvers.identification.search import WIDE, Identifier
-from solvers.identification.unknowns import LAW_ODDS, LAWS
-from solvers.problem import Load, Material, Problem
-from solvers.solver import NoSolutionError
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.boundary import mean_thickness
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.finite_strain import nested_path
+from pinnray.solvers.fem.identification import FemBody, FemIdSolver
+from pinnray.solvers.identification.law_fits import MOST_LOST, LawFits
+from pinnray.solvers.identification.model import ResponseModel
+from pinnray.solvers.identification.result import Identified
+from pinnray.solvers.identification.search import WIDE, Identifier
+from pinnray.solvers.identification.unknowns import LAW_ODDS, LAWS
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solver import NoSolutionError
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.twins import NOISE, TRUE, sought, twin
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from solvers.fem.identification import FemBody, FemIdSolver
-from solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
-from solvers.identification.unknowns import DEFAULT, Unknowns
+from pinnray.solvers.fem.identification import FemBody, FemIdSolver
+from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel, ResponseModel
+from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
 from tests.solvers.conftest import observed_at
 
 NOISE = 0.01

@@ -5,10 +5,10 @@ import pickle
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from solvers.materials import MATERIALS, TensileTest, fitted, preset, read_tensile_test
-from solvers.materials.tensile_test import nominal_stress
-from solvers.registry import make_solver
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.materials import MATERIALS, TensileTest, fitted, preset, read_tensile_test
+from pinnray.solvers.materials.tensile_test import nominal_stress
+from pinnray.solvers.registry import make_solver
 
 STRAIN = np.linspace(0.02, 0.8, 40)
 
@@ -68,7 +68,7 @@ def test_a_test_is_read_with_the_units_of_its_columns(tmp_path):
 
 def test_a_known_material_carries_its_substance_through_options_and_laws():
     from pinnray.options.shared import PhysicsOptions
-    from solvers.solver import with_law
+    from pinnray.solvers.solver import with_law
 
     known = preset("tpu-95a")
     assert (known.material.substance.density, known.material.substance.strain_at_break) == known[1:3]

@@ -7,7 +7,7 @@ Nothing is shared with the package but the mesh, the initial weights and the loa
 import numpy as np
 import torch
 
-from solvers.problem import Problem, contact_functional
+from pinnray.solvers.problem import Problem, contact_functional
 
 
 class PlainMlp(torch.nn.Module):

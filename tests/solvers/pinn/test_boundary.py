@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.mesh.boundary import (
+from pinnray.geometry.mesh.boundary import (
     boundary_loops,
     boundary_widths,
     evenly_spaced_points,
@@ -11,8 +11,8 @@ from geometry.mesh.boundary import (
     re_entrant_points,
     walls_and_ribs,
 )
-from solvers.pinn.finite_basis.point_spacing import NARROW, PointSpacing
-from solvers.problem import Problem
+from pinnray.solvers.pinn.finite_basis.point_spacing import NARROW, PointSpacing
+from pinnray.solvers.problem import Problem
 from tests.solvers.bodies import BODIES, body_mesh
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from solvers.pinn.finite_basis.hard_constraint import CurveDistance, LineDistance, base_distance
+from pinnray.solvers.pinn.finite_basis.hard_constraint import CurveDistance, LineDistance, base_distance
 from tests.solvers.bodies import BODIES, body_mesh
 
 

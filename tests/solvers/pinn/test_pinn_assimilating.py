@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from compare.evaluation.truths import virtual_experiment
-from geometry.mesh.quadrature import body_quadrature
-from solvers.fem.assimilating import FemAsmSolver
-from solvers.pinn.finite_basis.newton import find_equilibrium
-from solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalAsmSolver, PinnStdSolver
-from solvers.pinn.paper.solver import PaperPinnAsmSolver
-from solvers.pinn.paper.trained_field import MlpField
-from solvers.problem import Load, Material, Problem, contact_functional
+from pinnray.comparison.evaluation.truths import virtual_experiment
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.solvers.fem.assimilating import FemAsmSolver
+from pinnray.solvers.pinn.finite_basis.newton import find_equilibrium
+from pinnray.solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalAsmSolver, PinnStdSolver
+from pinnray.solvers.pinn.paper.solver import PaperPinnAsmSolver
+from pinnray.solvers.pinn.paper.trained_field import MlpField
+from pinnray.solvers.problem import Load, Material, Problem, contact_functional
 from tests.solvers.conftest import bar_mesh, hiding, observed_at
 from tests.solvers.pinn.autograd_reference import PlainPinn
 

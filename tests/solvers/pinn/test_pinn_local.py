@@ -7,30 +7,30 @@ import numpy as np
 import pytest
 import torch
 
-from geometry.cache import finger_mesh
-from geometry.errors import UserError
-from geometry.mesh.boundary import boundary_widths, singular_points
-from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.settings import MeshSettings
-from solvers import stability
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.pinn.finite_basis import newton
-from solvers.pinn.finite_basis.energy import NetworkEnergy
-from solvers.pinn.finite_basis.hard_constraint import HardConstraint
-from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
-from solvers.pinn.finite_basis.point_spacing import (
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.mesh.boundary import boundary_widths, singular_points
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers import stability
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.pinn.finite_basis import newton
+from pinnray.solvers.pinn.finite_basis.energy import NetworkEnergy
+from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
+from pinnray.solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
     graded_quadrature,
     graded_triangles,
     spread_points,
 )
-from solvers.pinn.finite_basis.presets import PinnLocalSolver
-from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.pinn.finite_basis.windows import ShepardWindows
-from solvers.pinn.threading import PATCH, boxes_around, cut_into_patches
-from solvers.problem import Load, Material, Problem
-from solvers.solution import State
+from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver
+from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
+from pinnray.solvers.pinn.finite_basis.windows import ShepardWindows
+from pinnray.solvers.pinn.threading import PATCH, boxes_around, cut_into_patches
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import State
 from tests.solvers.conftest import SHORT, bar_mesh, distances
 
 OTHERS = ("linear", "st-venant-kirchhoff")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import torch
 
-from solvers.pinn.paper.collocation import base_points, collocation_points
-from solvers.pinn.paper.modified_mlp import ModifiedMlp
-from solvers.pinn.paper.solver import PaperPinnSolver
-from solvers.pinn.paper.trained_field import assess_training
-from solvers.pinn.threading import torch_threads
-from solvers.problem import Load, Material, Problem
+from pinnray.solvers.pinn.paper.collocation import base_points, collocation_points
+from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
+from pinnray.solvers.pinn.paper.solver import PaperPinnSolver
+from pinnray.solvers.pinn.paper.trained_field import assess_training
+from pinnray.solvers.pinn.threading import torch_threads
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import bar_mesh
 from tests.solvers.pinn.autograd_reference import PlainPinn
 

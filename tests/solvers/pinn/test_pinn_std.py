@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 import torch
 
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.linear import FemSolver
-from solvers.pinn.finite_basis import energy as network_energy
-from solvers.pinn.finite_basis import windows
-from solvers.pinn.finite_basis.presets import PinnLocalSolver, PinnStdSolver
-from solvers.pinn.finite_basis.windows import GateTree
-from solvers.pinn.threading import boxes_around
-from solvers.problem import Load, Problem
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.pinn.finite_basis import energy as network_energy
+from pinnray.solvers.pinn.finite_basis import windows
+from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver, PinnStdSolver
+from pinnray.solvers.pinn.finite_basis.windows import GateTree
+from pinnray.solvers.pinn.threading import boxes_around
+from pinnray.solvers.problem import Load, Problem
 from tests.solvers.conftest import distances
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3}

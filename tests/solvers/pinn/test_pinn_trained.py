@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from solvers.pinn.finite_basis.newton import find_equilibrium
-from solvers.pinn.finite_basis.presets import PinnLocalSolver, TrainedPinnAsmSolver, TrainedPinnSolver
-from solvers.problem import Load, Material, Problem
-from solvers.solver import NoSolutionError
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from pinnray.solvers.pinn.finite_basis.newton import find_equilibrium
+from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver, TrainedPinnAsmSolver, TrainedPinnSolver
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solver import NoSolutionError
 from tests.solvers.conftest import bar_mesh, distances, observed_at
 
 SMALL = {"wall_spacing": 1.6, "corner_spacing": 0.4, "neurons": 3, "tolerance": 0.2}
@@ -127,7 +127,7 @@ def test_a_step_from_a_displacement_of_the_network_is_newtons(bent, law):
 
 
 def test_a_training_that_ends_beside_no_equilibrium_says_so(bent, monkeypatch):
-    monkeypatch.setattr("solvers.pinn.finite_basis.training.find_equilibrium", lambda *_: (None, 3))
+    monkeypatch.setattr("pinnray.solvers.pinn.finite_basis.training.find_equilibrium", lambda *_: (None, 3))
     with pytest.raises(NoSolutionError, match="no equilibrium near"):
         TrainedPinnSolver(**STEPS).solve(bent)
 

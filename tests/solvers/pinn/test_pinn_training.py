@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import torch
 
-from geometry.errors import UserError
-from solvers.pinn.paper.checkpoint import save_checkpoint
-from solvers.pinn.paper.solver import PaperPinnSolver
-from solvers.problem import Load, Problem
-from solvers.solution import Solution
-from solvers.solver import TrainingContext, TrainingDiverged
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.pinn.paper.checkpoint import save_checkpoint
+from pinnray.solvers.pinn.paper.solver import PaperPinnSolver
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import TrainingContext, TrainingDiverged
 from tests.solvers.conftest import bar_mesh
 
 SMALL = PaperPinnSolver(epochs=40, width=8, layers=2, base_points=20, threads=1, checkpoint_every=7)
@@ -145,7 +145,7 @@ def test_tensorboard_gets_every_epoch_once_if_it_is_installed(problem, tmp_path,
         def flush(self) -> None:
             pass
 
-    monkeypatch.setattr("solvers.pinn.paper.checkpoint.find_spec", lambda name: name)
+    monkeypatch.setattr("pinnray.solvers.pinn.paper.checkpoint.find_spec", lambda name: name)
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", SimpleNamespace(SummaryWriter=SummaryWriter))
     context = TrainingContext(tmp_path, resume=True)
     for epochs in (10, 20):

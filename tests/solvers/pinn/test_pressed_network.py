@@ -6,14 +6,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solvers.cylinder_contact import CylinderContact
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.lagrange import LagrangeSpace
-from solvers.pinn.finite_basis import pressed_network
-from solvers.pinn.finite_basis.presets import PinnLocalSolver
-from solvers.pinn.finite_basis.pressed_network import PENETRATION, UPDATES, Minimum, PressedNetwork, Tangent
-from solvers.pinn.finite_basis.solver import estimated_error
-from solvers.problem import Load, Material, Problem
+from pinnray.solvers.cylinder_contact import CylinderContact
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.pinn.finite_basis import pressed_network
+from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver
+from pinnray.solvers.pinn.finite_basis.pressed_network import (
+    PENETRATION,
+    UPDATES,
+    Minimum,
+    PressedNetwork,
+    Tangent,
+)
+from pinnray.solvers.pinn.finite_basis.solver import estimated_error
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import distances
 
 LOCAL = PinnLocalSolver(wall_spacing=0.7, corner_spacing=0.1, tolerance=0.1)

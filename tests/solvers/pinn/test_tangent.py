@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from geometry.errors import UserError
-from solvers.elasticity import lame_constants
-from solvers.pinn.finite_basis.energy import energy_density, piola_stress_and_tangent
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.elasticity import lame_constants
+from pinnray.solvers.pinn.finite_basis.energy import energy_density, piola_stress_and_tangent
 
 
 @pytest.mark.parametrize("law", ["gent", "ogden"])  # one without a tangent here, and one that there is not

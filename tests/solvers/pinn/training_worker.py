@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from solvers.problem import Problem
-from solvers.solver import TrainingContext
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import TrainingContext
 from tests.solvers.conftest import bar_mesh
 from tests.solvers.pinn.test_pinn_training import SMALL
 

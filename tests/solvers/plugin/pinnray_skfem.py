@@ -6,10 +6,10 @@ import numpy as np
 import skfem
 from skfem.models.elasticity import linear_elasticity
 
-from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import contact_functional
-from solvers.solution import Solution, Status
-from solvers.solver import check_problem, silent
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import contact_functional
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import check_problem, silent
 
 
 class SkfemSolver:

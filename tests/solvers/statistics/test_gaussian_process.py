@@ -8,10 +8,10 @@ from scipy.stats import multivariate_normal
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
-from geometry.errors import UserError
-from solvers.problem import Load, Problem
-from solvers.statistics.gaussian_process import GaussianProcessSolver
-from solvers.statistics.kernel_field import SMOOTHNESS
+from pinnray.geometry.errors import UserError
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.statistics.gaussian_process import GaussianProcessSolver
+from pinnray.solvers.statistics.kernel_field import SMOOTHNESS
 from tests.solvers.conftest import check_gradient, hiding, observed_at
 from tests.solvers.statistics.kernels import matern
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.mesh.point_location import LocatedPoints
-from solvers.statistics.kernel_field import SMOOTHNESS, KernelField, correlation
+from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.solvers.statistics.kernel_field import SMOOTHNESS, KernelField, correlation
 from tests.solvers.statistics.kernels import matern
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
-from solvers.statistics.statistical_fem import StatFemSolver
-from solvers.statistics.statistical_posterior import log_root_determinant, minus_log_likelihood
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.statistics.statistical_fem import StatFemSolver
+from pinnray.solvers.statistics.statistical_posterior import log_root_determinant, minus_log_likelihood
 from tests.solvers.conftest import check_gradient, hiding, observed_at
 from tests.solvers.statistics.kernels import matern
 

@@ -4,13 +4,13 @@ import csv
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from geometry.atomic import write_json
-from studies.sweep.job import StudyJob
-from studies.sweep.measurement import Measurement
-from studies.sweep.sampling import samples
-from studies.sweep.store import opened
-from studies.sweep.study import Study, Value, load_study
-from studies.sweep.sweep import JOURNAL, STUDY_FILE
+from pinnray.geometry.atomic import write_json
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.measurement import Measurement
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.store import opened
+from pinnray.studies.sweep.study import Study, Value, load_study
+from pinnray.studies.sweep.sweep import JOURNAL, STUDY_FILE
 
 DATA = Path(__file__).parents[2] / "data" / "sweep"
 """`ref.csv`: force, tip displacement, wrap angle and stress of the first fingers of the study `ref.toml`."""

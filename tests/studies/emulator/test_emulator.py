@@ -9,20 +9,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from geometry.errors import UserError
-from geometry.finger.design import Design
 from pinnray.cli import main
-from solvers.finger_figures import QUANTITIES, Quantity
-from solvers.finger_figures.measures import narrowest_gap, thinnest_wall
-from studies.emulator import emulator as module
-from studies.emulator import store
-from studies.emulator.emulator import Emulator
-from studies.emulator.inputs import Inputs
-from studies.emulator.store import FILE, emulator_of
-from studies.sweep.sampling import samples
-from studies.sweep.store import opened
-from studies.sweep.study import Study, Value
-from studies.sweep.sweep import JOURNAL, load_sweep
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.solvers.finger_figures import QUANTITIES, Quantity
+from pinnray.solvers.finger_figures.measures import narrowest_gap, thinnest_wall
+from pinnray.studies.emulator import emulator as module
+from pinnray.studies.emulator import store
+from pinnray.studies.emulator.emulator import Emulator
+from pinnray.studies.emulator.inputs import Inputs
+from pinnray.studies.emulator.store import FILE, emulator_of
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.store import opened
+from pinnray.studies.sweep.study import Study, Value
+from pinnray.studies.sweep.sweep import JOURNAL, load_sweep
 from tests.studies.emulator.sweeps import DATA, solved_sweep, synthetic_sweep
 
 TRAINED = 200

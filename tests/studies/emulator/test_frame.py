@@ -5,11 +5,11 @@ import csv
 import numpy as np
 import pytest
 
-from geometry.finger.parameters import Parameters
-from solvers.problem import Material
-from studies.emulator.frame import SHEAR_SHARE, BeamFrame, _stiffness
-from studies.sweep.sampling import samples
-from studies.sweep.study import load_study
+from pinnray.geometry.finger.parameters import Parameters
+from pinnray.solvers.problem import Material
+from pinnray.studies.emulator.frame import SHEAR_SHARE, BeamFrame, _stiffness
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.study import load_study
 from tests.studies.emulator.sweeps import DATA
 
 TRAVEL = (0.0, -10.0)

@@ -5,7 +5,7 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, WhiteKernel
 
-from studies.emulator.gaussian_process import GaussianProcess
+from pinnray.studies.emulator.gaussian_process import GaussianProcess
 
 
 def samples(count: int, noise: float) -> tuple[np.ndarray, np.ndarray]:

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from geometry.finger.presets import load_design
-from solvers.lagrange import LagrangeSpace
-from studies.emulator.inputs import Inputs
-from studies.fields.snapshots import KnownSamples, Snapshots
-from studies.sweep.sampling import samples
-from studies.sweep.study import Study, Value
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.presets import load_design
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.studies.emulator.inputs import Inputs
+from pinnray.studies.fields.snapshots import KnownSamples, Snapshots
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.study import Study, Value
 
 STROKES = 5
 

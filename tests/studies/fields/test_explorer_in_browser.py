@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page
 
-from geometry.errors import UserError
-from studies.fields.emulator import FieldEmulator, fitted_fields
-from studies.fields.explorer import write_explorer
-from studies.fields.live import HOST, handler
+from pinnray.geometry.errors import UserError
+from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields
+from pinnray.studies.fields.explorer import write_explorer
+from pinnray.studies.fields.live import HOST, handler
 from tests.compare.report.browser import chromium, opened
 from tests.studies.fields.synthetic import known, snapshots, study
 

@@ -5,22 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.finger.design import Design
-from geometry.finger.presets import load_design
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.finger_figures import figures_of
-from solvers.finger_figures.measures import wrap_angle
-from solvers.lagrange import LagrangeField
-from solvers.problem import Load, Material, Problem
-from studies.fields.emulator import FieldEmulator, fitted_fields, places
-from studies.fields.reader import FieldReader
-from studies.fields.store import _assembled, _parts, fields_of
-from studies.sweep.field_path import FieldPath, MovedMesh
-from studies.sweep.job import StudyJob
-from studies.sweep.sampling import samples
-from studies.sweep.study import Study
-from studies.sweep.sweep import run_sweep
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.presets import load_design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.finger_figures import figures_of
+from pinnray.solvers.finger_figures.measures import wrap_angle
+from pinnray.solvers.lagrange import LagrangeField
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields, places
+from pinnray.studies.fields.reader import FieldReader
+from pinnray.studies.fields.store import _assembled, _parts, fields_of
+from pinnray.studies.sweep.field_path import FieldPath, MovedMesh
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.study import Study
+from pinnray.studies.sweep.sweep import run_sweep
 from tests.studies.fields.synthetic import STROKES, field, known, numbers, snapshots, study
 
 
@@ -86,7 +86,7 @@ CHANGED = {
     "a sample was lost for another reason": lambda patch, now: replace(now, reasons=["refused"]),
     "samples of other values": lambda patch, now: replace(now, samples=now.samples[::-1]),
     "another version of a library": lambda patch, now: (
-        patch.setattr("studies.fields.store.package_versions", lambda: {"scipy": "9"}),
+        patch.setattr("pinnray.studies.fields.store.package_versions", lambda: {"scipy": "9"}),
         now,
     )[1],
 }
@@ -96,10 +96,10 @@ CHANGED = {
 def test_an_emulator_is_kept_for_what_it_was_fitted_to(what, emulator, tmp_path, monkeypatch):
     now = known(study(), [{"contact_position": 59.0, "radius": 4.5}])
     fitted = []
-    monkeypatch.setattr("studies.fields.store.KnownSamples.of", lambda folder: now)
-    monkeypatch.setattr("studies.fields.store.Snapshots.load", lambda known: known)
+    monkeypatch.setattr("pinnray.studies.fields.store.KnownSamples.of", lambda folder: now)
+    monkeypatch.setattr("pinnray.studies.fields.store.Snapshots.load", lambda known: known)
     monkeypatch.setattr(
-        "studies.fields.store.fitted_fields", lambda known, stages: fitted.append(known) or emulator
+        "pinnray.studies.fields.store.fitted_fields", lambda known, stages: fitted.append(known) or emulator
     )
     fields_of(tmp_path)
     now = CHANGED[what](monkeypatch, now)

@@ -2,9 +2,9 @@
 
 from matplotlib.patches import Rectangle
 
-from studies.gridsearch.chart import draw_grid
-from studies.gridsearch.training_run import DIVERGED, TRAINED, GridPoint, TrainingRun
-from studies.sweep.quantities import TRAINING
+from pinnray.studies.gridsearch.chart import draw_grid
+from pinnray.studies.gridsearch.training_run import DIVERGED, TRAINED, GridPoint, TrainingRun
+from pinnray.studies.sweep.quantities import TRAINING
 from tests.compare.figures.drawn_pages import page_of
 
 

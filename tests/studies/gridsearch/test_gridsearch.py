@@ -10,25 +10,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compare.runtime.exits import NOT_CONVERGED
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
 from pinnray.cli import main
 from pinnray.commands.studies.gridsearch import read_settings
+from pinnray.comparison.runtime.exits import NOT_CONVERGED
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.shared import SolverOptions
-from solvers.fem.linear import FemSolver
-from solvers.lagrange import LagrangeField
-from solvers.problem import Load, Problem
-from solvers.solution import Solution
-from solvers.solver import TrainingDiverged
-from studies.gridsearch.search import grid_study, search_grid
-from studies.gridsearch.training_run import DIVERGED, FAILED, TRAINED, GridPoint, TrainingRun, best_of
-from studies.sweep.job import StudyJob, Task
-from studies.sweep.measurement import Measurement, measured
-from studies.sweep.quantities import TRAINING, training
-from studies.sweep.study import Study
-from studies.sweep.workers import Workers
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.lagrange import LagrangeField
+from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import TrainingDiverged
+from pinnray.studies.gridsearch.search import grid_study, search_grid
+from pinnray.studies.gridsearch.training_run import DIVERGED, FAILED, TRAINED, GridPoint, TrainingRun, best_of
+from pinnray.studies.sweep.job import StudyJob, Task
+from pinnray.studies.sweep.measurement import Measurement, measured
+from pinnray.studies.sweep.quantities import TRAINING, training
+from pinnray.studies.sweep.study import Study
+from pinnray.studies.sweep.workers import Workers
 from tests.compare.tables import rows_of
 
 TINY = {"preset": "paper", "epochs": 2, "width": 4, "layers": 1, "base_points": 5}
@@ -126,7 +126,7 @@ def test_a_run_without_a_solution_says_why(wanted, monkeypatch, error, state):
     def refused(*_: object) -> Solution:
         raise error
 
-    monkeypatch.setattr("solvers.pinn.paper.solver.PaperPinnSolver.solve", refused)
+    monkeypatch.setattr("pinnray.solvers.pinn.paper.solver.PaperPinnSolver.solve", refused)
     ended = measured(wanted.task(0, {"pinn-std.learning_rate": 1e-2, "pinn-std.bc_weight": 1.0}))
     assert (ended.state, ended.message, ended.values) == (state, str(error), {})
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.optimum.front import hypervolume, reference_point, unbeaten
+from pinnray.studies.optimum.front import hypervolume, reference_point, unbeaten
 
 
 def test_a_front_is_what_no_point_beats() -> None:

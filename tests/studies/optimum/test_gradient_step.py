@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.optimum.gradient_step import TRUST, stepped
-from studies.optimum.page import steps_sentence
-from studies.optimum.question import Limit, Question
-from studies.optimum.search import search_front
-from studies.sweep.job import StudyJob
-from studies.sweep.measurement import measured
+from pinnray.studies.optimum.gradient_step import TRUST, stepped
+from pinnray.studies.optimum.page import steps_sentence
+from pinnray.studies.optimum.question import Limit, Question
+from pinnray.studies.optimum.search import search_front
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.measurement import measured
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -79,8 +79,8 @@ def test_no_step_leads_on_from_a_corner_of_the_ranges():
 @pytest.mark.slow
 def test_a_search_ends_with_the_steps_and_says_what_they_gained(tmp_path, monkeypatch, in_line):
     asked = question(runs=20, steps=2)
-    monkeypatch.setattr("studies.optimum.proposals.POPULATION", 16)
-    monkeypatch.setattr("studies.optimum.proposals.GENERATIONS", 4)
+    monkeypatch.setattr("pinnray.studies.optimum.proposals.POPULATION", 16)
+    monkeypatch.setattr("pinnray.studies.optimum.proposals.GENERATIONS", 4)
     found = search_front(StudyJob(asked, Path(), tmp_path / "out", 2))
     assert 20 < len(found.measurements) <= 22
     assert (np.diff(found.volumes[19:]) >= 0).all()

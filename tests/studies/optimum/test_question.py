@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.optimum.question import Question, load_question
+from pinnray.studies.optimum.question import Question, load_question
 
 GOOD = """
 mesh_size = 2.0

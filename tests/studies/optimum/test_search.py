@@ -7,23 +7,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation.deformed_body import THROUGH_ITSELF
-from geometry.cache import finger_mesh
-from geometry.drawing.drawn_finger import finger_from
-from geometry.errors import UserError
-from geometry.finger.presets import load_design
 from pinnray.cli import main
-from solvers.finger_figures import QUANTITIES
-from solvers.problem import Problem
-from studies.optimum.designs import write_designs
-from studies.optimum.page import front_grid, front_sentences, page_tables
-from studies.optimum.pictures import cylinder_at_end
-from studies.optimum.question import Limit, Question
-from studies.optimum.search import Optimum, search_front
-from studies.sweep.job import StudyJob, Task
-from studies.sweep.measurement import Measurement, measured
-from studies.sweep.store import Journal
-from studies.sweep.study import physics_of
+from pinnray.comparison.evaluation.deformed_body import THROUGH_ITSELF
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.drawing.drawn_finger import finger_from
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.presets import load_design
+from pinnray.solvers.finger_figures import QUANTITIES
+from pinnray.solvers.problem import Problem
+from pinnray.studies.optimum.designs import write_designs
+from pinnray.studies.optimum.page import front_grid, front_sentences, page_tables
+from pinnray.studies.optimum.pictures import cylinder_at_end
+from pinnray.studies.optimum.question import Limit, Question
+from pinnray.studies.optimum.search import Optimum, search_front
+from pinnray.studies.sweep.job import StudyJob, Task
+from pinnray.studies.sweep.measurement import Measurement, measured
+from pinnray.studies.sweep.store import Journal
+from pinnray.studies.sweep.study import physics_of
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 
@@ -61,16 +61,16 @@ def judge(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
 def quick() -> Iterator[None]:
     """Fewer rounds and a smaller population: the known front is easy."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("studies.optimum.search.ROUNDS", 2)
-        patch.setattr("studies.optimum.proposals.POPULATION", 32)
-        patch.setattr("studies.optimum.proposals.GENERATIONS", 10)
+        patch.setattr("pinnray.studies.optimum.search.ROUNDS", 2)
+        patch.setattr("pinnray.studies.optimum.proposals.POPULATION", 32)
+        patch.setattr("pinnray.studies.optimum.proposals.GENERATIONS", 10)
         yield
 
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Optimum:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("studies.optimum.search.finish", judge)
+        patch.setattr("pinnray.studies.optimum.search.finish", judge)
         return search_front(StudyJob(QUESTION, Path(), tmp_path_factory.mktemp("known") / "out", 1))
 
 
@@ -90,7 +90,7 @@ def test_the_hypervolume_grows_past_that_of_the_samples(found: Optimum) -> None:
 
 
 def test_the_same_seed_has_the_same_runs_to_the_bit(found, tmp_path, monkeypatch):
-    monkeypatch.setattr("studies.optimum.search.finish", judge)
+    monkeypatch.setattr("pinnray.studies.optimum.search.finish", judge)
     again = search_front(StudyJob(QUESTION, Path(), tmp_path / "out", 1))
     assert again.fingers == found.fingers
     assert again.measurements == found.measurements
@@ -103,10 +103,10 @@ def test_a_search_that_was_stopped_goes_on_to_the_same_runs(found, tmp_path, mon
         judge(tasks, journal)
 
     job = StudyJob(QUESTION, Path(), tmp_path / "out", 1)
-    monkeypatch.setattr("studies.optimum.search.finish", interrupted)
+    monkeypatch.setattr("pinnray.studies.optimum.search.finish", interrupted)
     with pytest.raises(KeyboardInterrupt):
         search_front(job)
-    monkeypatch.setattr("studies.optimum.search.finish", judge)
+    monkeypatch.setattr("pinnray.studies.optimum.search.finish", judge)
     assert search_front(job).fingers == found.fingers
 
 
@@ -119,7 +119,7 @@ def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, 
             said = f"{THROUGH_ITSELF}; converged" if crossed else ""
             journal.add(Measurement(number, "done", said, 0.0, judged(tasks[number])))
 
-    monkeypatch.setattr("studies.optimum.search.finish", strict)
+    monkeypatch.setattr("pinnray.studies.optimum.search.finish", strict)
     other = search_front(StudyJob(QUESTION, Path(), tmp_path / "out", 1))
     crossed = [n for n, finger in enumerate(other.fingers) if finger["rib_count"] == best]
     assert crossed
@@ -128,7 +128,7 @@ def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, 
 
 
 def test_constraints_that_nothing_obeys_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.optimum.search.finish", judge)
+    monkeypatch.setattr("pinnray.studies.optimum.search.finish", judge)
     asked = QUESTION.model_copy(update={"constraints": {"von_mises": Limit(at_most=0.1)}})
     with pytest.raises(UserError, match=r"none of 42 runs obeys the constraints \(42 converged\); relax"):
         search_front(StudyJob(asked, Path(), tmp_path / "out", 1))
@@ -136,7 +136,7 @@ def test_constraints_that_nothing_obeys_are_told(tmp_path: Path, monkeypatch: py
 
 def test_the_command_writes_the_front(tmp_path, capsys, monkeypatch):
     """The tutorial of the page for designers has the same on fingers that are solved."""
-    monkeypatch.setattr("studies.optimum.search.finish", judge)
+    monkeypatch.setattr("pinnray.studies.optimum.search.finish", judge)
     path = tmp_path / "small.toml"
     path.write_text(
         'mesh_size = 2.0\nruns = 40\n[objectives]\nwrap = "largest"\nforce = "least"\n'
@@ -195,7 +195,7 @@ def test_a_search_with_few_converged_runs_takes_further_samples(tmp_path, monkey
             values = judged(tasks[number]) if state == "done" else {}
             journal.add(Measurement(number, state, "", 0.0, values))
 
-    monkeypatch.setattr("studies.optimum.search.finish", hard)
+    monkeypatch.setattr("pinnray.studies.optimum.search.finish", hard)
     asked = QUESTION.model_copy(update={"runs": 20, "samples": 12})
     found = search_front(StudyJob(asked, Path(), tmp_path / "out", 1))
     assert len(found.measurements) == 20

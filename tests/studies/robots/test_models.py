@@ -6,16 +6,16 @@ import gmsh
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.mesh.settings import MeshSettings
-from solvers.physics import Material
-from studies.robots.chain import MM, Chain
-from studies.robots.mjcf import Damping, chain_mjcf
-from studies.robots.simulation import chain_front
-from studies.robots.sofa import sofa_scene
-from studies.robots.solid_files import write_msh
-from studies.robots.solid_mesh import SolidMesh
-from studies.robots.springs import Springs
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.physics import Material
+from pinnray.studies.robots.chain import MM, Chain
+from pinnray.studies.robots.mjcf import Damping, chain_mjcf
+from pinnray.studies.robots.simulation import chain_front
+from pinnray.studies.robots.sofa import sofa_scene
+from pinnray.studies.robots.solid_files import write_msh
+from pinnray.studies.robots.solid_mesh import SolidMesh
+from pinnray.studies.robots.springs import Springs
 from tests.solvers.conftest import SHORT
 
 DENSITY = 1200.0

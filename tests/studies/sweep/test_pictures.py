@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.sweep.job import StudyJob
-from studies.sweep.measurement import Measurement
-from studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs
-from studies.sweep.sampling import samples
-from studies.sweep.study import Study, load_study
-from studies.sweep.sweep import Sweep
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.measurement import Measurement
+from pinnray.studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.study import Study, load_study
+from pinnray.studies.sweep.sweep import Sweep
 from tests.compare.figures.drawn_pages import page_of
 from tests.studies.sweep.test_sweep import study_file
 

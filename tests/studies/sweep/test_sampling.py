@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from studies.sweep.sampling import place_of, samples, value_at
-from studies.sweep.study import Range, Study
+from pinnray.studies.sweep.sampling import place_of, samples, value_at
+from pinnray.studies.sweep.study import Range, Study
 
 VARIED = {
     "rib_count": {"from": 2, "to": 5},

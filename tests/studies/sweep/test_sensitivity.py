@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import sobol_indices, uniform
 
-from geometry.arrays import FloatArray
-from studies.sweep.measurement import Measurement
-from studies.sweep.sampling import samples
-from studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
-from studies.sweep.study import Study
-from studies.sweep.sweep import Sweep
+from pinnray.geometry.arrays import FloatArray
+from pinnray.studies.sweep.measurement import Measurement
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
+from pinnray.studies.sweep.study import Study
+from pinnray.studies.sweep.sweep import Sweep
 
 VARIED = {
     "height": {"from": 80, "to": 100},

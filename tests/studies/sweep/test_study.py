@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from studies.sweep.job import StudyJob
-from studies.sweep.sampling import samples
-from studies.sweep.study import load_study, physics_of
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.study import load_study, physics_of
 
 GOOD = 'sampling = "sobol"\nsamples = 4\n[varied]\nrib_thickness = {from = 1, to = 2}\n'
 

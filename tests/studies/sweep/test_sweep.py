@@ -17,24 +17,24 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from compare.figures.style import axes_at
-from geometry.cache import cad_files
-from geometry.errors import UserError
-from geometry.figure import figure
-from geometry.finger.design import Design
 from pinnray.cli import main
-from solvers.solution import Solution
-from studies.sweep.job import StudyJob
-from studies.sweep.measurement import Measurement, measured
-from studies.sweep.page import slow_sentence
-from studies.sweep.pictures import draw_medians
-from studies.sweep.quantities import quantities
-from studies.sweep.sampling import samples
-from studies.sweep.store import opened
-from studies.sweep.study import load_study
-from studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
-from studies.sweep.tables import failure_grid, sample_table
-from studies.sweep.workers import Workers
+from pinnray.comparison.figures.style import axes_at
+from pinnray.geometry.cache import cad_files
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.figure import figure
+from pinnray.geometry.finger.design import Design
+from pinnray.solvers.solution import Solution
+from pinnray.studies.sweep.job import StudyJob
+from pinnray.studies.sweep.measurement import Measurement, measured
+from pinnray.studies.sweep.page import slow_sentence
+from pinnray.studies.sweep.pictures import draw_medians
+from pinnray.studies.sweep.quantities import quantities
+from pinnray.studies.sweep.sampling import samples
+from pinnray.studies.sweep.store import opened
+from pinnray.studies.sweep.study import load_study
+from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
+from pinnray.studies.sweep.tables import failure_grid, sample_table
+from pinnray.studies.sweep.workers import Workers
 from tests.pinnray.commands.programs import COMMAND
 from tests.studies.sweep.workers import answered, die_at_one, hang_at_one
 
@@ -95,7 +95,7 @@ def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: 
         solution, values = quantities(*given, **named)
         return solution, {**values, "von_mises": float("nan")}
 
-    monkeypatch.setattr("studies.sweep.measurement.quantities", without_stress)
+    monkeypatch.setattr("pinnray.studies.sweep.measurement.quantities", without_stress)
     sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
     found = measured(
         StudyJob(load_study(study_file(tmp_path, 1)), tmp_path, tmp_path / "out").task(1, sample)
@@ -130,7 +130,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def children(parent: int) -> set[int]:
     """Worker processes of a sweep."""
     listed = subprocess.run(
-        ["pgrep", "-P", str(parent), "-f", "geometry.processes"], capture_output=True, text=True
+        ["pgrep", "-P", str(parent), "-f", "pinnray.geometry.processes"], capture_output=True, text=True
     )
     return {int(word) for word in listed.stdout.split()}
 
@@ -200,15 +200,15 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
 def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     tmp_path, monkeypatch, request, ending, limit, state, said
 ):
-    monkeypatch.setattr("studies.sweep.workers._measured", ending)
-    monkeypatch.setattr("studies.sweep.workers.GRACE_S", 1.0)
-    monkeypatch.setattr("studies.sweep.workers.DEATHS", 2)
+    monkeypatch.setattr("pinnray.studies.sweep.workers._measured", ending)
+    monkeypatch.setattr("pinnray.studies.sweep.workers.GRACE_S", 1.0)
+    monkeypatch.setattr("pinnray.studies.sweep.workers.DEATHS", 2)
     study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
     sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", state, "done"]
     assert [(row[0], row[2]) for row in failure_grid(sweep).rows] == [(state, said)]
     assert list(sample_table(sweep)["state"]) == ["done", state, "done"]
-    monkeypatch.setattr("studies.sweep.workers._measured", answered)
+    monkeypatch.setattr("pinnray.studies.sweep.workers._measured", answered)
     request.getfixturevalue("in_line")
     longer = study.model_copy(update={"time_limit": 600.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
@@ -244,7 +244,7 @@ def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(monk
             raise KilledWorker("sample", SimpleNamespace(address="tcp://a"), 0)  # as the scheduler does
         return answered(task)
 
-    monkeypatch.setattr("studies.sweep.workers.measured", dying)
+    monkeypatch.setattr("pinnray.studies.sweep.workers.measured", dying)
     tasks = {number: SimpleNamespace(number=number) for number in range(3)}
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,

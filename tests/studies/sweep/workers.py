@@ -4,7 +4,7 @@ import os
 import signal
 import time
 
-from studies.sweep.measurement import Measurement
+from pinnray.studies.sweep.measurement import Measurement
 
 
 def die_at_one(task: object, report: object) -> Measurement:

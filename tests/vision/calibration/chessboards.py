@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from geometry.arrays import BoolArray, FloatArray
-from vision.calibration.camera import Camera, Pose
-from vision.calibration.charuco import DICTIONARIES, CharucoBoard
-from vision.calibration.chessboard import Board
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.calibration.charuco import DICTIONARIES, CharucoBoard
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.frames.frame import GreyImage
 
 BOARD = Board(9, 6, 25.0)
 CAMERA = Camera(1280, 720, 1100.0, 1095.0, 652.0, 349.0, distortion=(-0.25, 0.08, 1e-3, -5e-4, 0.0))

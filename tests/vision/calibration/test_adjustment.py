@@ -7,8 +7,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
+from pinnray.vision.calibration.bundle_adjustment import Poses, adjust
 from tests.vision.calibration.chessboards import BOARD, CAMERA, poses, views
-from vision.calibration.bundle_adjustment import Poses, adjust
 
 ALL = np.array(list(views(6, noise=0.3).values()))
 SOME = np.where(np.random.default_rng(5).random((6, 54, 1)) < 0.4, ALL, np.nan)

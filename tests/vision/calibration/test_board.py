@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pinnray.vision.calibration.camera import Pose
+from pinnray.vision.calibration.chessboard import Board
 from tests.vision.calibration.chessboards import BOARD, drawn, through_fisheye
-from vision.calibration.camera import Pose
-from vision.calibration.chessboard import Board
 
 SMALL = Board(5, 4, 10.0)
 TO_PIXELS = np.array([[4.2, 0.7, 90.0], [-0.5, 3.9, 75.0], [1e-3, -6e-4, 1.0]])
@@ -19,7 +19,7 @@ def test_corners_are_found_where_they_are():
     exact = np.column_stack([SMALL.corners[:, :2], np.ones(20)]) @ TO_PIXELS.T
     exact = exact[:, :2] / exact[:, 2:]
     error = min(np.abs(order - exact).max() for order in (found, found[::-1]))  # a board has no up
-    assert error < 0.02  # 0.06 without the fit of `vision.calibration.corner_refinement`
+    assert error < 0.02  # 0.06 without the fit of `pinnray.vision.calibration.corner_refinement`
     assert Board(6, 4, 10.0).find(image) is None
     assert Board(6, 4, 10.0).suggest(image) == "5x4"
 

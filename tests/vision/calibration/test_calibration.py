@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.errors import UserError
 from pinnray.cli import main
+from pinnray.geometry.errors import UserError
+from pinnray.vision.calibration import lens_fit
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.calibration.camera_calibration import better_lens, calibrate_camera, calibrate_views
+from pinnray.vision.calibration.camera_file import load_camera
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.calibration.lens_fit import LensChoice
+from pinnray.vision.frames.sources import photographs
 from tests.vision.calibration.chessboards import BOARD, CAMERA, drawn, views
-from vision.calibration import lens_fit
-from vision.calibration.camera import Camera, Pose
-from vision.calibration.camera_calibration import better_lens, calibrate_camera, calibrate_views
-from vision.calibration.camera_file import load_camera
-from vision.calibration.chessboard import Board
-from vision.calibration.lens_fit import LensChoice
-from vision.frames.sources import photographs
 
 SIZE = (CAMERA.width, CAMERA.height)
 NOISE = 0.05
@@ -244,5 +244,5 @@ def test_the_photographs_of_opencv_give_their_known_camera(model):
     assert found.left_out == {}
     assert 530 < found.camera.fx < 540
     assert abs(found.camera.fy - found.camera.fx) < 3
-    assert found.rms < 0.2  # 0.23 without the fit of `vision.calibration.corner_refinement`
+    assert found.rms < 0.2  # 0.23 without the fit of `pinnray.vision.calibration.corner_refinement`
     assert found.rms < found.held_out_rms < 0.22

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera_file import load_camera, save_camera
 from tests.vision.calibration.chessboards import BOARD, CAMERA, poses, projected
-from vision.calibration.camera import Camera
-from vision.calibration.camera_file import load_camera, save_camera
 
 GRID = np.stack(np.meshgrid(np.linspace(0, 1279, 17), np.linspace(0, 719, 11)), axis=-1).reshape(-1, 2)
 BARREL = replace(CAMERA, distortion=(-0.35, 0.15, 2e-3, -1e-3, -0.03))

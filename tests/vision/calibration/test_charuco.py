@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.arrays import FloatArray
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera import Pose
+from pinnray.vision.calibration.charuco import CharucoBoard
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.frames.frame import GreyImage
 from tests.vision.calibration.chessboards import photographed
-from vision.calibration.camera import Pose
-from vision.calibration.charuco import CharucoBoard
-from vision.calibration.chessboard import Board
-from vision.frames.frame import GreyImage
 
 CHARUCO = CharucoBoard(7, 5, 20.0, 15.0, "5X5_100")
 TILTS = [(20, -15, 5), (5, 30, 170)]

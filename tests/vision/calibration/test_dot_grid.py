@@ -6,11 +6,11 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from geometry.arrays import FloatArray
-from vision.calibration.camera_calibration import calibrate_views
-from vision.calibration.charuco import parse_board
-from vision.calibration.dot_grid import DotGrid
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera_calibration import calibrate_views
+from pinnray.vision.calibration.charuco import parse_board
+from pinnray.vision.calibration.dot_grid import DotGrid
+from pinnray.vision.frames.frame import GreyImage
 
 SIZE, FOCAL, SAMPLES = (640, 480), 700.0, 2
 CIRCLES, SHIFTED = DotGrid(7, 6, 10.0), DotGrid(4, 11, 7.5, asymmetric=True)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from vision.calibration.camera_calibration import calibrate_camera
-from vision.calibration.charuco import CharucoBoard
-from vision.calibration.chessboard import Board
-from vision.rig.boards import board_poses, board_scene
-from vision.rig.exposure import Exposure
-from vision.rig.render import render
-from vision.rig.virtual_camera import default_camera
+from pinnray.vision.calibration.camera_calibration import calibrate_camera
+from pinnray.vision.calibration.charuco import CharucoBoard
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.rig.boards import board_poses, board_scene
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.render import render
+from pinnray.vision.rig.virtual_camera import default_camera
 
 pytestmark = pytest.mark.slow
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from vision.calibration.corner_refinement import refine_corners
+from pinnray.vision.calibration.corner_refinement import refine_corners
 
 SIZE, FINE = 40, 20
 EDGES = np.array([[[1.0, 0.1], [-0.3, 1.0]]])

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from geometry.arrays import FloatArray
-from vision.frames.frame import GreyImage
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.frames.frame import GreyImage
 
 CHORDS = 16
 """A pixel of radius."""

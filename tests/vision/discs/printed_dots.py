@@ -6,12 +6,12 @@ from math import ceil
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from vision.calibration.camera import Camera, Pose
-from vision.frames.frame import GreyImage
-from vision.rig.exposure import Exposure
-from vision.rig.render import render
-from vision.rig.shapes import Scene, Shape, blot, circle, closed, rectangle
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.frames.frame import GreyImage
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.render import render
+from pinnray.vision.rig.shapes import Scene, Shape, blot, circle, closed, rectangle
 
 PAPER, INK = 0.75, 0.2
 """Reflectances."""

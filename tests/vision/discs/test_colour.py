@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pinnray.vision.discs.colour import DARK, ColourRange, Darker, read_colour
 from tests.vision.discs.dots import dots
-from vision.discs.colour import DARK, ColourRange, Darker, read_colour
 
 WHITE = (0.95047, 1.0, 1.08883)
 """XYZ of D65."""

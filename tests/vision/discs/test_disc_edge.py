@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from pinnray.vision.discs.disc_fit import FittedDiscs, fit_discs
 from tests.vision.discs.disc_images import DiscImage, Edge
-from vision.discs.disc_fit import FittedDiscs, fit_discs
 
 COUNT = 60
 

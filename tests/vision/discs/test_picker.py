@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from pinnray.vision.discs.colour import ColourRange, read_colour
+from pinnray.vision.discs.colour_picker import pick_colour
 from tests.vision.discs.dots import Dots, dots
-from vision.discs.colour import ColourRange, read_colour
-from vision.discs.colour_picker import pick_colour
 
 COLOURS = {
     "black": (45, 45, 45),

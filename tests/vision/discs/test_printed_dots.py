@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from tests.vision import films
-from tests.vision.discs import printed_dots
-from tests.vision.discs.printed_dots import INK, PAPER, PrintedDots, darkness_centroids
-from vision.discs import fit_stages
-from vision.discs.disc_detector import luma_of
-from vision.discs.disc_fit import FittedDiscs, fit_discs
-from vision.discs.disc_image_model import (
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.vision.discs import fit_stages
+from pinnray.vision.discs.disc_detector import luma_of
+from pinnray.vision.discs.disc_fit import FittedDiscs, fit_discs
+from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     COUNT,
@@ -27,13 +24,16 @@ from vision.discs.disc_image_model import (
     RADIUS,
     disc_image,
 )
-from vision.discs.least_squares import behind_clipping
-from vision.discs.pixel_windows import DARKEST, LIGHTEST
-from vision.rig.bench import Bench
-from vision.rig.exposure import Exposure
-from vision.rig.shapes import area, blot, centroid, closed
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
+from pinnray.vision.discs.least_squares import behind_clipping
+from pinnray.vision.discs.pixel_windows import DARKEST, LIGHTEST
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.shapes import area, blot, centroid, closed
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
+from tests.vision import films
+from tests.vision.discs import printed_dots
+from tests.vision.discs.printed_dots import INK, PAPER, PrintedDots, darkness_centroids
 
 COUNTED = 48
 

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.finger.design import Design
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.design import Design
+from pinnray.vision.discs.circle_proposals import highlight_colour, propose_circles
+from pinnray.vision.discs.colour import DARK, ColourRange
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.render import render
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.workspace import default_workspace
 from tests.vision.discs.dots import Dots, dots, draw_disc, exposed, step
-from vision.discs.circle_proposals import highlight_colour, propose_circles
-from vision.discs.colour import DARK, ColourRange
-from vision.rig.bench import Bench
-from vision.rig.exposure import Exposure
-from vision.rig.render import render
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.workspace import default_workspace
 
 GREY = np.full((200, 300), 128, np.uint8)
 

@@ -5,29 +5,29 @@ from functools import cache
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.finger.design import Design
-from geometry.finger.finger import Finger
-from geometry.finger.presets import load_design
-from geometry.mesh.mesher import build_mesh
-from geometry.mesh.settings import MeshSettings
-from tests.fingers import beam, ring
-from tests.vision.films import frames_of
-from vision.rig.bench import Bench
-from vision.rig.exposure import Exposure
-from vision.rig.motion import Motion
-from vision.rig.recording import Recording
-from vision.rig.shapes import area
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.data_association import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.presets import load_design
+from pinnray.geometry.mesh.mesher import build_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.motion import Motion
+from pinnray.vision.rig.recording import Recording
+from pinnray.vision.rig.shapes import area
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.data_association import (
     NOISE,
     associate_markers,
     distance_from_base,
     step_covariances,
 )
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
-from vision.tracking.workspace import default_workspace
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
+from pinnray.vision.tracking.workspace import default_workspace
+from tests.fingers import beam, ring
+from tests.vision.films import frames_of
 
 FINGERS: dict[str, Finger] = {
     "default": Design(marker_layout="joints"),

@@ -8,13 +8,13 @@ import pytest
 from benchmarks.tracker.films import Finger, Score, coverage
 from benchmarks.tracker.scenes import random_recording, scored
 from benchmarks.tracker.stress import CASES, JUMP, filmed, seen
-from geometry.cache import finger_mesh
-from geometry.mesh.settings import MeshSettings
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera_calibration import calibrate_views
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.rig.boards import board_poses
 from tests.vision.films import DESIGN, bent
-from vision.calibration.camera import Camera
-from vision.calibration.camera_calibration import calibrate_views
-from vision.calibration.chessboard import Board
-from vision.rig.boards import board_poses
 
 pytestmark = pytest.mark.slow
 

@@ -4,11 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.registration import HAND_HELD
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.registration import HAND_HELD
+from pinnray.vision.calibration.camera import Camera
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, error_of, images, recording, tracked
-from vision.calibration.camera import Camera
 
 pytestmark = pytest.mark.usefixtures("discs_fitted_once")
 

@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
+from pinnray.vision.calibration.camera import Pose
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.rig.virtual_camera import viewing_pose
+from pinnray.vision.tracking.camera_motion import find_camera_motion
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images
-from vision.calibration.camera import Pose
-from vision.discs.disc_detector import DiscDetections
-from vision.rig.virtual_camera import viewing_pose
-from vision.tracking.camera_motion import find_camera_motion
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
 
 MARKERS = DESIGN.markers
 SCENE = FilmedScene(design=DESIGN, workspace=WORKSPACE, camera=CAMERA)

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.discs.colour import DARK, ColourRange
+from pinnray.vision.frames.frame import CapturedImage, Frames, Image
+from pinnray.vision.rig.virtual_camera import viewing_pose
+from pinnray.vision.tracking.rest_detection import RestIntervals
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
+from pinnray.vision.tracking.workspace import Workspace
 from tests.fingers import beam
 from tests.vision.tracking.listed_discs import NOISE, ListedDiscs, middles, seen
-from vision.calibration.camera import Camera, Pose
-from vision.discs.colour import DARK, ColourRange
-from vision.frames.frame import CapturedImage, Frames, Image
-from vision.rig.virtual_camera import viewing_pose
-from vision.tracking.rest_detection import RestIntervals
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
-from vision.tracking.workspace import Workspace
 
 FINGER, RED = beam(), ColourRange((20.0, 40.0, 20.0), (80.0, 90.0, 80.0))
 MARKERS = FINGER.markers

@@ -6,6 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
+from pinnray.vision.rig.motion import Course, Motion
+from pinnray.vision.rig.occluders import cables
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
 from tests.vision.films import (
     CAMERA,
     DESIGN,
@@ -17,10 +21,6 @@ from tests.vision.films import (
     recording,
     tracked,
 )
-from vision.rig.motion import Course, Motion
-from vision.rig.occluders import cables
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
 
 pytestmark = pytest.mark.usefixtures("discs_fitted_once")
 

@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs.colour import DARK
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import track
 from tests.vision.end_to_end.test_track import (
     CAMERA,
     MARKERS,
@@ -18,9 +21,6 @@ from tests.vision.end_to_end.test_track import (
     film,
 )
 from tests.vision.tracking.listed_discs import ListedDiscs, middles, seen
-from vision.discs.colour import DARK
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import track
 
 COVARIANCE = tuple(map(tuple, (1e-8 * np.eye(9)).tolist()))
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vision.frames.formats import pages
-from vision.frames.sources import open_frames, photographs
+from pinnray.vision.frames.formats import pages
+from pinnray.vision.frames.sources import open_frames, photographs
 
 LEVELS = (10, 40, 70, 100, 130, 160)
 

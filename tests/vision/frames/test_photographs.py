@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.frames.sources import FRAMES_OF_A_VIDEO, photographs
-from vision.frames.video import video_writer
+from pinnray.vision.frames.sources import FRAMES_OF_A_VIDEO, photographs
+from pinnray.vision.frames.video import video_writer
 
 
 @pytest.fixture

@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from vision.frames.decoder import Decoder
-from vision.frames.formats import PNG
-from vision.frames.pictures import split
-from vision.frames.sources import open_frames
+from pinnray.geometry.errors import UserError
+from pinnray.vision.frames.decoder import Decoder
+from pinnray.vision.frames.formats import PNG
+from pinnray.vision.frames.pictures import split
+from pinnray.vision.frames.sources import open_frames
 
 
 def encoded(
@@ -131,8 +131,8 @@ def test_a_header_alone_does_not_take_gigabytes(tmp_path):
     program = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from geometry.errors import UserError\n"
-        "from vision.frames.decoder import Decoder\n"
+        "from pinnray.geometry.errors import UserError\n"
+        "from pinnray.vision.frames.decoder import Decoder\n"
         "try:\n"
         "    list(Decoder()(Path(sys.argv[1]).read_bytes(), sys.argv[1], 'a'))\n"
         "except UserError as error:\n"

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from vision.frames.sources import open_frames
-from vision.frames.video import video_frames, video_writer
+from pinnray.geometry.errors import UserError
+from pinnray.vision.frames.sources import open_frames
+from pinnray.vision.frames.video import video_frames, video_writer
 
 VIDEOS = Path(__file__).parent / "videos"
 SIZE = (64, 48)
@@ -197,6 +197,6 @@ def test_a_video_that_names_another_file_opens_nothing(name, tmp_path, monkeypat
 
 
 def test_a_video_larger_than_any_camera_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("vision.frames.video.MOST_PIXELS", 64 * 48 - 1)
+    monkeypatch.setattr("pinnray.vision.frames.video.MOST_PIXELS", 64 * 48 - 1)
     with pytest.raises(UserError, match="too large"):
         read(written(tmp_path / "a.mkv", smooth(1)))

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.registration import Homography
-from vision.calibration.camera import Camera
-from vision.tracking.marker_plane import (
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.registration import Homography
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.tracking.marker_plane import (
     HOMOGRAPHY,
     SIMILARITY,
     AlignedProjection,

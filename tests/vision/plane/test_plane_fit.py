@@ -9,15 +9,20 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from geometry.arrays import FloatArray
-from geometry.finger.design import Design
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.finger.design import Design
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.marker_plane import SIMILARITY, MarkerPlane
+from pinnray.vision.tracking.plane_fit import (
+    camera_plane,
+    homography_plane,
+    plane_of_markers,
+    similarity_plane,
+)
+from pinnray.vision.tracking.workspace import default_workspace
 from tests.vision.fingers import MARKERS as FRONT
 from tests.vision.fingers import PRESSED
-from vision.calibration.camera import Camera
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.marker_plane import SIMILARITY, MarkerPlane
-from vision.tracking.plane_fit import camera_plane, homography_plane, plane_of_markers, similarity_plane
-from vision.tracking.workspace import default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1190.0, 652.0, 349.0, distortion=(-0.12, 0.05, 1e-3, -5e-4, 0.01))
 POSE = np.array([2.8, 0.2, -0.3, -40.0, -10.0, 150.0])

@@ -5,22 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.discs.colour import DARK, ColourRange
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.rig.virtual_camera import viewing_pose
+from pinnray.vision.tracking.fiducial_matching import UnseenError
+from pinnray.vision.tracking.marker_plane import SIMILARITY, CameraProjection
+from pinnray.vision.tracking.plane_fit import camera_plane
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.workspace import Workspace
 from tests.fingers import beam
 from tests.vision.tracking.listed_discs import NOISE, ListedDiscs, middles, seen
-from vision.calibration.camera import Camera
-from vision.discs.colour import DARK, ColourRange
-from vision.discs.disc_detector import DiscDetections
-from vision.frames.frame import Image
-from vision.rig.virtual_camera import viewing_pose
-from vision.tracking.fiducial_matching import UnseenError
-from vision.tracking.marker_plane import SIMILARITY, CameraProjection
-from vision.tracking.plane_fit import camera_plane
-from vision.tracking.scene import FilmedScene
-from vision.tracking.workspace import Workspace
 
 FINGER = beam()
 FIDUCIALS = (

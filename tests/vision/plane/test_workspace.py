@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.section.loop import Loop
-from geometry.section.section import Section
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.section import Section
+from pinnray.vision.tracking.workspace import Workspace, default_workspace, load_workspace, workspace_svg
 from tests.fingers import beam
-from vision.tracking.workspace import Workspace, default_workspace, load_workspace, workspace_svg
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 SVG = "{http://www.w3.org/2000/svg}"

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.finger.design import Design
-from vision.rig.bench import FINGER, Bench
-from vision.rig.print_layers import DIRECTION, PERIOD, PrintLayers
-from vision.rig.render import mean_light, pixel_coverage
-from vision.rig.shapes import Scene, area
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.workspace import default_workspace
+from pinnray.geometry.finger.design import Design
+from pinnray.vision.rig.bench import FINGER, Bench
+from pinnray.vision.rig.print_layers import DIRECTION, PERIOD, PrintLayers
+from pinnray.vision.rig.render import mean_light, pixel_coverage
+from pinnray.vision.rig.shapes import Scene, area
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.workspace import default_workspace
 
 WORKSPACE = default_workspace(Design())
 CAMERA = default_camera()

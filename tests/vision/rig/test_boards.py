@@ -4,12 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.calibration.charuco import CharucoBoard
-from vision.calibration.chessboard import Board
-from vision.rig.boards import INK, PAPER, board_poses, board_scene
-from vision.rig.exposure import Exposure
-from vision.rig.render import mean_light
-from vision.rig.virtual_camera import default_camera
+from pinnray.vision.calibration.charuco import CharucoBoard
+from pinnray.vision.calibration.chessboard import Board
+from pinnray.vision.rig.boards import INK, PAPER, board_poses, board_scene
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.render import mean_light
+from pinnray.vision.rig.virtual_camera import default_camera
 
 CAMERA = default_camera(960, 540)
 CHESS = Board(9, 6, 8.0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from vision.rig.render import pixel_coverage
-from vision.rig.shapes import circle, closed, rectangle
+from pinnray.vision.rig.render import pixel_coverage
+from pinnray.vision.rig.shapes import circle, closed, rectangle
 
 SIZE = (14, 11)
 STAR = 3.7 + 3.3 * np.array([(0, -1), (0.2, 0.1), (1.4, 0), (0.1, 0.4), (0.3, 1.2), (-0.7, 0.3)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vision.rig.motion import Motion
+from pinnray.vision.rig.motion import Motion
 
 
 @pytest.mark.parametrize("shutter", [0.0, 0.3, 0.9])

@@ -6,20 +6,20 @@ import json
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
-from geometry.finger.design import Design
-from vision.calibration.camera_file import load_camera
-from vision.frames.sources import open_frames
-from vision.measurements import read_measurements
-from vision.rig.bench import Bench
-from vision.rig.exposure import Exposure
-from vision.rig.motion import Motion
-from vision.rig.occluders import cable, share_seen
-from vision.rig.recording import Recording
-from vision.rig.recording_files import FILES, record
-from vision.rig.render import render
-from vision.rig.virtual_camera import default_camera, viewing_pose
-from vision.tracking.workspace import default_workspace, load_workspace
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.design import Design
+from pinnray.vision.calibration.camera_file import load_camera
+from pinnray.vision.frames.sources import open_frames
+from pinnray.vision.measurements import read_measurements
+from pinnray.vision.rig.bench import Bench
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.motion import Motion
+from pinnray.vision.rig.occluders import cable, share_seen
+from pinnray.vision.rig.recording import Recording
+from pinnray.vision.rig.recording_files import FILES, record
+from pinnray.vision.rig.render import render
+from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+from pinnray.vision.tracking.workspace import default_workspace, load_workspace
 
 WORKSPACE = default_workspace(Design())
 CAMERA = default_camera(320, 180)

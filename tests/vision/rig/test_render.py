@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.special import erf
 
-from vision.calibration.camera import Camera, Pose
-from vision.rig.exposure import Exposure
-from vision.rig.render import mean_light, render
-from vision.rig.shapes import Scene, Shape, circle, closed, rectangle
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.rig.exposure import Exposure
+from pinnray.vision.rig.render import mean_light, render
+from pinnray.vision.rig.shapes import Scene, Shape, circle, closed, rectangle
 
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 PINHOLE = Camera(120, 80, 900.0, 880.0, 61.0, 38.0)

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geometry.arrays import FloatArray
-from vision.calibration.camera import Camera, Pose
-from vision.discs.colour import Colour
-from vision.discs.disc_detector import DetectionMethod, DiscDetections
-from vision.frames.frame import Image
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.discs.colour import Colour
+from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections
+from pinnray.vision.frames.frame import Image
 
 NOISE = 0.05
 """Standard deviation of a coordinate, pixels."""

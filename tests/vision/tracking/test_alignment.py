@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.registration import FIXED, Homography
-from vision.tracking.alignment import LAID, align
+from pinnray.geometry.registration import FIXED, Homography
+from pinnray.vision.tracking.alignment import LAID, align
 
 DRAWN = np.array([[10.0, -1.0], [20.0, -20.0], [30.0, -1.0], [45.0, -14.0], [60.0, -1.0], [80.0, -2.0]])
 OFF = Homography(np.array([40.0, -6.0]), np.array([0.4, 0.5, -0.3, 0.01, 0.0, 0.0]))

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.arrays import BoolArray, FloatArray
-from vision.discs.disc_detector import DiscDetections
-from vision.frames.frame import Image
-from vision.tracking.annotation import annotated
-from vision.tracking.frame_tracker import FrameDetections
+from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.tracking.annotation import annotated
+from pinnray.vision.tracking.frame_tracker import FrameDetections
 
 GREEN, RED, BLUE, VIOLET, DARK = (40, 150, 0), (0, 60, 230), (200, 110, 0), (190, 0, 190), (30, 30, 30)
 """Markers, lost markers, fiducials, trajectories and text; written again here, in blue, green, red."""

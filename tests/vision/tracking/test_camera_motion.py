@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.tracking.camera_motion import find_camera_motion
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.workspace import Workspace
 from tests.fingers import beam
-from vision.calibration.camera import Camera
-from vision.discs.disc_detector import DiscDetections
-from vision.tracking.camera_motion import find_camera_motion
-from vision.tracking.scene import FilmedScene
-from vision.tracking.workspace import Workspace
 
 CORNERS = ((0.0, 0.0), (100.0, 0.0), (100.0, 60.0), (0.0, 60.0), (40.0, 70.0), (110.0, 25.0))
 SCENE = FilmedScene(beam(), Workspace(fiducials=CORNERS))

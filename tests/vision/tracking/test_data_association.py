@@ -6,15 +6,15 @@ from math import exp, log, pi, radians
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray, IntArray
-from tests.fingers import RADIUS, ring
-from vision.tracking.data_association import (
+from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.vision.tracking.data_association import (
     associate_markers,
     distance_from_base,
     rest_covariances,
     step_covariances,
     with_predictions,
 )
+from tests.fingers import RADIUS, ring
 
 SEEN, FALSE_DENSITY, NOISE, GATE, SURE = 0.9, 1e-4, 0.15, 5.0, 0.999
 """As documented; written again here, so that a change of them fails."""

@@ -5,10 +5,10 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.tracking.fiducial_matching import UnseenError, identify_fiducials
-from vision.tracking.workspace import Workspace
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.tracking.fiducial_matching import UnseenError, identify_fiducials
+from pinnray.vision.tracking.workspace import Workspace
 
 SCALE = 6.0
 """Pixels per mm."""

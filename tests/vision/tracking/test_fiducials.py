@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.finger.design import Design
+from pinnray.geometry.finger.design import Design
+from pinnray.vision.calibration.camera import Camera, Pose
+from pinnray.vision.tracking.fiducial_matching import identify_fiducials
+from pinnray.vision.tracking.workspace import default_workspace
 from tests.vision.fingers import MARKERS
-from vision.calibration.camera import Camera, Pose
-from vision.tracking.fiducial_matching import identify_fiducials
-from vision.tracking.workspace import default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1200.0, 640.0, 360.0)
 WORKSPACE = default_workspace(Design())

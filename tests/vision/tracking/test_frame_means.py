@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from geometry.arrays import FloatArray
-from vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
-from vision.tracking.frame_means import LOSSY, mean_detections
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
+from pinnray.vision.tracking.frame_means import LOSSY, mean_detections
 
 DEVIATION = 0.01
 """Of a coordinate in one frame, pixels."""

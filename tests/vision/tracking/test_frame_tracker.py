@@ -5,18 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs.colour import DARK, ColourRange
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.frames.frame import Image
+from pinnray.vision.tracking.data_association import distance_from_base, with_predictions
+from pinnray.vision.tracking.frame_tracker import FrameTracker
+from pinnray.vision.tracking.marker_plane import SIMILARITY, MarkerPlane
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.workspace import Workspace
 from tests.fingers import beam
 from tests.vision.tracking.listed_discs import ListedDiscs
-from vision.discs.colour import DARK, ColourRange
-from vision.discs.disc_detector import DiscDetections
-from vision.frames.frame import Image
-from vision.tracking.data_association import distance_from_base, with_predictions
-from vision.tracking.frame_tracker import FrameTracker
-from vision.tracking.marker_plane import SIMILARITY, MarkerPlane
-from vision.tracking.scene import FilmedScene
-from vision.tracking.workspace import Workspace
 
 FINGER, RED = beam(), ColourRange((20.0, 40.0, 20.0), (80.0, 90.0, 80.0))
 MARKERS, RADIUS, COUNT = FINGER.markers, FINGER.marker_radius, 7

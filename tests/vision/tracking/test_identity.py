@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from tests.vision.fingers import MARKERS, pressed
-from vision.tracking.data_association import (
+from pinnray.vision.tracking.data_association import (
     associate_markers,
     rest_covariances,
     step_covariances,
 )
+from tests.vision.fingers import MARKERS, pressed
 
 FRONT = MARKERS["front"]
 

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from vision.tracking.layout_matching import match_layout
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.tracking.layout_matching import match_layout
 
 DIAMETER, SCALE = 1.6, 8.0
 """Of the markers, mm, and of the picture, pixels per mm."""

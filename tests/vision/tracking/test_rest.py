@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pinnray.vision.tracking.rest_detection import STILL, RestIntervals, _noise, _resting, find_rest_intervals
 from tests.vision.fingers import MARKERS, PRESSED
-from vision.tracking.rest_detection import STILL, RestIntervals, _noise, _resting, find_rest_intervals
 
 WHOLE = np.array(PRESSED["front"])[0]
 

@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
+from pinnray.geometry.arrays import FloatArray
+from pinnray.geometry.errors import UserError
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.tracking.marker_plane import SIMILARITY
+from pinnray.vision.tracking.rest_detection import RestIntervals
+from pinnray.vision.tracking.scene import FilmedScene
+from pinnray.vision.tracking.tracker import _fiducials_at_rest, track
+from pinnray.vision.tracking.trajectories import Tracking
 from tests.vision.end_to_end.test_track import FINGER, MARKERS, PRESSED, RED, SHARES, SPACE, film
 from tests.vision.tracking.listed_discs import NOISE, ListedDiscs
-from vision.discs.disc_detector import DiscDetections
-from vision.tracking.marker_plane import SIMILARITY
-from vision.tracking.rest_detection import RestIntervals
-from vision.tracking.scene import FilmedScene
-from vision.tracking.tracker import _fiducials_at_rest, track
-from vision.tracking.trajectories import Tracking
 
 
 def markers_only(

@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from geometry.arrays import FloatArray
+from pinnray.geometry.arrays import FloatArray
+from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.tracking.marker_plane import SIMILARITY, MarkerPlane
+from pinnray.vision.tracking.rest_detection import RestIntervals
+from pinnray.vision.tracking.trajectories import Tracking
 from tests.fingers import beam
-from vision.discs.disc_detector import DiscDetections
-from vision.tracking.marker_plane import SIMILARITY, MarkerPlane
-from vision.tracking.rest_detection import RestIntervals
-from vision.tracking.trajectories import Tracking
 
 DESIGN = beam()
 MARKERS = DESIGN.markers

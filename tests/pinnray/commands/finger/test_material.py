@@ -4,7 +4,7 @@ import pytest
 
 import pinnray as pr
 from pinnray.cli import main
-from solvers.materials import MATERIALS
+from pinnray.solvers.materials import MATERIALS
 
 
 def test_a_tensile_test_ends_with_the_options_for_compare(tmp_path, capsys):

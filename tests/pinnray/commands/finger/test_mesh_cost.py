@@ -4,18 +4,18 @@ import re
 
 import pytest
 
-from compare.runtime.exits import BAD_INPUT
-from geometry.cache import drawn_finger, finger_mesh
-from geometry.drawing.description import Description
-from geometry.errors import UserError
-from geometry.finger.presets import load_design
-from geometry.mesh.element_size import estimated_triangles
-from geometry.mesh.settings import MeshSettings
 from pinnray.cli import main
+from pinnray.comparison.runtime.exits import BAD_INPUT
+from pinnray.geometry.cache import drawn_finger, finger_mesh
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.errors import UserError
+from pinnray.geometry.finger.presets import load_design
+from pinnray.geometry.mesh.element_size import estimated_triangles
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.cost import MeshCost, check_mesh_cost
 from pinnray.options.preset_jobs import job_defaults
-from solvers.registry import PRESETS, make_solver
-from solvers.solver import Cost, Traits
+from pinnray.solvers.registry import PRESETS, make_solver
+from pinnray.solvers.solver import Cost, Traits
 from tests.compare.pipeline.endings import Ending
 from tests.geometry.drawing.files import write_beam_mesh
 
@@ -47,7 +47,7 @@ def test_consent_goes_on(tmp_path, monkeypatch):
     def mesh(*_: object, **__: object) -> None:
         raise Began
 
-    monkeypatch.setattr("compare.pipeline.shared_mesh.finger_mesh", mesh)
+    monkeypatch.setattr("pinnray.comparison.pipeline.shared_mesh.finger_mesh", mesh)
     with pytest.raises(Began):
         main(["compare", "--mesh-size", "0.02", "--yes", "--quiet", "--out", str(tmp_path / "out")])
 

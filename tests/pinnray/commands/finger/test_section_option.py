@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from compare.crossval.study import CrossvalStudy
-from compare.pipeline.job import Job
-from geometry.cache import drawn_finger
-from geometry.drawing.description import Description
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.mesh.settings import MeshSettings
 from pinnray.cli import main
+from pinnray.comparison.crossval.study import CrossvalStudy
+from pinnray.comparison.pipeline.job import Job
+from pinnray.geometry.cache import drawn_finger
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.shared import FingerOptions
 from tests.geometry.drawing.files import write_beam_mesh
 

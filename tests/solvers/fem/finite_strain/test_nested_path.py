@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.finite_strain import solver
-from solvers.fem.finite_strain.nested_path import ACROSS, coarser
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.finite_strain import solver
+from pinnray.solvers.fem.finite_strain.nested_path import ACROSS, coarser
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import SHORT
 
 FINE = Problem(

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.drawing.description import Description
-from geometry.drawing.load import finger_from_file
-from geometry.mesh.settings import MeshSettings
-from solvers.fem.finite_strain import load_path
-from solvers.fem.finite_strain.nested_path import coarser
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.drawing.load import finger_from_file
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.solvers.fem.finite_strain import load_path
+from pinnray.solvers.fem.finite_strain.nested_path import coarser
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.geometry.drawing.files import rectangle, write_dxf
 
 STEEL = Material(young=2e5, poisson=0.3, law="neo-hookean")

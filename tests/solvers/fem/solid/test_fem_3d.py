@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.crossval.true_fields import FieldSampler
-from compare.evaluation.certification import with_certificates
-from compare.evaluation.evaluation import Evaluation
-from solvers.extrusion import ExtrudedSpace
-from solvers.fem.equilibrium import DiscreteEquilibrium
-from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_solvers import Multigrid
-from solvers.fem.solid import FaceField, Fem3dSolver, affordable
-from solvers.problem import Load, Material, Problem
-from solvers.solution import State
+from pinnray.comparison.crossval.true_fields import FieldSampler
+from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.linear_solvers import Multigrid
+from pinnray.solvers.fem.solid import FaceField, Fem3dSolver, affordable
+from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import State
 from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import bar_mesh, beam_compliance
 from tests.solvers.fem.test_fem_ranks import reported

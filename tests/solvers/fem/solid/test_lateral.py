@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.extrusion import ExtrudedSpace
-from solvers.fem.linear import FemSolver
-from solvers.fem.solid import Fem3dSolver
-from solvers.problem import Load, Material, Problem
+from pinnray.solvers.extrusion import ExtrudedSpace
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.fem.solid import Fem3dSolver
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import bar_mesh, beam_compliance
 
 MATERIAL = Material(young=10.0, poisson=0.3)

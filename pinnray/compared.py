@@ -6,12 +6,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Self
 
-from compare.evaluation import comparison
-from geometry.notebook import fact_table
-from geometry.text_files import as_path
+from pinnray.comparison.evaluation import comparison
+from pinnray.geometry.notebook import fact_table
+from pinnray.geometry.text_files import as_path
 
 if TYPE_CHECKING:
-    from geometry.figure import Figure
+    from pinnray.geometry.figure import Figure
 
 SHOWN = {
     "converged": "converged",
@@ -49,15 +49,15 @@ class Comparison(comparison.Results):
         Raises:
             UserError: If there is no such picture or solver, or nothing to draw in it.
         """
-        from compare.figures.gallery import draw
+        from pinnray.comparison.figures.gallery import draw
 
         return draw(self, picture, solvers).figure
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one HTML file that holds its pictures, and return its path."""
-        from compare.figures import draw_all
-        from compare.report.html_report import write_report
-        from compare.runtime.provenance import machine, package_versions
+        from pinnray.comparison.figures import draw_all
+        from pinnray.comparison.report.html_report import write_report
+        from pinnray.comparison.runtime.provenance import machine, package_versions
 
         provenance = {
             "design_sha256": self.design.digest,
