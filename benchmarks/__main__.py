@@ -6,7 +6,7 @@ import sys
 
 from rich.console import Console, RenderableType
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 BENCHMARKS = {
     "results": "results.default_run:main",

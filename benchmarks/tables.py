@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-from pinnray.geometry.atomic import atomic_path, write_text
+from pinnray.runtime.atomic import atomic_path, write_text
 
 DOCS = Path(__file__).parents[1] / "docs"
 END = "<!-- end of the table -->\n"

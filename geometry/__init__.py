@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pinnray.geometry.cache import cad_files as cad_files
     from pinnray.geometry.cache import finger_mesh as finger_mesh
-    from pinnray.geometry.errors import OutsideBodyError as OutsideBodyError
-    from pinnray.geometry.errors import ShapeError as ShapeError
-    from pinnray.geometry.errors import UserError as UserError
     from pinnray.geometry.finger.design import Design as Design
     from pinnray.geometry.finger.finger import Finger as Finger
     from pinnray.geometry.finger.markers import marker_positions as marker_positions
@@ -29,7 +26,10 @@ if TYPE_CHECKING:
     from pinnray.geometry.observations import Observations as Observations
     from pinnray.geometry.section.loop import Loop as Loop
     from pinnray.geometry.section.section import Section as Section
+    from pinnray.runtime.errors import OutsideBodyError as OutsideBodyError
+    from pinnray.runtime.errors import ShapeError as ShapeError
+    from pinnray.runtime.errors import UserError as UserError
 else:
-    from pinnray.geometry.lazy_exports import lazy_exports
+    from pinnray.runtime.lazy_exports import lazy_exports
 
     __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

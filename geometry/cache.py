@@ -11,15 +11,15 @@ from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
 
-from pinnray.geometry.atomic import remove_partials, write_bytes
-from pinnray.geometry.content_hash import content_hash, file_digest, sources_digest
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.worker import run_task
+from pinnray.runtime.atomic import remove_partials, write_bytes
+from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
+from pinnray.runtime.errors import UserError
 
 TIMEOUT_S = 300.0
 

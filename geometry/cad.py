@@ -11,10 +11,10 @@ from pathlib import Path
 import cadquery as cq
 from cadquery.occ_impl.exporters.dxf import DxfDocument
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.finger import Finger, outline_with_contact
 from pinnray.geometry.finger.svg import section_svg
 from pinnray.geometry.section.loop import Loop
+from pinnray.runtime.arrays import FloatArray
 
 LABELLED = {"base": 5, "contact": 30}
 """Layers of a DXF file that name parts of the outline, with their colours' numbers."""

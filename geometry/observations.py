@@ -6,9 +6,9 @@ from textwrap import shorten
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, frozen_array
-from pinnray.geometry.errors import ShapeError, UserError
 from pinnray.geometry.registration import FIXED, Registration
+from pinnray.runtime.arrays import BoolArray, FloatArray, frozen_array
+from pinnray.runtime.errors import ShapeError, UserError
 
 
 @dataclass(frozen=True, eq=False)

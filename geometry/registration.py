@@ -13,8 +13,8 @@ from math import inf
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 PARTS = {"turn": "deg", "shift_x": "mm", "shift_y": "mm", "scale": "", "tilt_x": "", "tilt_y": ""}
 """Values of a homography, with their units."""

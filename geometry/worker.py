@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.machine_memory import free_memory_gb, limit_memory, peak_memory_gb
-from pinnray.geometry.processes import Pool, ProcessFailed
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import free_memory_gb, limit_memory, peak_memory_gb
+from pinnray.runtime.processes import Pool, ProcessFailed
 
 
 def run_task(task: Mapping[str, Any], timeout_s: float) -> Any:

@@ -31,13 +31,14 @@ if TYPE_CHECKING:
     from pinnray.functions import solve as solve
     from pinnray.functions import solver as solver
     from pinnray.geometry.drawing.drawn_finger import DrawnFinger as DrawnFinger
-    from pinnray.geometry.errors import OutsideBodyError as OutsideBodyError
-    from pinnray.geometry.errors import UserError as UserError
     from pinnray.geometry.finger.design import Design as Design
     from pinnray.geometry.finger.presets import load_design as load_design
     from pinnray.geometry.finger.presets import preset_names as preset_names
     from pinnray.geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
     from pinnray.observations import Observations as Observations
+    from pinnray.robots.export import Exported as Exported
+    from pinnray.runtime.errors import OutsideBodyError as OutsideBodyError
+    from pinnray.runtime.errors import UserError as UserError
     from pinnray.simulators import export as export
     from pinnray.solution import Solution as Solution
     from pinnray.solvers.finger_figures.sensitivity import LocalSensitivity as LocalSensitivity
@@ -48,11 +49,10 @@ if TYPE_CHECKING:
     from pinnray.solvers.registry import solver_names as solver_names
     from pinnray.studies.fields.prediction import PredictedField as PredictedField
     from pinnray.studies.optimum.search import Optimum as Optimum
-    from pinnray.studies.robots.export import Exported as Exported
     from pinnray.vision.calibration.camera_calibration import Calibration as Calibration
     from pinnray.vision.rig.exposure import Exposure as Exposure
     from pinnray.vision.rig.motion import Motion as Motion
 else:
-    from pinnray.geometry.lazy_exports import lazy_exports
+    from pinnray.runtime.lazy_exports import lazy_exports
 
     __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -7,14 +7,14 @@ from typing import Any, Literal, TypedDict, get_args
 from pinnray.geometry.cache import drawn_finger
 from pinnray.geometry.drawing.description import Description, description_beside, load_description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.keywords import FingerKeywords
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
 from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.geometry.text_files import as_path
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import as_path
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.materials.presets import preset
 from pinnray.solvers.physics import Load, LoadKind, Material, Physics

@@ -18,19 +18,19 @@ from pinnray.arguments import (
     read_solver,
 )
 from pinnray.geometry import observations
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import unknown_parameter
-from pinnray.geometry.text_files import as_path
 from pinnray.observations import Observations
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import as_path
 from pinnray.solvers.physics import Load, LoadKind, Material
 from pinnray.solvers.solver import Solver
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pinnray.comparison.camera.film import Film
-    from pinnray.comparison.runtime.tables import Cell
+    from pinnray.film.film import Film
+    from pinnray.runtime.tables import Cell
     from pinnray.vision.calibration.camera_calibration import Calibration
     from pinnray.vision.rig.exposure import Exposure
     from pinnray.vision.rig.motion import Motion
@@ -101,8 +101,8 @@ def track(
     Raises:
         UserError: If the film does not show the finger.
     """
-    from pinnray.comparison.camera.track_film import track_film
-    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.film.track_film import track_film
+    from pinnray.runtime.stages import shown_stages
 
     for name in film:
         if name not in FILM:
@@ -145,10 +145,10 @@ def film_forces(
     """
     import pandas as pd
 
-    from pinnray.comparison.camera.force_estimate import MESH, force_rows, force_tracker, forces_of
-    from pinnray.comparison.camera.track_film import track_film
-    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.film.force_estimate import MESH, force_rows, force_tracker, forces_of
+    from pinnray.film.track_film import track_film
     from pinnray.geometry.cache import finger_mesh, mesh_sizes
+    from pinnray.runtime.stages import shown_stages
 
     words: dict[str, Any] = {**given}
     film = _film(source, {name: words.pop(name) for name in FILM if name in words})
@@ -216,11 +216,11 @@ def rig(
     Raises:
         UserError: If the finger cannot be filmed so.
     """
-    from pinnray.comparison.camera.filmed_force import filmed_course
-    from pinnray.comparison.camera.virtual_film import filmed_solution, write_film
-    from pinnray.comparison.runtime.output_folder import check_output
-    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.film.filmed_force import filmed_course
+    from pinnray.film.virtual_film import filmed_solution, write_film
     from pinnray.geometry.cache import finger_mesh
+    from pinnray.runtime.output_folder import check_output
+    from pinnray.runtime.stages import shown_stages
     from pinnray.vision.calibration.charuco import parse_board
     from pinnray.vision.rig.bench import PAINTS, Bench
     from pinnray.vision.rig.exposure import Exposure
@@ -281,7 +281,7 @@ def _with_nan(row: "dict[str, Cell]") -> "dict[str, Cell]":
 
 def _film(source: object, film: Mapping[str, Any]) -> "Film":
     """The film, with the options of `FilmKeywords` that are given."""
-    from pinnray.comparison.camera.film import Film
+    from pinnray.film.film import Film
 
     if (method := film.get("method", "precise")) not in ("precise", "hough"):
         raise UserError(f"method = {method!r}: there are precise, hough")

@@ -8,7 +8,7 @@ import gc
 import os
 import sys
 
-from pinnray.comparison.runtime.exits import ending_at_once, interruptible
+from pinnray.runtime.exits import ending_at_once, interruptible
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 """The matrices are small: more threads of the linear algebra only cost a core, waiting for one another.

@@ -7,11 +7,11 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Self
 
 from pinnray.comparison.evaluation import comparison
-from pinnray.geometry.notebook import fact_table
-from pinnray.geometry.text_files import as_path
+from pinnray.runtime.notebook import fact_table
+from pinnray.runtime.text_files import as_path
 
 if TYPE_CHECKING:
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
 SHOWN = {
     "converged": "converged",
@@ -57,7 +57,7 @@ class Comparison(comparison.Results):
         """Write the report as one HTML file that holds its pictures, and return its path."""
         from pinnray.comparison.figures import draw_all
         from pinnray.comparison.report.html_report import write_report
-        from pinnray.comparison.runtime.provenance import machine, package_versions
+        from pinnray.runtime.machine import machine, package_versions
 
         provenance = {
             "design_sha256": self.design.digest,

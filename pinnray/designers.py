@@ -12,12 +12,12 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from pinnray.arguments import JobKeywords, mesh_settings, read_job
-from pinnray.comparison.runtime.provenance import cores
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
-from pinnray.geometry.text_files import as_path
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import cores
+from pinnray.runtime.text_files import as_path
 from pinnray.solvers.physics import Load, LoadKind, Material, Physics
 
 if TYPE_CHECKING:
@@ -56,8 +56,8 @@ def sensitivity(
     """
     from pinnray.comparison.evaluation.deformed_body import DeformedBody
     from pinnray.comparison.evaluation.plausibility import problem_remarks
-    from pinnray.comparison.runtime.stages import shown_stages
     from pinnray.geometry.cache import finger_mesh
+    from pinnray.runtime.stages import shown_stages
     from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
     from pinnray.solvers.problem import Problem
 
@@ -112,7 +112,7 @@ def sweep(
     Raises:
         UserError: If the study cannot be run, or the folder holds another one.
     """
-    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.runtime.stages import shown_stages
     from pinnray.studies.sweep.job import StudyJob
     from pinnray.studies.sweep.study import Study, load_study
     from pinnray.studies.sweep.sweep import run_sweep
@@ -209,7 +209,7 @@ def optimise(
     Raises:
         UserError: If the question cannot be asked, the folder holds another one, or nothing is allowed.
     """
-    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.runtime.stages import shown_stages
     from pinnray.studies.optimum.question import load_question, question_of
     from pinnray.studies.optimum.search import search_front
     from pinnray.studies.sweep.job import StudyJob

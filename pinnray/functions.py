@@ -24,12 +24,12 @@ from pinnray.camera import read_observations
 from pinnray.compared import Comparison
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.text_files import as_path
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import as_path
 from pinnray.solution import Solution
 from pinnray.solvers.physics import Load, LoadKind, Material
 from pinnray.solvers.problem import Problem
@@ -126,7 +126,7 @@ def solve(
         displacement_remarks,
         problem_remarks,
     )
-    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.runtime.stages import shown_stages
 
     chosen = read_solver(solver, preset)
     others = (size, material, load, measurements)
@@ -199,8 +199,8 @@ def compare(
     """
     from pinnray.comparison.pipeline.job import Job, checked
     from pinnray.comparison.pipeline.pipeline import compute, run
-    from pinnray.comparison.runtime.stages import shown_stages
     from pinnray.options.preset_jobs import job_defaults
+    from pinnray.runtime.stages import shown_stages
 
     if adapt is not None and (isinstance(adapt, bool) or not isinstance(adapt, int | float)):
         raise UserError(f"adapt = {adapt!r} is no number; give a tolerance in mm")
@@ -261,7 +261,7 @@ def crossval(
     """
     from pinnray.comparison.crossval.cross_validation import cross_validate
     from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
-    from pinnray.comparison.runtime.stages import shown_stages
+    from pinnray.runtime.stages import shown_stages
 
     own = [each.name for each in fields(CrossvalStudy)]
     words = {name: study.pop(name) for name in list(study) if name not in own}

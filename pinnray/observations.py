@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pinnray.geometry import observations
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.parameters import MARKER
 from pinnray.geometry.registration import FIXED, Registration
-from pinnray.geometry.text_files import as_path
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import as_path
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Unpack
 
 from pinnray.arguments import JobKeywords, mesh_settings, read_job
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.text_files import as_path
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import as_path
 from pinnray.solvers.physics import Load, LoadKind, Material
 
 if TYPE_CHECKING:
-    from pinnray.studies.robots.export import Exported
+    from pinnray.robots.export import Exported
 
 
 def export(
@@ -56,10 +56,10 @@ def export(
     Raises:
         UserError: If MuJoCo is missing, a load is not possible, or the finger is of several materials.
     """
-    from pinnray.comparison.runtime.stages import shown_stages
     from pinnray.geometry.cache import finger_mesh, mesh_sizes
+    from pinnray.robots.export import KINDS, SIZES, ExportSettings, export_finger
+    from pinnray.runtime.stages import shown_stages
     from pinnray.solvers.problem import Problem
-    from pinnray.studies.robots.export import KINDS, SIZES, ExportSettings, export_finger
 
     if kind not in KINDS:
         raise UserError(f"there is no export {kind!r}; there are {', '.join(KINDS)}")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.text_files import as_path
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import as_path
 from pinnray.solvers import solution
 from pinnray.solvers.finger_figures import FingerFigures, figures_of
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pyvista
 
     from pinnray.comparison.evaluation.evaluation import Evaluation
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
 FieldName = Literal["displacement", "von_mises", "strain_principal", "strain_xx", "strain_yy", "strain_xy"]
 
@@ -152,7 +152,7 @@ class Solution(solution.Solution):
 
                 write_vtu(file, self.problem.mesh, self._fields)
             elif file.suffix == ".csv":
-                from pinnray.geometry.atomic import write_text
+                from pinnray.runtime.atomic import write_text
 
                 write_text(file, self.to_dataframe().to_csv(index=False, lineterminator="\n"))
             else:

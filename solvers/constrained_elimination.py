@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.problem import Problem, contact_ends, front_points
 from pinnray.solvers.solution import Contact, ContactPoints

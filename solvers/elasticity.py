@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, assert_never, get_args
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.names import LawName as LawName
 
 PLANES = ("strain", "stress")

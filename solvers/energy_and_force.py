@@ -4,10 +4,10 @@ import numpy as np
 from scipy.sparse import diags
 from scipy.sparse.linalg import spsolve
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.boundary import mean_thickness
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import piola_stress
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Problem, contact_ends, contact_nodes

@@ -16,8 +16,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.solvers.lagrange import LagrangeSpace
 
 

@@ -11,9 +11,9 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
 # Edge k joins the corners EDGES[k]; its node is number 3 + k of a quadratic element.
 EDGES = np.array([[0, 1], [1, 2], [2, 0]])

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, get_
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import Lame, lame_constants
 from pinnray.solvers.names import LawName
 from pinnray.solvers.names import LoadKind as LoadKind

@@ -8,14 +8,14 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.content_hash import content_hash
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.quadrature import segment_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.geometry.notebook import brief
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.content_hash import content_hash
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.notebook import brief
 from pinnray.solvers.elasticity import Lame, lame_constants
 from pinnray.solvers.physics import LEAST_TRAVEL as LEAST_TRAVEL
 from pinnray.solvers.physics import RADIUS as RADIUS

@@ -7,10 +7,10 @@ from typing import ClassVar, Literal, NamedTuple, Protocol, cast, runtime_checka
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
-from pinnray.geometry.notebook import brief, fact_table
 from pinnray.geometry.registration import Pictures
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.notebook import brief, fact_table
 from pinnray.solvers.elasticity import energy_density_of, strain_of, stress_of, von_mises
 from pinnray.solvers.problem import Problem
 

@@ -12,8 +12,8 @@ from typing import Any, ClassVar, Literal, Protocol, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import Solution, Status
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 FIRST_SHIFT, SHIFT_FACTOR = 1e-8, 10.0
 """Smallest shift over the stiffness that a caller scales by, and its growth until the tangent is definite."""

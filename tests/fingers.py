@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.drawing.placement import Placement
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray
 
 
 def drawn(name: str, section: Section, markers: FloatArray, contact_abscissa: float) -> DrawnFinger:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.section import cells, corner_angles
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 
 
 def permuted(mesh: TriangleMesh, seed: int) -> TriangleMesh:

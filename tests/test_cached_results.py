@@ -6,7 +6,7 @@ from pathlib import Path
 import grimp
 import pytest
 
-from pinnray.geometry.content_hash import PROGRAM
+from pinnray.runtime.content_hash import PROGRAM
 
 ROOT = Path(__file__).parents[1]
 DIGESTS = ("sources_digest", "job_definition", "job.definition")

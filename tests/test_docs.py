@@ -430,7 +430,7 @@ def test_the_docs_have_every_name_of_a_list(page, column, listed):
 
 
 def test_the_docs_have_every_key_of_a_published_line():
-    from pinnray.comparison.camera.publication import FrameLine, PublishedForce
+    from pinnray.film.publication import FrameLine, PublishedForce
 
     page = HOW_TO / "force-from-film.md"
     for heading, model in (("key of a line", FrameLine), ("key of a line's force", PublishedForce)):
@@ -441,7 +441,7 @@ def test_the_docs_have_every_key_of_a_published_line():
 
 
 def test_the_docs_have_every_exit_code():
-    from pinnray.comparison.runtime import exits
+    from pinnray.runtime import exits
 
     codes = {int(name) for name in names(table(REFERENCE / "exit-codes.md", "code"))}
     assert codes == {0, 1, exits.BAD_INPUT, exits.NOT_CONVERGED, exits.INTERRUPTED, exits.UNREAD}

@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from pinnray.commands.app import COMMANDS
-from pinnray.geometry.content_hash import PROGRAM
+from pinnray.runtime.content_hash import PROGRAM
 from tests.pinnray.commands.programs import run_python
 
 ROOT = Path(__file__).parents[1]

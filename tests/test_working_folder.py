@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pinnray.geometry.processes import Pool, child_environment
+from pinnray.runtime.processes import Pool, child_environment
 
 
 def sum_of(number: int, progress: Callable[..., None]) -> int:
@@ -71,7 +71,7 @@ def test_pictures_take_no_settings_from_the_working_folder(tmp_path: Path) -> No
     code = (
         "import sys, subprocess\n"
         "from pathlib import Path\n"
-        "from pinnray.geometry.figure import figure\n"
+        "from pinnray.runtime.figure import figure\n"
         "subprocess.check_output = lambda *given, **_: sys.exit('a program was started')\n"
         "with figure(1.0) as drawn:\n"
         "    drawn.text(0.5, 0.5, 'text')\n"

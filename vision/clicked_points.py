@@ -10,10 +10,10 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import HAND_HELD, Homography, nearest_similarity
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.foreign_tables import foreign_table
 
 FEWEST = 3

@@ -10,11 +10,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import atomic_path
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import FIXED, HAND_HELD, Registration
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import atomic_path
+from pinnray.runtime.errors import UserError
 from pinnray.vision.foreign_tables import foreign_table
 
 POSITION = ("x_mm", "y_mm")

@@ -9,10 +9,10 @@ import skfem
 from rich.table import Table
 from skfem.models.elasticity import linear_elasticity
 
-from pinnray.comparison.runtime.tables import terminal_table
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.tables import terminal_table
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Problem, contact_functional
 

@@ -21,13 +21,13 @@ from rich.table import Table
 from benchmarks.tables import DOCS
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import force_error, reference_differences
-from pinnray.comparison.runtime.tables import terminal_table
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.load import finger_from_file
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.tables import terminal_table
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import Solution

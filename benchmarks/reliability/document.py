@@ -24,8 +24,8 @@ from benchmarks.reliability import inputs
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
 from benchmarks.tables import DOCS, kept_rows, markdown
-from pinnray.comparison.runtime.tables import terminal_table
-from pinnray.geometry.atomic import write_text
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.tables import terminal_table
 
 HERE = Path(__file__).parent
 PAGE = DOCS / "reliability.md"

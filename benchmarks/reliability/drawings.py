@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.reliability import drawing_files
 from pinnray.geometry.drawing.checks import body
 from pinnray.geometry.drawing.load import read_drawing
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 SAME = 1e-6
 """Largest relative difference of areas and of the markers' distances."""

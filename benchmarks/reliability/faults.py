@@ -214,14 +214,14 @@ def filled(folder: Path) -> Iterator[Path]:
         raise RuntimeError(ending.text)
     from pinnray.cli import main
     from pinnray.comparison.figures import gallery
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
     blank = gallery.Illustration(Figure(1.0), "Blank", "Blank.", "Blank.")
     drawings = {name: (what, lambda _: blank) for name, (what, _) in gallery.GALLERY.items()}
     with (
         # The same files with blank pictures, in a tenth of the time.
         patch.object(gallery, "GALLERY", drawings),
-        patch("pinnray.geometry.figure.DPI", 20),
+        patch("pinnray.runtime.figure.DPI", 20),
         # Two processes work on any mesh, not only where that is worth its while.
         patch("pinnray.comparison.pipeline.solving.LARGE", 0),
     ):

@@ -19,7 +19,7 @@ from unittest.mock import patch
 from benchmarks.tables import keep_rows, kept_rows
 from pinnray.geometry.cache import drawn_finger
 from pinnray.geometry.drawing.description import load_description
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.studies.sweep.measurement import Measurement, measured
 
 if TYPE_CHECKING:

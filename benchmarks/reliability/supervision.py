@@ -20,7 +20,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 KINDS = ("kill", "torn", "ENOSPC", "EIO")
 """Faults: killed before a call, killed within a write, disk full from a call on, one failed call."""

@@ -12,8 +12,8 @@ from rich.table import Table
 
 from benchmarks.tables import DOCS, fill, keep_rows, kept_rows, markdown
 from pinnray.cli import compare_main
-from pinnray.comparison.runtime.tables import terminal_table
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.tables import terminal_table
 
 ROOT = DOCS.parent
 RUN = ROOT / "out" / "default" / "metrics.json"

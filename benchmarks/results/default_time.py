@@ -23,10 +23,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.table import Table
 
-from pinnray.comparison.runtime import stages
-from pinnray.comparison.runtime.provenance import cores
-from pinnray.comparison.runtime.tables import terminal_table
-from pinnray.geometry.errors import UserError
+from pinnray.runtime import stages
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import cores
+from pinnray.runtime.tables import terminal_table
 from pinnray.solvers.solver import Progress
 
 ROOT = Path(__file__).parents[2]

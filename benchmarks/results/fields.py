@@ -12,7 +12,7 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tables import DOCS
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.studies.fields.emulator import FieldEmulator, grip_force
 from pinnray.studies.fields.reader import FIGURES
 from pinnray.studies.fields.snapshots import KnownSamples, Snapshots

@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 
 from pinnray.comparison.evaluation.truths import simulate
-from pinnray.geometry.arrays import BoolArray, FloatArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.problem import Problem
 from pinnray.vision.frames.frame import CapturedImage, Frames, Image
 from pinnray.vision.rig.recording import FrameTruth

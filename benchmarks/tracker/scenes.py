@@ -19,8 +19,8 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tracker.films import Finger, Score, coverage, film_of, one_thread
-from pinnray.comparison.runtime.tables import terminal_table
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.tables import terminal_table
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.camera_calibration import calibrate_camera
 from pinnray.vision.calibration.chessboard import Board

@@ -23,9 +23,9 @@ from rich.table import Table
 
 from benchmarks.tables import DOCS, fill, markdown, table_of
 from benchmarks.tracker.films import HIDDEN, Finger, Score, coverage, film_of, one_thread
-from pinnray.comparison.runtime.tables import terminal_table
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.tables import terminal_table
 from pinnray.vision.calibration.camera import Pose
 from pinnray.vision.discs.colour import DARK
 from pinnray.vision.discs.colour_picker import pick_colour

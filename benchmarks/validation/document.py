@@ -29,9 +29,9 @@ from benchmarks.validation.markers import (
 )
 from benchmarks.validation.picture import side_view
 from benchmarks.validation.study import Outcome, all_cases, length, predict, young_modulus
-from pinnray.comparison.runtime.tables import terminal_table
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_text
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.tables import terminal_table
 
 PAGE, PICTURE = DOCS / "validation.md", DOCS / "pictures" / "soft-beam.png"
 

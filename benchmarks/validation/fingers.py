@@ -9,10 +9,10 @@ import shapely
 import pinnray as pr
 from benchmarks.tables import markdown
 from benchmarks.validation.printed_finger import FINGERS, FRICTION, RADIUS, PrintedFinger
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import nearest_similarity
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
 from pinnray.solvers.problem import Load
 from pinnray.solvers.solution import Solution
 from pinnray.vision.clicked_points import clicked_points, read_clicks

@@ -13,8 +13,8 @@ from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from benchmarks.validation.laws import LAWS
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.dolfinx_compat import dolfinx
 from pinnray.solvers.petsc import PETSc
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.validation.half_beam import Deformation
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 FILE = Path(__file__).parent / "soft_beam" / "markers.csv"
 

@@ -5,8 +5,8 @@ import numpy as np
 from benchmarks.validation.half_beam import HEIGHT, LENGTH, Deformation
 from benchmarks.validation.markers import LOADS, NAMES, NOMINAL, marker_places
 from benchmarks.validation.study import Outcome
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
 
 SHADES = {"gravity": "#8fc3e3", "load52": "#3f8fc9", "load101": "#08519c"}
 """Outlines, darker with the load."""

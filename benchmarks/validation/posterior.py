@@ -15,12 +15,12 @@ import numpy as np
 from rich.table import Table
 
 from pinnray.comparison.evaluation.truths import SLIDING, virtual_experiment
-from pinnray.comparison.runtime.tables import terminal_table
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.tables import terminal_table
 from pinnray.solvers.assimilation.estimation import values_of
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.model import EXACT, MarkerModel

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_text
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_text
 
 FOLDER = Path(__file__).with_name("printed_fingers")
 LENGTH, BASE, DEPTH = 70.0, 35.0, 35.0

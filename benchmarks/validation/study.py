@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from benchmarks.validation import comsol
 from benchmarks.validation.half_beam import Deformation, HalfBeam
 from benchmarks.validation.markers import LOADS, NOMINAL, marker_places, turned_offsets
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 KNOWN = "gravity"
 """Case whose markers Young's modulus is found from."""

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.special import roots_jacobi, roots_legendre
 
 from benchmarks.verification.hooke import PlaneLaw
-from pinnray.geometry.arrays import BoolArray, FloatArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import Quadrature, edge_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Material, Problem

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.problem import Material
 
 

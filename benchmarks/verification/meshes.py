@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 
 JITTER = 0.2
 """Largest shift of an inner node, in elements: all triangles differ, none is nearly flat."""

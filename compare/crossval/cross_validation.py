@@ -16,15 +16,15 @@ from pinnray.comparison.crossval.study import CrossvalStudy, visible_markers
 from pinnray.comparison.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
 from pinnray.comparison.evaluation.truths import experiment_source
-from pinnray.comparison.runtime.output_folder import check_resumable_folder, locked
-from pinnray.comparison.runtime.stages import Stages, in_stages
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_json
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.processes import ProcessFailed
 from pinnray.geometry.registration import FIXED
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.output_folder import check_resumable_folder, locked
+from pinnray.runtime.processes import ProcessFailed
+from pinnray.runtime.stages import Stages, in_stages
 from pinnray.solvers.fem.assimilating import FemAsmSolver
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Progress

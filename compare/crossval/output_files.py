@@ -22,11 +22,11 @@ from pinnray.comparison.figures.style import (
     solver_colour,
     write_heading,
 )
-from pinnray.comparison.runtime.html import write_html
-from pinnray.comparison.runtime.tables import Cell, write_csv
-from pinnray.geometry.atomic import write_json
-from pinnray.geometry.content_hash import file_digest
-from pinnray.geometry.figure import WIDTH, Figure, figure
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.content_hash import file_digest
+from pinnray.runtime.figure import WIDTH, Figure, figure
+from pinnray.runtime.html import write_html
+from pinnray.runtime.tables import Cell, write_csv
 
 HELD_OUT, FIELDS, SWEEP = "held_out", "fields", "l_curve"
 """Names of the pictures, without the truth that follows if there are several."""

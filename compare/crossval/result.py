@@ -19,9 +19,9 @@ from pinnray.comparison.crossval.scores import (
 )
 from pinnray.comparison.crossval.study import CrossvalStudy, SolverVariant
 from pinnray.comparison.crossval.true_fields import TrueContact
-from pinnray.comparison.runtime.tables import Cell
-from pinnray.geometry.notebook import brief
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.notebook import brief
+from pinnray.runtime.tables import Cell
 from pinnray.solvers.solver import Traits
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from pinnray.comparison.crossval.folds import FoldResult, SeedResults
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 LEVEL = 0.95
 """Confidence level of every interval; coverage is the share of errors inside the interval of this level."""

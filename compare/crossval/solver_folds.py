@@ -16,12 +16,12 @@ from pinnray.comparison.crossval.study import CrossvalStudy, SolverVariant
 from pinnray.comparison.crossval.true_fields import FieldSampler, SampledField, TrueField
 from pinnray.comparison.evaluation.deformed_body import DeformedBody
 from pinnray.comparison.evaluation.truths import SLIDING, Truth
-from pinnray.geometry.atomic import write_bytes
-from pinnray.geometry.content_hash import has_source, sources_digest
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.processes import known_to_children
+from pinnray.runtime.atomic import write_bytes
+from pinnray.runtime.content_hash import has_source, sources_digest
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.processes import known_to_children
 from pinnray.solvers.assimilation.marker_forces import root_mean_square
 from pinnray.solvers.assimilation.marker_weighting import FACTORS
 from pinnray.solvers.fem.assimilating import FemAsmSolver

@@ -9,16 +9,16 @@ import numpy as np
 
 from pinnray.comparison.crossval.folds import ALL, SCHEMES
 from pinnray.comparison.evaluation.truths import EVERY_TRUTH, SLIDING, TRUTHS, Truth, check_truths
-from pinnray.comparison.runtime.output_folder import job_definition
-from pinnray.comparison.runtime.provenance import cores
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import mesh_sizes
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import FIXED, PARTS, Homography, Registration
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import cores
+from pinnray.runtime.output_folder import job_definition
 from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, check_load, check_name, with_law

@@ -12,7 +12,7 @@ from pinnray.comparison.crossval.result import CaseResult, CrossvalResult
 from pinnray.comparison.crossval.scores import BASELINES, FIELD_NAMES, FIELDS, LEVEL, ScoreInterval
 from pinnray.comparison.crossval.study import CrossvalStudy
 from pinnray.comparison.evaluation.truths import Truth
-from pinnray.comparison.runtime.tables import NONE, TextTable, distance, percent, significant, terminal_table
+from pinnray.runtime.tables import NONE, TextTable, distance, percent, significant, terminal_table
 from pinnray.solvers.solver import Traits, with_law
 
 NULL_MODELS = ("gp", "statfem")

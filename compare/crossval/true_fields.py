@@ -10,17 +10,17 @@ from pinnray.comparison.crossval.folds import LoadCase
 from pinnray.comparison.crossval.study import SIZES, CrossvalStudy
 from pinnray.comparison.evaluation.evaluation import field_difference
 from pinnray.comparison.evaluation.truths import Truth, simulate
-from pinnray.comparison.runtime.provenance import package_versions
-from pinnray.comparison.runtime.tables import Cell
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_arrays
 from pinnray.geometry.cache import cache_folder, finger_mesh, kept_if_possible
-from pinnray.geometry.content_hash import content_hash, sources_digest
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_arrays
+from pinnray.runtime.content_hash import content_hash, sources_digest
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_versions
+from pinnray.runtime.tables import Cell
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import SolidField, Solution, State

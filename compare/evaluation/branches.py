@@ -10,7 +10,7 @@ import numpy as np
 
 from pinnray.comparison.evaluation.certificate import ROUNDING
 from pinnray.comparison.evaluation.evaluation import Evaluation, field_difference
-from pinnray.comparison.runtime.tables import percent
+from pinnray.runtime.tables import percent
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import MissingLibraryError, make_solver
 

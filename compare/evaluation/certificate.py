@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pinnray.comparison.runtime.tables import percent
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.tables import percent
 
 ENERGY_LIMIT = 0.02
 """Most energy that the imbalance of a converged solution may have, relative to the energy of `fem`.

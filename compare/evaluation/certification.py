@@ -9,9 +9,9 @@ from scipy.spatial import cKDTree
 
 from pinnray.comparison.evaluation.certificate import ROUNDING, Certificate, Region
 from pinnray.comparison.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation, field_difference
-from pinnray.geometry.arrays import BoolArray, FloatArray
 from pinnray.geometry.mesh.boundary import boundary_loops, mean_thickness, singular_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.elasticity import energy_density_of
 from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace

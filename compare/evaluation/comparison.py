@@ -13,10 +13,10 @@ from pinnray.comparison.evaluation.metrics import (
     reference_differences,
     truth_differences,
 )
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.adaptive_refinement import Adaptation
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, UnsupportedProblemError, check_load, with_law

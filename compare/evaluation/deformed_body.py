@@ -8,8 +8,8 @@ import shapely
 
 from pinnray.comparison.evaluation.certification import NOT_FINITE
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.geometry.arrays import BoolArray, FloatArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.solution import Solution, Status
 

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 from pydantic import TypeAdapter
 
 from pinnray.comparison.evaluation.certificate import Certificate
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_arrays
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.geometry.notebook import brief
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_arrays
+from pinnray.runtime.notebook import brief
 from pinnray.solvers.finger_figures import FingerFigures
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.solution import IdentifiedForce, SolidField, Solution

@@ -14,11 +14,11 @@ from pinnray.comparison.evaluation.evaluation import (
     ReferenceDifferences,
     field_difference,
 )
-from pinnray.comparison.runtime.tables import Cell, write_csv
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import nearest_similarity
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.tables import Cell, write_csv
 from pinnray.solvers.finger_figures import figures_of
 from pinnray.solvers.problem import Load
 from pinnray.solvers.shared_work import shared

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import shapely
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.errors import OutsideBodyError, UserError
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.section.thickness import wall_thickness
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import OutsideBodyError, UserError
 from pinnray.solvers.identification.contradiction import MUCH_NEARER, likely_order, order_words
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import MissingLibraryError, make_solver

@@ -13,15 +13,15 @@ from math import isfinite, radians, tan
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.runtime.provenance import package_versions
 from pinnray.geometry.cache import cache_folder, finger_mesh, kept_if_possible
-from pinnray.geometry.content_hash import content_hash, sources_digest
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.section import rib_feet, rib_pitch, rib_slope
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.content_hash import content_hash, sources_digest
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_versions
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.problem import Load, LoadKind, Material, Problem
 from pinnray.solvers.registry import MissingLibraryError, make_solver

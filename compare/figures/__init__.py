@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pinnray.comparison.evaluation.comparison import Results
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.processes import Pool, ProcessFailed, end_with_parent
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.processes import Pool, ProcessFailed, end_with_parent
 from pinnray.solvers.shared_work import SharedWork
 
 if TYPE_CHECKING:
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
 FORMATS = ("svg", "pdf")
 """Formats of pictures for print."""

@@ -23,9 +23,9 @@ from PIL import Image
 
 from pinnray.comparison.evaluation.evaluation import weighted_percentile
 from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent, Pixels
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.figure import INK, MUTED, SMALL
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.figure import INK, MUTED, SMALL
 
 PERCENT = 99.5
 """Share of the area within a colour scale; peaks at re-entrant corners would leave the rest in one colour."""

@@ -13,8 +13,6 @@ from pinnray.comparison.figures import body
 from pinnray.comparison.figures.dimensions import CENTRE_LINE, Draughtsman, upright
 from pinnray.comparison.figures.pyvista_canvas import Extent
 from pinnray.comparison.figures.style import arrow, axes_at, write_heading
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import CONTACT, MEASURED, SMALL, WIDTH, Figure, figure
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.picture import draw_section
@@ -30,6 +28,8 @@ from pinnray.geometry.finger.section import (
 )
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import inner_normals
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import CONTACT, MEASURED, SMALL, WIDTH, Figure, figure
 
 POINT = 8.5 / 72 / WIDTH
 """Height of the type as a share of the drawing's width."""

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.text import Annotation, Text
 
 from pinnray.comparison.figures.style import HALO, arrow
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import INK
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import INK
 
 LabelPlace = Sequence[float] | FloatArray
 CENTRE_LINE = (0, (6, 2, 1, 2))

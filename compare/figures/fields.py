@@ -13,11 +13,11 @@ from pinnray.comparison.figures import body
 from pinnray.comparison.figures.body import PERCENT, ColourScale, diverging, sequential, symmetric
 from pinnray.comparison.figures.pyvista_canvas import Canvas
 from pinnray.comparison.figures.style import axes_at, write_heading
-from pinnray.comparison.runtime.tables import percent, significant
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.figure import MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.tables import percent, significant
 
 MARGIN = 0.1
 HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55

@@ -14,8 +14,8 @@ from pinnray.comparison.figures.style import (
     solver_colour,
     write_heading,
 )
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import INK, MEASURED, WIDTH, Figure, figure
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
 
 
 def draw_force_displacement(

@@ -29,8 +29,8 @@ from pinnray.comparison.figures.solver_charts import (
     draw_losses,
     draw_marker_errors,
 )
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.figure import Figure
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.figure import Figure
 
 
 class Illustration(NamedTuple):

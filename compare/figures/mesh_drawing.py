@@ -8,10 +8,10 @@ from matplotlib.patches import Rectangle
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.pyvista_canvas import Extent
 from pinnray.comparison.figures.style import HALO, axes_at, write_heading
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
 
 HEAD, INSET_TITLE, MARGIN = 0.48, 0.24, 0.1
 """Heights of the headings, and the margin, inches."""

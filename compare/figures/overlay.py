@@ -15,10 +15,10 @@ from pinnray.comparison.figures import body
 from pinnray.comparison.figures.body import ColourScale
 from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent
 from pinnray.comparison.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
 
 MARGIN = 0.12
 HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48

@@ -8,8 +8,8 @@ from textwrap import fill
 from matplotlib import rc_context
 from matplotlib.backends.backend_pdf import PdfPages
 
-from pinnray.geometry.atomic import write_bytes
-from pinnray.geometry.figure import INK, OPTIONS, SETTINGS, SMALL, Figure
+from pinnray.runtime.atomic import write_bytes
+from pinnray.runtime.figure import INK, OPTIONS, SETTINGS, SMALL, Figure
 
 COLUMNS = 92
 """Letters in a line of a caption."""

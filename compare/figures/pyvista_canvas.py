@@ -19,9 +19,9 @@ os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import pyvista
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.shared_work import shared
 
 Pixels = NDArray[np.uint8]

@@ -21,9 +21,9 @@ from pinnray.comparison.figures.style import (
     write_heading,
     write_letter,
 )
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 
 HEAD = 0.3
 """Height of the heading, inches."""

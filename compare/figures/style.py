@@ -6,8 +6,8 @@ from matplotlib import patheffects
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import INK, MUTED, SMALL, Figure
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import INK, MUTED, SMALL, Figure
 
 HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 """Keeps type and lines legible on anything."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pinnray.comparison.figures.style import axes_at, solver_colour, write_heading
-from pinnray.geometry.figure import MEASURED, WIDTH, Figure, figure
+from pinnray.runtime.figure import MEASURED, WIDTH, Figure, figure
 from pinnray.solvers.materials import TensileFit, TensileTest
 
 

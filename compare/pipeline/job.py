@@ -4,16 +4,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pinnray.comparison.camera.film import Film
 from pinnray.comparison.evaluation.comparison import supported_solvers
 from pinnray.comparison.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
 from pinnray.comparison.figures import check_formats
+from pinnray.film.film import Film
 from pinnray.geometry.cache import mesh_sizes
-from pinnray.geometry.content_hash import has_source
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.content_hash import has_source
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.adaptive_refinement import check_adaptable
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, check_name

@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pinnray.comparison.camera.film import Film
 from pinnray.comparison.evaluation.branches import with_branches
 from pinnray.comparison.evaluation.comparison import Results, supported_solvers
 from pinnray.comparison.evaluation.deformed_body import with_body_checks
@@ -25,14 +24,15 @@ from pinnray.comparison.pipeline.job import Job, checked
 from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
 from pinnray.comparison.pipeline.solving import ERRORS, solve_all
 from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
-from pinnray.comparison.runtime.output_folder import check_output, replaced_folder, write_run
-from pinnray.comparison.runtime.provenance import package_versions
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.atomic import write_json
-from pinnray.geometry.content_hash import file_digest
-from pinnray.geometry.errors import UserError
+from pinnray.film.film import Film
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.processes import Pool
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.content_hash import file_digest
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_versions
+from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
+from pinnray.runtime.processes import Pool
+from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.shared_work import SharedWork
 from pinnray.solvers.solver import Solver, Traits
@@ -60,8 +60,8 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
             _write(folder, job, comparison, stages, pool)
             return comparison
         # They need OpenCV.
-        from pinnray.comparison.camera.predicted_frame import predicted_frame
-        from pinnray.comparison.camera.track_film import track_figures, track_film
+        from pinnray.film.predicted_frame import predicted_frame
+        from pinnray.film.track_film import track_figures, track_film
 
         last: deque[Frame] = deque(maxlen=1)
         track = folder / "track"

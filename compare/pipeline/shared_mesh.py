@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from pinnray.comparison.runtime.exits import say
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.comparison.runtime.tables import Cell, write_csv
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.exits import say
+from pinnray.runtime.stages import Stages
+from pinnray.runtime.tables import Cell, write_csv
 from pinnray.solvers.fem.adaptive_refinement import Adaptation, check_adaptable
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver

@@ -15,17 +15,17 @@ from pinnray.comparison.evaluation.certification import with_certificates
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import evaluated
 from pinnray.comparison.pipeline.job import Job
-from pinnray.comparison.runtime.output_folder import SOLUTIONS, TRAINING, take_training
-from pinnray.comparison.runtime.provenance import cores, package_versions
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.atomic import write_text
 from pinnray.geometry.cache import expected_triangles
-from pinnray.geometry.content_hash import content_hash, sources_digest
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.processes import Pool, ProcessFailed, end_with_parent
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.content_hash import content_hash, sources_digest
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import cores, package_versions
+from pinnray.runtime.output_folder import SOLUTIONS, TRAINING, take_training
+from pinnray.runtime.processes import Pool, ProcessFailed, end_with_parent
+from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import solver_modules
 from pinnray.solvers.shared_work import SharedWork

@@ -37,11 +37,11 @@ from pinnray.comparison.report import text
 from pinnray.comparison.report.output_files import metrics
 from pinnray.comparison.report.summary import answers
 from pinnray.comparison.report.tables import millimetres, printed_rows, seconds, table_one
-from pinnray.comparison.runtime.html import Packed, base64_text, picture_urls, template_environment
-from pinnray.comparison.runtime.tables import distance, number, percent
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_text
 from pinnray.geometry.mesh.boundary import edge_paths
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.html import Packed, base64_text, picture_urls, template_environment
+from pinnray.runtime.tables import distance, number, percent
 
 BUDGET = 6_000_000
 """Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""

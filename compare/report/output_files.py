@@ -26,9 +26,9 @@ from pinnray.comparison.evaluation.metrics import (
     truth_differences,
     without_rigid_motion,
 )
-from pinnray.geometry.atomic import write_text
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.atomic import write_text
 from pinnray.solvers.finger_figures import FingerFigures
 from pinnray.solvers.solution import IdentifiedForce
 

@@ -10,10 +10,10 @@ from typing import Any
 from pinnray.comparison.evaluation.metrics import MEANS
 from pinnray.comparison.report.output_files import SCHEMA, read_solvers
 from pinnray.comparison.report.summary import RunAnswer, answers
-from pinnray.comparison.runtime.html import picture_urls, write_html
-from pinnray.comparison.runtime.output_folder import RUN_FILE, check_links
-from pinnray.comparison.runtime.tables import NONE, Cell, TextTable, number, percent, write_csv
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.html import picture_urls, write_html
+from pinnray.runtime.output_folder import RUN_FILE, check_links
+from pinnray.runtime.tables import NONE, Cell, TextTable, number, percent, write_csv
 
 TABLE = "runs.csv"
 SHOWN_PICTURES = {"overlay.png": "Deformed finger", "von_mises.png": "Von Mises stress"}

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
-from pinnray.comparison.runtime.tables import NONE, TextTable, number, percent
+from pinnray.runtime.tables import NONE, TextTable, number, percent
 from pinnray.solvers.finger_figures import break_warning
 
 Metrics = Mapping[str, Any]

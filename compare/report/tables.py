@@ -23,10 +23,10 @@ from pinnray.comparison.evaluation.metrics import (
     reference_differences,
     truth_differences,
 )
-from pinnray.comparison.runtime.tables import NONE, Cell, percent, terminal_table, write_csv
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS
+from pinnray.runtime.tables import NONE, Cell, percent, terminal_table, write_csv
 
 Means = tuple[float, float, float | None, float]
 """Mean absolute errors at the markers in the order of `MEANS`, mm; None where it is not printed."""

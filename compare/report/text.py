@@ -11,9 +11,9 @@ from pinnray.comparison.evaluation.certification import REGIONS
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import force_error, truth_differences
-from pinnray.comparison.runtime.tables import distance, number, percent
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.finger import Finger
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.tables import distance, number, percent
 from pinnray.solvers.problem import Load
 
 FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"

@@ -7,14 +7,14 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.drawing.formats.closed_loops import straightened
 from pinnray.geometry.drawing.formats.drawing import place
 from pinnray.geometry.drawing.placement import on_curve
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import DEVIATION, Section
 from pinnray.geometry.section.thickness import inner_normals, wall_thickness
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 APART = 1e-3
 """Smallest distance of two curves, mm."""

@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
-from pinnray.geometry.text_files import parse_toml, read_toml
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import parse_toml, read_toml
 
 Coordinates = tuple[float, float]
 

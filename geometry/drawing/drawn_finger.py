@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, frozen_array
-from pinnray.geometry.atomic import write_text
-from pinnray.geometry.content_hash import content_hash
 from pinnray.geometry.drawing.checks import least_thickness
 from pinnray.geometry.drawing.placement import Placement
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.geometry.notebook import brief, fact_table, png_image
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray, frozen_array
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.content_hash import content_hash
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.notebook import brief, fact_table, png_image
 
 if TYPE_CHECKING:
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
 KIND = "drawing"
 """Value of `kind` in the definition."""

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.content_hash import file_digest
 from pinnray.geometry.drawing import proposal
 from pinnray.geometry.drawing.checks import body, check_contact, check_markers
 from pinnray.geometry.drawing.description import Description, description_beside, load_description
@@ -18,9 +16,11 @@ from pinnray.geometry.drawing.formats.closed_loops import straightened
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, label_of, place
 from pinnray.geometry.drawing.placement import placed, with_part
 from pinnray.geometry.drawing.ready_mesh import ready_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.content_hash import file_digest
+from pinnray.runtime.errors import UserError
 
 SUFFIXES = (".step", ".stp", ".dxf", ".svg", ".msh")
 

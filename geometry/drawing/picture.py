@@ -3,13 +3,13 @@
 import numpy as np
 from matplotlib.patches import Circle
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.drawing.placement import Placement
-from pinnray.geometry.figure import CONTACT, INK, MEASURED, SMALL, Figure, body_figure
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.picture import draw_section
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.thickness import inner_normals
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import CONTACT, INK, MEASURED, SMALL, Figure, body_figure
 
 
 def plot_drawing(finger: Finger, placement: Placement) -> Figure:

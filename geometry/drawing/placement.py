@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import FloatArray, frozen_array
 from pinnray.geometry.drawing.formats.closed_loops import corner_at, cut_at, nearest_piece, run_between
 from pinnray.geometry.drawing.formats.drawing import place
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.section.loop import STRAIGHT, Loop
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import inner_normals
+from pinnray.runtime.arrays import FloatArray, frozen_array
+from pinnray.runtime.errors import UserError
 
 STEEPEST = np.radians(60)
 """Largest angle of the front's normal from the contact's."""

@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import inner_normals, through
+from pinnray.runtime.arrays import FloatArray
 
 MARKERS = 9
 SIDEWAYS = np.cos(np.radians(45))

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 import shapely
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
 from pinnray.geometry.drawing.description import PartMaterial
 from pinnray.geometry.drawing.formats.drawing import MeshInFile, label_of
 from pinnray.geometry.drawing.placement import Placement
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.boundary import are_among, counter_clockwise
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 
 
 def ready_mesh(

@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import model_validator
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.markers import marker_positions
 from pinnray.geometry.finger.parameters import (
     MARKER,
@@ -17,11 +16,12 @@ from pinnray.geometry.finger.parameters import (
 from pinnray.geometry.finger.rules import fitting_marker
 from pinnray.geometry.finger.section import finger_section
 from pinnray.geometry.finger.validation import check
-from pinnray.geometry.notebook import fact_table
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.notebook import fact_table
 
 if TYPE_CHECKING:
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
 
 class Design(Parameters):

@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
 
 class Finger(Protocol):

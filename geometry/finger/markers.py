@@ -4,9 +4,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.section import rib_axes, tip_middle, tip_tangent
+from pinnray.runtime.arrays import FloatArray
 
 
 @lru_cache(maxsize=64)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_core import ErrorDetails
 
-from pinnray.geometry.content_hash import content_hash
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.content_hash import content_hash
+from pinnray.runtime.errors import UserError
 
 
 def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meaning: str) -> Any:

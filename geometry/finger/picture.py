@@ -5,9 +5,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
 
-from pinnray.geometry.figure import BODY, CONTACT, INK, MEASURED, Figure, body_figure
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, Figure, body_figure
 
 
 def plot_finger(finger: Finger) -> Figure:

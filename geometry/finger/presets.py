@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.keywords import FingerKeywords
 from pinnray.geometry.finger.parameters import (
@@ -14,7 +13,8 @@ from pinnray.geometry.finger.parameters import (
     unknown_parameter,
     with_symbol,
 )
-from pinnray.geometry.text_files import read_toml
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import read_toml
 
 FOLDER = Path(__file__).parent.parent / "designs"
 """Folder of the presets, one TOML file each."""

@@ -5,10 +5,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

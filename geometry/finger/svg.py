@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.finger import Finger, outline_with_contact
 from pinnray.geometry.section.loop import Loop
+from pinnray.runtime.arrays import FloatArray
 
 LABELLED = {"base": "#0072b2", "contact": "#d55e00"}
 """Paths that name parts of the outline, with their colours."""

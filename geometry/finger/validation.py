@@ -6,11 +6,11 @@ from itertools import islice
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.parameters import Parameters, parameter_info
 from pinnray.geometry.finger.rules import RULES, Rule
 from pinnray.geometry.finger.section import rib_feet, rib_pitch
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 ROUNDING = -1e-9
 """Tolerance of the margins, mm."""

@@ -5,8 +5,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
 CORNER_ANGLE = np.radians(10.0)
 """Minimum turn of the boundary at a corner."""

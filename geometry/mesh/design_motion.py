@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger, outline_with_contact
 from pinnray.geometry.mesh.elastic_motion import ElasticMotion
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.loop import Loop
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 
 ON_CURVE = 1e-6
 """Largest distance of a boundary's node from the section, mm."""

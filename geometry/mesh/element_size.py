@@ -7,11 +7,11 @@ import numpy as np
 import shapely
 from scipy.ndimage import distance_transform_edt
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import wall_thickness
+from pinnray.runtime.arrays import FloatArray
 
 TRIES = (3.6, 4.8, 6.4)
 """Thickness over element size: the first that gives `MIN_ELEMENTS` of the mesher is taken."""

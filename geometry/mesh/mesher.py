@@ -9,9 +9,6 @@ from typing import NamedTuple
 import gmsh
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.atomic import write_bytes
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger, outline_with_contact
 from pinnray.geometry.mesh.boundary import (
     are_among,
@@ -23,6 +20,9 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.atomic import write_bytes
+from pinnray.runtime.errors import UserError
 
 MIN_ELEMENTS = 3
 """Least number of elements through the thickness of every wall and rib."""

@@ -5,9 +5,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.tri import Triangulation
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.figure import INK, MUTED, Figure, body_figure
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import INK, MUTED, Figure, body_figure
 
 
 def plot_field(

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import FloatArray, IntArray, frozen_array
-from pinnray.geometry.errors import OutsideBodyError
-from pinnray.geometry.notebook import brief
+from pinnray.runtime.arrays import FloatArray, IntArray, frozen_array
+from pinnray.runtime.errors import OutsideBodyError
+from pinnray.runtime.notebook import brief
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,10 @@ on the angles of triangles constructed by bisecting the longest side, Math. Comp
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 
 
 def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = None) -> TriangleMesh:

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import FloatArray, IntArray, frozen_array
-from pinnray.geometry.atomic import write_arrays
-from pinnray.geometry.content_hash import content_hash
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.point_location import LocatedPoints, Locator
-from pinnray.geometry.notebook import fact_table, png_image
+from pinnray.runtime.arrays import FloatArray, IntArray, frozen_array
+from pinnray.runtime.atomic import write_arrays
+from pinnray.runtime.content_hash import content_hash
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.notebook import fact_table, png_image
 
 if TYPE_CHECKING:
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
 BOUNDARY_PREFIX = "boundary_"
 
@@ -188,7 +188,7 @@ class TriangleMesh:
 
     def plot(self) -> "Figure":
         """Every triangle, the contact and the markers, as a matplotlib figure."""
-        from pinnray.geometry.figure import CONTACT, INK, MEASURED, body_figure
+        from pinnray.runtime.figure import CONTACT, INK, MEASURED, body_figure
 
         title = f"Mesh, {len(self.points)} nodes, {len(self.triangles)} triangles"
         touched = self.points[np.unique(self.boundary("contact"))]

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
 from pinnray.geometry.mesh.boundary import (
     CORNER_ANGLE,
     boundary_loops,
@@ -22,6 +21,7 @@ from pinnray.geometry.mesh.boundary import (
 )
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray, frozen_array
-from pinnray.geometry.errors import ShapeError, UserError
-from pinnray.geometry.notebook import brief
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray, frozen_array
+from pinnray.runtime.errors import ShapeError, UserError
+from pinnray.runtime.notebook import brief
 
 STRAIGHT = 1e-12
 """Largest absolute bulge of a straight piece."""

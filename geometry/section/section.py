@@ -9,11 +9,11 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.content_hash import content_hash
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.notebook import brief
 from pinnray.geometry.section.loop import Loop
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.content_hash import content_hash
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.notebook import brief
 
 DEVIATION = 1e-5
 """Largest distance of the polygon from the arcs for which it stands, mm."""

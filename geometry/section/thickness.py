@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
 from pinnray.geometry.section.loop import STRAIGHT, Loop
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
 TOUCH = 1e-7
 """Length of a ray within which it is still at its own start, mm."""

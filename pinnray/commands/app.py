@@ -6,8 +6,8 @@ from pathlib import Path
 from cyclopts import App
 
 from pinnray.commands.launch import EXIT_CODES
-from pinnray.comparison.runtime.provenance import program_version
 from pinnray.options.file import take_options
+from pinnray.runtime.machine import program_version
 
 COMMANDS = (
     *("comparison.compare", "comparison.report"),

@@ -17,8 +17,8 @@ from typing import Any, TextIO
 
 from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 
-from pinnray.comparison.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
 
 EXIT_CODES = (
     "Exit codes: 0 all well; 1 a fault of the program; 2 bad input, with one line that says what and how to "

@@ -22,7 +22,7 @@ def quietable(command: Callable[..., int]) -> Callable[..., int]:
     def run(*positional: Any, quiet: bool = False, **named: Any) -> int:
         if not quiet:
             return command(*positional, **named)
-        from pinnray.comparison.runtime.stages import quiet_stages
+        from pinnray.runtime.stages import quiet_stages
 
         with redirect_stdout(StringIO()), quiet_stages():
             return command(*positional, **named)

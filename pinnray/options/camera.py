@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import Flag, Repeated, existing
+from pinnray.runtime.errors import UserError
 
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
-    from pinnray.comparison.camera.film import Film
+    from pinnray.film.film import Film
     from pinnray.geometry.finger.finger import Finger
     from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
     from pinnray.solvers.physics import Material
@@ -56,7 +56,7 @@ class FilmOptions:
         Raises:
             UserError: If the camera's or the workspace's file does not exist.
         """
-        from pinnray.comparison.camera.film import Film
+        from pinnray.film.film import Film
 
         return Film(
             source,

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from pinnray.geometry.cache import mesh_sizes
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.machine_memory import free_memory_gb
 from pinnray.geometry.mesh.element_size import estimated_triangles
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import free_memory_gb
 from pinnray.solvers.solver import Cost, Solver, Traits
 
 MESH, EXPERIMENT = Cost(per_triangle=40), Cost(per_triangle=300)

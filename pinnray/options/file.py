@@ -7,10 +7,10 @@ from typing import Any
 
 from cyclopts import App, ArgumentCollection
 
-from pinnray.comparison.runtime.exits import say
-from pinnray.comparison.runtime.provenance import package_versions
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.text_files import read_json, read_toml
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import say
+from pinnray.runtime.machine import package_versions
+from pinnray.runtime.text_files import read_json, read_toml
 
 OPTION = "--from"
 INPUTS = ("design", "mesh", "measurements")
@@ -37,7 +37,7 @@ def read_options_file(file: Path) -> dict[str, Any]:
         UserError: If it cannot be read, has no options, has a key beside them and is not of a run, or names
             an output folder elsewhere: the file may be somebody else's.
     """
-    from pinnray.comparison.runtime.output_folder import SCHEMA
+    from pinnray.runtime.output_folder import SCHEMA
 
     is_json = file.suffix.lower() == ".json"
     content = read_json(file, "options file") if is_json else read_toml(file, "options file")

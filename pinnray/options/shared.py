@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from pinnray.comparison.runtime.exits import errors_of_interruption, say
-from pinnray.comparison.runtime.provenance import cores
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.text_files import parse_toml
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import errors_of_interruption, say
+from pinnray.runtime.machine import cores
+from pinnray.runtime.text_files import parse_toml
 from pinnray.solvers.names import LawName, LoadKind
 
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import chdtri, ndtri, stdtrit
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
 LEVEL = 0.95
 """Level of confidence intervals, and of the test whether noise explains the misfit."""

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 
 class MarkerFit(NamedTuple):

@@ -5,8 +5,8 @@ from typing import get_args
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerForces, root_mean_square
 from pinnray.solvers.assimilation.misfit import Choice, MarkerSettings, Misfit, Weighting, misfit_of
 from pinnray.solvers.problem import Problem

@@ -19,10 +19,10 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.special import roots_legendre
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Problem
 
 Weighting = Literal["paper", "precision"]

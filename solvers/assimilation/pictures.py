@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Parameter, values_of
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
 from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting

@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.refinement import refined
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.error_estimate import ErrorEstimator
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Load, Problem

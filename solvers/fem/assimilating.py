@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerForces, residual_phrase
 from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
 from pinnray.solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements

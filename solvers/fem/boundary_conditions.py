@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.assimilation.misfit import Misfit
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.lagrange import LagrangeSpace

@@ -21,7 +21,7 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.solvers.elasticity import Lame
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.ranks import communicator

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.cylinder_contact import ContactState, CylinderContact
 from pinnray.solvers.elasticity import deformation_jacobian, energy_density_of

@@ -30,10 +30,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_matrix, diags, vstack
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import Quadrature, body_quadrature, triangle_rule
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.elasticity import deformation_jacobian, lame_constants, piola_stress
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Material, Problem

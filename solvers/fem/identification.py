@@ -9,12 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 import ufl
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import Registration
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import COST_CHANGE
 from pinnray.solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions

@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass, replace
 from typing import get_args
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, linear_equilibrium
 from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice

@@ -5,8 +5,8 @@ from weakref import finalize
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
 from pinnray.solvers.petsc import PETSc
 

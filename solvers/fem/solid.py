@@ -8,10 +8,10 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.machine_memory import free_memory_gb
 from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import free_memory_gb
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.equilibrium import LoadState

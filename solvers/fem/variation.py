@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
 from pinnray.solvers.fem.finite_strain.nested_path import coarser

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures.measures import (
     Extreme,
     force_curve,

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.boundary import mean_thickness, singular_points
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import cavity_widths, wall_thickness
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.problem import Problem, contact_ends, contact_nodes, front_points
 from pinnray.solvers.solution import SmoothField, SolidField, Solution, State
 

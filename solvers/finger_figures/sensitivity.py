@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.parameters import parameter_info
 from pinnray.geometry.mesh.design_motion import MovingMesh
 from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.variation import VariedProblem
 from pinnray.solvers.finger_figures.figures import (
     QUANTITIES,
@@ -27,7 +27,7 @@ from pinnray.solvers.solver import Progress, silent
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pinnray.geometry.figure import Figure
+    from pinnray.runtime.figure import Figure
 
 STEP = 1e-4
 """Step of a parameter, mm, or of Young's modulus over its value; ten times as much of an angle, degrees, and
@@ -108,7 +108,7 @@ class LocalSensitivity:
 
     def plot(self, name: str = "force") -> "Figure":
         """A bar for each parameter: percent of a figure per percent of it, the largest on top."""
-        from pinnray.geometry.figure import CONTACT, INK, WIDTH, figure
+        from pinnray.runtime.figure import CONTACT, INK, WIDTH, figure
 
         shares = {each: share for each, share in self.relative(name).items() if abs(share) >= LEAST}
         if not shares:

@@ -11,8 +11,8 @@ motion. F is the derivative of E by the rest of c.
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import Lame
 from pinnray.solvers.solution import DisplacementField
 

@@ -16,9 +16,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.quadrature import edge_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 
 LOOSE = 0.1
 """Standard deviation of how far a foot gives, and of how far its ends move when it turns, mm: about as far as

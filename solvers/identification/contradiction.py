@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import HAND_HELD
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import NoSolutionError
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.geometry.registration import Pictures
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import deformation_jacobian
 from pinnray.solvers.identification.body import Body
 from pinnray.solvers.identification.boundary import RigidMotion

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.boundary import mean_thickness
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel

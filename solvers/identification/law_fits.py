@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.fit import Fit

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Prediction
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
 from pinnray.solvers.constrained_elimination import ConstrainedElimination

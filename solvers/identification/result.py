@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.body import Body

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.identification.transfer import transferred
 from pinnray.solvers.identification.unknowns import DEFAULT, parse_unknowns
 from pinnray.solvers.problem import Problem

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri, ndtri
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import ShapeError, UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import ShapeError, UserError
 from pinnray.solvers.assimilation.estimation import (
     LEVEL,
     degrees_of_freedom,

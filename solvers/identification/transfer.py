@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.identification.field import IdentifiedField
 from pinnray.solvers.identification.model import EXACT, Response, ResponseModel
 from pinnray.solvers.problem import Problem, contact_ends

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.geometry.registration import PARTS, Homography, Pictures
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Parameter
 from pinnray.solvers.assimilation.pictures import picture_parameters
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives

@@ -7,7 +7,7 @@ change its modulus by a third, so that the tensile test of a printed strip is be
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Material, Substance
 
 STRETCH = 2.0 - 2.0**-2

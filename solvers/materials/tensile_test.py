@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import LawName, lame_constants, stress_of
 from pinnray.solvers.problem import Material
 

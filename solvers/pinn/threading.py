@@ -19,7 +19,7 @@ import torch
 from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
-from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 
 CHUNK = 2**14
 """Numbers in one array of a chunk: an eighth of a megabyte."""

@@ -16,9 +16,9 @@ from scipy.linalg import cho_solve
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.boundary import evenly_spaced_points
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.misfit import standard_deviations
 from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
 from pinnray.solvers.energy_and_force import energy_and_force

@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.solution import Solution
 

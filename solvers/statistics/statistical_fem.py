@@ -28,8 +28,8 @@ from typing import cast
 
 import numpy as np
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import standard_deviations
 from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
 from pinnray.solvers.energy_and_force import energy_and_force

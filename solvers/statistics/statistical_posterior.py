@@ -14,8 +14,8 @@ from scipy.linalg import cho_solve
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.pictures import FreePictures
 from pinnray.solvers.solution import DisplacementField
 from pinnray.solvers.statistics.kernel_field import (

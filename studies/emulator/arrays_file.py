@@ -8,9 +8,9 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_bytes
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_bytes
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_bytes
+from pinnray.runtime.errors import UserError
 
 
 def keep_arrays(file: Path, arrays: Mapping[str, FloatArray], digest: str, **texts: str) -> None:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.section import finger_section
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.stages import Stages
 from pinnray.solvers.finger_figures import QUANTITIES, heading
 from pinnray.solvers.finger_figures.measures import narrowest_gap, thinnest_wall
 from pinnray.studies.emulator.gaussian_process import GaussianProcess

@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.section import back_line, base_line, front_line, rib_axes, tip_line
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.problem import Material
 
 SHEAR_SHARE = 5 / 6

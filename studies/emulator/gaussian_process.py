@@ -17,7 +17,7 @@ from typing import Self
 import numpy as np
 from scipy.linalg import cholesky, lapack, solve_triangular
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 LEARNERS = 400
 """Samples from which the lengths are learnt: a step costs their cube."""

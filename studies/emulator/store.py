@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
-from pinnray.comparison.runtime.provenance import package_versions
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.content_hash import content_hash, sources_digest
-from pinnray.geometry.text_files import read_json
+from pinnray.runtime.content_hash import content_hash, sources_digest
+from pinnray.runtime.machine import package_versions
+from pinnray.runtime.stages import Stages
+from pinnray.runtime.text_files import read_json
 from pinnray.studies.emulator.arrays_file import keep_arrays, kept_arrays
 from pinnray.studies.emulator.emulator import Emulator, Learnt, fitted_emulator
 from pinnray.studies.emulator.gaussian_process import GaussianProcess

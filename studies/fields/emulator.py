@@ -12,9 +12,9 @@ from math import hypot
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.stages import Stages
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.physics import Load, Material
 from pinnray.solvers.problem import Problem

@@ -7,13 +7,13 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import to_hex
 
-from pinnray.comparison.runtime import html
-from pinnray.comparison.runtime.html import Packed
-from pinnray.comparison.runtime.provenance import package_versions
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime import html
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.html import Packed
+from pinnray.runtime.machine import package_versions
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.physics import Physics

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.studies.fields.reduction import Modes
 
 WATCHED = 12

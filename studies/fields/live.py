@@ -15,11 +15,11 @@ from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import Any
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.geometry.processes import Pool, ProcessFailed
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.processes import Pool, ProcessFailed
 from pinnray.studies.fields.emulator import FieldEmulator, grip_force
 from pinnray.studies.fields.explorer import write_explorer
 from pinnray.studies.fields.reader import FIGURES

@@ -6,9 +6,9 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
 from pinnray.geometry.mesh.boundary import mean_thickness, singular_points
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.solvers.elasticity import Lame, LawName, stress_of, von_mises
 from pinnray.solvers.finger_figures.measures import turn
 from pinnray.solvers.lagrange import EDGES, LagrangeSpace

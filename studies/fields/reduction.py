@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from scipy.linalg import eigh
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.lagrange import LagrangeSpace
 
 

@@ -7,11 +7,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.geometry.text_files import read_json
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import read_json
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.sweep.field_path import FieldPath, MovedMesh

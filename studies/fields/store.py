@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pinnray.comparison.runtime.provenance import package_versions
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.content_hash import content_hash, sources_digest
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.content_hash import content_hash, sources_digest
+from pinnray.runtime.machine import package_versions
+from pinnray.runtime.stages import Stages
 from pinnray.studies.emulator.arrays_file import keep_arrays, kept_arrays
 from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields
 from pinnray.studies.fields.gaussian_processes import Block

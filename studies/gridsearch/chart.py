@@ -9,7 +9,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Rectangle
 
 from pinnray.comparison.figures.style import HALO, axes_at, write_heading
-from pinnray.geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.studies.gridsearch.training_run import TrainingRun, best_of
 
 HEAD, CELL, FOOT, LEFT, GAP = 0.68, 0.34, 0.5, 0.85, 0.25

@@ -5,12 +5,12 @@ from dataclasses import asdict
 
 from rich.table import Table
 
-from pinnray.comparison.runtime.output_folder import job_definition
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.comparison.runtime.tables import NONE, Cell, terminal_table, write_csv
-from pinnray.geometry.atomic import write_json
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import finger_from
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.output_folder import job_definition
+from pinnray.runtime.stages import Stages
+from pinnray.runtime.tables import NONE, Cell, terminal_table, write_csv
 from pinnray.solvers.problem import Problem
 from pinnray.studies.gridsearch.chart import draw_grid
 from pinnray.studies.gridsearch.training_run import GridPoint, TrainingRun, best_of

@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pinnray.geometry.atomic import write_text
 from pinnray.geometry.drawing.drawn_finger import finger_from
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.errors import UserError
 from pinnray.studies.optimum.question import Question
 from pinnray.studies.sweep.job import StudyJob, Task
 

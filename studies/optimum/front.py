@@ -3,7 +3,7 @@
 import moocore
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 
 MARGIN = 0.1
 """Distance of the reference point beyond the worst costs, as a share of their range."""

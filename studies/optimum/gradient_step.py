@@ -9,12 +9,12 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.optimize import linprog
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.validation import broken_rule
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures.measures import narrowest_gap, thinnest_wall
 from pinnray.solvers.finger_figures.sensitivity import SMALLEST, sensitivity_of
 from pinnray.solvers.problem import Problem

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from pinnray.comparison.runtime.html import write_html
-from pinnray.comparison.runtime.tables import TextTable
-from pinnray.geometry.atomic import write_text
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import finger_from
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.html import write_html
+from pinnray.runtime.tables import TextTable
 from pinnray.solvers.finger_figures import QUANTITIES, heading
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver

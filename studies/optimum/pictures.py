@@ -7,8 +7,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 
 from pinnray.comparison.figures.style import HALO, axes_at, write_heading
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.problem import Problem, contact_ends, front_points
 from pinnray.solvers.solution import Solution

@@ -8,7 +8,7 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.studies.emulator.emulator import Emulator
 from pinnray.studies.optimum.front import hypervolume, unbeaten
 from pinnray.studies.optimum.question import Question

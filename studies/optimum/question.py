@@ -6,9 +6,9 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
-from pinnray.geometry.text_files import read_toml
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import read_toml
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.studies.sweep.study import Study
 

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from pinnray.comparison.runtime.output_folder import check_resumable_folder, locked
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_json
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.validation import broken_rule
-from pinnray.geometry.notebook import brief
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.notebook import brief
+from pinnray.runtime.output_folder import check_resumable_folder, locked
+from pinnray.runtime.stages import Stages
 from pinnray.studies.emulator.emulator import fitted_emulator
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.optimum.front import hypervolume, reference_point, unbeaten

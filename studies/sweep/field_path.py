@@ -9,14 +9,14 @@ from typing import Self
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_arrays
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.design_motion import MovingMesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_arrays
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.lagrange import LagrangeField
 from pinnray.solvers.problem import Problem

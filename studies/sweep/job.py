@@ -8,9 +8,7 @@ from math import floor
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from pinnray.comparison.runtime.provenance import package_versions
 from pinnray.geometry.cache import drawn_finger
-from pinnray.geometry.content_hash import sources_digest
 from pinnray.geometry.drawing.description import description_beside, load_description
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
@@ -18,6 +16,8 @@ from pinnray.geometry.finger.parameters import Parameters, parameter_info
 from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.finger.rules import markers_apart, markers_fit
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.content_hash import sources_digest
+from pinnray.runtime.machine import package_versions
 from pinnray.solvers.solver import check_load
 from pinnray.studies.sweep.study import PHYSICS, Study, Value, physics_of
 

@@ -10,10 +10,10 @@ from pinnray.comparison.evaluation.deformed_body import THROUGH_ITSELF, Deformed
 from pinnray.comparison.evaluation.plausibility import problem_remarks
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import finger_from
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.validation import broken_rule
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures import FRACTIONS
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pinnray.comparison.runtime import html
+from pinnray.runtime import html
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs, draw_sensitivity
 from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities

@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
 from pinnray.comparison.figures.style import axes_at, write_heading
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.drawing.drawn_finger import finger_from
-from pinnray.geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.geometry.finger.picture import draw_section
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity

@@ -8,8 +8,8 @@ from math import prod
 import numpy as np
 from scipy.stats import qmc
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.studies.sweep.study import MOST, WHOLE, Range, Study, Value
 
 

@@ -13,7 +13,7 @@ from math import comb
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.studies.sweep.sampling import places_of
 from pinnray.studies.sweep.sweep import Sweep
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.studies.sweep.measurement import Measurement
 
 _NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")

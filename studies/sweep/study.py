@@ -7,7 +7,6 @@ from typing import Any, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.parameters import (
     SYMBOLS,
     CheckedModel,
@@ -16,7 +15,8 @@ from pinnray.geometry.finger.parameters import (
     parameter_info,
     unknown_parameter,
 )
-from pinnray.geometry.text_files import read_toml
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import read_toml
 from pinnray.solvers.problem import Load, Material, Physics
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Solver, Traits

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from pinnray.comparison.evaluation.deformed_body import ADVICE
 from pinnray.comparison.evaluation.plausibility import LOOKS_LIKE
-from pinnray.comparison.runtime.output_folder import check_links, check_resumable_folder, locked
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.atomic import write_json
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.text_files import read_json
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.output_folder import check_links, check_resumable_folder, locked
+from pinnray.runtime.stages import Stages
+from pinnray.runtime.text_files import read_json
 from pinnray.solvers.solver import Progress, silent
 from pinnray.studies.sweep.job import StudyJob, Task
 from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pinnray.comparison.runtime.tables import TextTable, plain
-from pinnray.geometry.atomic import write_bytes, write_text
+from pinnray.runtime.atomic import write_bytes, write_text
+from pinnray.runtime.tables import TextTable, plain
 from pinnray.solvers.finger_figures import QUANTITIES, heading
 from pinnray.studies.sweep.study import title
 from pinnray.studies.sweep.sweep import Sweep

@@ -12,8 +12,8 @@ from itertools import islice, zip_longest
 from math import inf
 from typing import TYPE_CHECKING, Self
 
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.processes import Pool, ProcessFailed
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.processes import Pool, ProcessFailed
 from pinnray.studies.sweep.job import Task
 from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, measured
 

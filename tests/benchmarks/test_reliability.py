@@ -10,8 +10,8 @@ from benchmarks.reliability.document import PAGE, page
 from benchmarks.reliability.faults import ROWS, Expected, Row, chosen, differences, known_trials, plain
 from benchmarks.reliability.supervision import Fault, Point, supervised
 from benchmarks.tables import kept_rows
-from pinnray.geometry.atomic import write_text
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.errors import UserError
 
 ROOT = Path(__file__).parents[2]
 

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.tables import fill, markdown
 from benchmarks.tracker import stress
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 
 def test_rows_that_are_not_made_anew_stay_on_the_page(tmp_path: Path, monkeypatch) -> None:

@@ -27,7 +27,7 @@ from benchmarks.validation.markers import (
 )
 from benchmarks.validation.printed_finger import FINGERS
 from benchmarks.validation.study import all_cases, length, predict
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 
 @pytest.fixture(scope="module")

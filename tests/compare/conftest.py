@@ -11,12 +11,12 @@ import pytest
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import evaluated
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import DisplacementField, ErrorEstimate, Solution, Status
 

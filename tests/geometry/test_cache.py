@@ -17,8 +17,8 @@ from pinnray.geometry import Design, MeshSettings, UserError, cad_files, finger_
 from pinnray.geometry.cache import cache_folder, cache_key, drawn_finger
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.geometry.processes import Pool, child_environment
 from pinnray.geometry.worker import perform, run_task
+from pinnray.runtime.processes import Pool, child_environment
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
 

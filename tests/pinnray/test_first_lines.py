@@ -275,7 +275,7 @@ def test_the_rig_films_what_is_calibrated_tracked_and_weighed(tmp_path: Path):
 def test_a_notebook_shows_the_progress_in_one_line(monkeypatch: pytest.MonkeyPatch):
     from rich.console import Console
 
-    from pinnray.comparison.runtime.stages import NotebookLine, shown_stages
+    from pinnray.runtime.stages import NotebookLine, shown_stages
 
     texts: list[str] = []
 

@@ -12,11 +12,11 @@ import numpy as np
 from pinnray.comparison.crossval.folds import load_cases_of
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks
 from pinnray.comparison.evaluation.truths import TRUTHS, Truth, virtual_experiment
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.mesher import build_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Problem
 

@@ -22,7 +22,7 @@ from pinnray.geometry.drawing.formats.planes import plane_of
 from pinnray.geometry.drawing.load import finger_from_file, read_drawing
 from pinnray.geometry.mesh.quadrature import triangle_rule
 from pinnray.geometry.registration import Registration
-from pinnray.geometry.text_files import read_json, read_toml
+from pinnray.runtime.text_files import read_json, read_toml
 from tests.geometry.drawing.files import (
     BEAM,
     FINRAY,

@@ -26,8 +26,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pinnray.comparison.runtime.exits import BAD_INPUT
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import BAD_INPUT
 
 APPROVED = Path(__file__).with_name("approved.txt")
 SECTION, PYTHON, SHELL = "== ", ">>> ", "$ "

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.camera_calibration import calibrate_camera, calibrate_views
 from pinnray.vision.calibration.camera_file import load_camera, save_camera

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.solution import Solution

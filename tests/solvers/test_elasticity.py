@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import (
     deformation_jacobian,
     energy_density_of,

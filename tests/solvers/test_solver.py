@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import Progress, SolverFailedError, refitter, silent, solved

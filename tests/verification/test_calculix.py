@@ -8,9 +8,9 @@ import pytest
 from benchmarks.verification.cases import calculix
 from benchmarks.verification.document import PAGE, page
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem import equilibrium
 from pinnray.solvers.lagrange import LagrangeSpace

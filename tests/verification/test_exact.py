@@ -8,7 +8,7 @@ from benchmarks.verification.cases.manufactured import waves
 from benchmarks.verification.cases.plate_with_hole import kirsch
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.hyperelastic import Hyperelastic
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Material
 
 CLOSED_FORMS = {

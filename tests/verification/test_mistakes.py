@@ -8,7 +8,7 @@ from benchmarks.verification.cases.cook import COOK
 from benchmarks.verification.cases.finite_strain import FINITE_STRAIN
 from benchmarks.verification.cases.manufactured import MANUFACTURED
 from benchmarks.verification.cases.plate_with_hole import KIRSCH
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers import elasticity
 from pinnray.solvers.fem import equilibrium
 from pinnray.solvers.problem import Material

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.frames.frame import CapturedImage, Frames, Image
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.arrays import FloatArray
 
 MARKERS = {layout: Design(marker_layout=layout).markers for layout in ("front", "joints")}
 

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.chessboard import Board
 from pinnray.vision.frames.frame import GreyImage
 

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.chessboard import Board
 

@@ -14,8 +14,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.board_views import FEWEST_VIEWS, MAX_NAMED, coverage, find_views, unusable
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.chessboard import Board

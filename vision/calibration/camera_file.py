@@ -8,9 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import write_text
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_text
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.camera_calibration import Calibration
 

@@ -7,8 +7,8 @@ from itertools import product
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.chessboard import Board
 from pinnray.vision.calibration.dot_grid import DotGrid
 from pinnray.vision.frames.frame import GreyImage

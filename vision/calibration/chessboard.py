@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.corner_refinement import refine_corners
 from pinnray.vision.frames.frame import GreyImage
 

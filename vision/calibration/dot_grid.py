@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.chessboard import Board, homography_jacobian
 from pinnray.vision.frames.frame import GreyImage
 

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.bundle_adjustment import Adjustment, Poses, adjust
 from pinnray.vision.calibration.camera import LENSES, Camera
 from pinnray.vision.calibration.chessboard import Board

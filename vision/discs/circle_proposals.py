@@ -11,8 +11,8 @@ from math import ceil
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.colour import DARK, Colour
 from pinnray.vision.frames.frame import Image
 

@@ -12,8 +12,8 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.frames.frame import Image
 
 Lab = tuple[float, float, float]

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.colour import HIGHEST, LOWEST, ColourRange
 from pinnray.vision.frames.frame import Image
 

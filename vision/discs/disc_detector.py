@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.vision.discs.circle_proposals import PixelBox, propose_circles
 from pinnray.vision.discs.colour import Colour
 from pinnray.vision.discs.disc_fit import fit_discs

@@ -10,8 +10,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, frozen_array
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray, frozen_array
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs import disc_image_model as model
 from pinnray.vision.discs.fit_priors import Known
 from pinnray.vision.discs.fit_stages import fit_discs_of_one_size

@@ -13,7 +13,7 @@ Source: Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, "Orthogonal matching purs
 import numpy as np
 from scipy.special import ndtr
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,

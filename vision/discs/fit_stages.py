@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.vision.discs.correlated_noise import correlated_noise
 from pinnray.vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, Array, X, Y
 from pinnray.vision.discs.edge_profile import with_edges

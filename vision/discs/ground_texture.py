@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import erfc, ndtri
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.vision.frames.frame import GreyImage
 
 SECTORS = 16

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.vision.discs.correlated_noise import CorrelatedNoise, correlated_noise
 from pinnray.vision.discs.disc_image_model import (
     BLUR,

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import log_ndtr
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,

@@ -6,7 +6,7 @@ from typing import Self
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.vision.discs.disc_image_model import RADIUS, Array, X, Y
 from pinnray.vision.frames.frame import GreyImage
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.vision.frames.formats import PNG, TIFF, pages, refusal, unread_format
 from pinnray.vision.frames.frame import Image
 

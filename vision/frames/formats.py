@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 PNG, TIFF = b"\x89PNG\r\n\x1a\n", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 HEAD = 64

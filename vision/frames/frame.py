@@ -11,7 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 Image = NDArray[np.uint8]
 GreyImage = NDArray[np.uint8]

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import cv2
 
-from pinnray.geometry.atomic import write_bytes
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.atomic import write_bytes
+from pinnray.runtime.errors import UserError
 from pinnray.vision.frames.decoder import JPEG, PNG_HEADER, Decoder, content_of, picture_end
 from pinnray.vision.frames.formats import HEAD, PNG, UNREAD_SUFFIXES, has_pages, refusal, unread_format
 from pinnray.vision.frames.frame import RIG_MARK, CapturedImage, Image, ImageStream

@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.vision.frames.decoder import Decoder, content_of, silenced
 from pinnray.vision.frames.formats import pages
 from pinnray.vision.frames.frame import (

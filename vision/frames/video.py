@@ -20,8 +20,8 @@ from av.container import InputContainer
 from av.video import VideoStream
 from av.video.reformatter import Colorspace, Interpolation, VideoReformatter
 
-from pinnray.geometry.atomic import atomic_path
-from pinnray.geometry.errors import ShapeError, UserError
+from pinnray.runtime.atomic import atomic_path
+from pinnray.runtime.errors import ShapeError, UserError
 from pinnray.vision import MOST_PIXELS
 from pinnray.vision.frames.frame import (
     MAX_RATE,

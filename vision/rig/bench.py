@@ -6,11 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.errors import ShapeError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import ShapeError
 from pinnray.vision.rig.print_layers import PrintLayers
 from pinnray.vision.rig.shapes import CORNERS, Paint, Scene, Shape, blot, circle, closed, rectangle
 from pinnray.vision.tracking.workspace import Workspace

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.calibration.charuco import DICTIONARIES, CharucoBoard
 from pinnray.vision.calibration.chessboard import Board

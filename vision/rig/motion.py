@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
+from pinnray.runtime.arrays import FloatArray
 
 if TYPE_CHECKING:  # the options of the rig are motions, and `--help` has to be quick
     from scipy.interpolate import CubicSpline

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.motion import Course, Motion

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.mesh.triangle_mesh import boundary_edges
+from pinnray.runtime.arrays import FloatArray, IntArray
 
 PERIOD = 0.4
 """Width of two layers, a lighter and a darker one, mm."""

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pinnray.geometry.atomic import atomic_path, write_json, write_text
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.atomic import atomic_path, write_json, write_text
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Pose
 from pinnray.vision.calibration.camera_file import save_camera
 from pinnray.vision.frames.frame import RIG_MARK, Image

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.tracking.workspace import Workspace
 

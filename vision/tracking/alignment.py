@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.registration import FIXED, Homography, Registration, nearest_similarity
+from pinnray.runtime.arrays import FloatArray
 
 LAID = Registration(turn=1.0, shift=1.0, scale=0.01)
 """How a finger lies on its sheet before anything was measured, and how exactly that is printed."""

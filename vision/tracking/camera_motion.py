@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.tracking.marker_plane import MarkerPlane
 from pinnray.vision.tracking.plane_fit import pose_covariance

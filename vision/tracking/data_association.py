@@ -10,8 +10,8 @@ of their weight agrees. Units: mm.
 import numpy as np
 import shapely
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.arrays import FloatArray, IntArray
 
 HYPOTHESES = 256
 """Number of joint hypotheses that are kept."""

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.tracking.workspace import Workspace
 
 GATE = 2.0

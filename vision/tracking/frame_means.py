@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtri
 
-from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
 
 LEAST_SHARE = 0.2

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.colour import DARK
 from pinnray.vision.discs.disc_detector import DiscDetections, detect_discs, detect_discs_near
 from pinnray.vision.frames.frame import Image

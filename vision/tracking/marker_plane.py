@@ -13,8 +13,8 @@ from typing import NamedTuple, Protocol
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.registration import Homography
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
 
 CORNERS = 24

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 STILL = 0.02
 """Root mean square distance from the first frames, mm, that counts as rest, ..."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.discs.colour import DARK, Colour
 from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections, detect_discs

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.registration import HAND_HELD
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.disc_detector import FLOOR, DiscDetections
 from pinnray.vision.frames.frame import Frame, Frames
 from pinnray.vision.tracking.camera_motion import CameraMotion, find_camera_motion

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import FIXED, Registration
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections
 from pinnray.vision.tracking.alignment import Alignment, align
 from pinnray.vision.tracking.marker_plane import MarkerPlane

@@ -5,8 +5,8 @@ from contextlib import suppress
 import cv2
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.tracking.layout_matching import match_layout
 from pinnray.vision.tracking.marker_plane import MarkerPlane

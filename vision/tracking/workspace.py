@@ -11,10 +11,10 @@ from typing import Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.text_files import read_json
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import read_json
 
 MARGIN = 12.0
 """Distance of the fiducials from the finger's bounding box before loading."""

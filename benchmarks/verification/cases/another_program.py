@@ -9,10 +9,10 @@ from scipy.sparse.linalg import SuperLU, splu
 from skfem.models.elasticity import linear_elasticity
 
 from benchmarks.verification.record import Case, Row, at_most
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem, contact_functional
 

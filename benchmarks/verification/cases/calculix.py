@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.verification.record import Case, Row, at_most
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import check_known
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions

@@ -4,10 +4,10 @@ import numpy as np
 
 from benchmarks.verification.cases.calculix import PROGRAM, Answer, cells, solved
 from benchmarks.verification.record import Case, Row, at_most
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.cylinder_contact import CylinderContact
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.lagrange import LagrangeSpace

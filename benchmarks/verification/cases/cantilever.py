@@ -8,7 +8,7 @@ from benchmarks.verification.boundary_value import BoundaryValue, Exact
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, about, at_most, between, slope_rows
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.lagrange import LagrangeField
 from pinnray.solvers.problem import Material
 

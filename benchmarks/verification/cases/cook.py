@@ -5,7 +5,7 @@ import numpy as np
 from benchmarks.verification.boundary_value import BoundaryValue, at_rest
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, about
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.problem import Material
 
 BODY = quadrilateral([(0, 0), (48, 44), (48, 60), (0, 44)])

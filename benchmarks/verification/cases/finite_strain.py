@@ -7,11 +7,11 @@ from benchmarks.verification.cases.another_program import basis_of, components, 
 from benchmarks.verification.hyperelastic import Hyperelastic
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, at_most
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import Solution

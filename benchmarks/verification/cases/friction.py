@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.verification.cases.hertz import FINEST, INDENTATION, RADIUS, block
 from benchmarks.verification.meshes import mapped_mesh
 from benchmarks.verification.record import Case, Row, about, at_most
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.cylinder_contact import ContactPoints, ContactRegion
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver

@@ -4,8 +4,8 @@ import numpy as np
 
 from benchmarks.verification.meshes import mapped_mesh
 from benchmarks.verification.record import Case, Row, about, at_most
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.problem import Load, Material, Problem
 

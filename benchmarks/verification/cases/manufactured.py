@@ -9,7 +9,7 @@ from benchmarks.verification.cases.patch import BODY
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.meshes import mapped_mesh
 from benchmarks.verification.record import Case, Row, about, slope_rows
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.problem import Material
 
 WAVES = np.array([[1.9, 0.6], [1.1, -1.6]])

@@ -8,7 +8,7 @@ from benchmarks.verification.boundary_value import BoundaryValue, Exact
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, at_most
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem
 

@@ -8,7 +8,7 @@ from benchmarks.verification.boundary_value import BoundaryValue, Exact, at_rest
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.meshes import mapped_mesh
 from benchmarks.verification.record import Case, Row, about, slope_rows
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.problem import Material
 
 RADIUS, HALF_WIDTH = 1.0, 4.0

@@ -8,8 +8,8 @@ import ufl
 
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, about, at_most, slope_rows
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import energy_density_of
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.dolfinx_compat import DistributedSpace

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Scale, place
 from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, check_twice, joined
 from pinnray.geometry.drawing.formats.pieces import Piece
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.section.loop import STRAIGHT, Loop
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 ROUND = 0.02
 """Largest relative difference of the radii of a closed curve that is a circle, of arcs or short lines."""

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.section.loop import Loop
+from pinnray.runtime.arrays import FloatArray, IntArray
 
 LABELS = {"clamp": "base", "base": "base", "front": "front", "contact": "contact", "markers": "markers"}
 """Labels that mean something to the finger, by their names in files."""

@@ -9,13 +9,13 @@ from typing import Any
 import ezdxf
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.drawing.formats.closed_loops import Marks
 from pinnray.geometry.drawing.formats.drawing import Drawing, label_of
 from pinnray.geometry.drawing.formats.dxf_blocks import Walk, sound
 from pinnray.geometry.drawing.formats.dxf_file import document_of, dxf_scale
 from pinnray.geometry.drawing.formats.pieces import Curve, Piece, arc_through, arcs_along, full_circle, line
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 WITHOUT_GEOMETRY = re.compile("TEXT|MTEXT|DIMENSION|(MULTI)?LEADER|HATCH|IMAGE|ATTDEF|ATTRIB|POINT")
 """Entities that show or annotate and bound nothing."""

@@ -8,7 +8,7 @@ import numpy as np
 from ezdxf.lldxf.const import DXFError
 
 from pinnray.geometry.drawing.formats.drawing import place
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 MOST = 100_000
 """Largest number of entities in all insertions."""

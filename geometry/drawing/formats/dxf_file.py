@@ -11,7 +11,7 @@ from ezdxf.audit import AuditError
 from ezdxf.lldxf.const import DXFError
 
 from pinnray.geometry.drawing.formats.drawing import UNITS, Scale
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else its notes go to the standard error
 

@@ -8,10 +8,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.drawing.formats.drawing import UNITS, WORDS, Scale, place
 from pinnray.geometry.drawing.formats.pieces import FARTHEST, Piece, is_near
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 
 JOIN = 1e-3
 """Largest distance of two ends that count as one, mm, where no tolerance is given."""

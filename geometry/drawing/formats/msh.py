@@ -11,13 +11,13 @@ import gmsh
 import numpy as np
 from scipy.interpolate import BarycentricInterpolator
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.drawing.formats.closed_loops import Closed, closed_loops, straightened
 from pinnray.geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, Scale, label_of
 from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, line
 from pinnray.geometry.drawing.formats.planes import axes_across, plane_text
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.mesher import session
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 
 FACES = {
     4: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]],

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 DEVIATION = 1e-3
 """Largest distance of the arcs from the ellipse or spline for which they stand, mm."""

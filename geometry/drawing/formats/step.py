@@ -13,13 +13,13 @@ import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.GeomLProp import GeomLProp_SLProps
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.drawing.formats.closed_loops import closed_loops
 from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Scale
 from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
 from pinnray.geometry.drawing.formats.planes import axes_across, plane_of, plane_text
 from pinnray.geometry.drawing.formats.step_parts import parts_of
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 PARALLEL = 1e-6
 """Largest sine of the angle of two parallel directions."""

@@ -19,7 +19,7 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 MARKER = re.compile(r"markers?([-_ .:]?\d+)*(\s*[(<]\d+[)>])?$", re.IGNORECASE)
 """Names of the parts that are markers: also `marker-1:1` of Fusion, `marker-1<2>` of SolidWorks."""

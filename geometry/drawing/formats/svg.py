@@ -9,12 +9,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import svgelements
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.drawing.formats.closed_loops import Marks
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, label_of
 from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
 from pinnray.geometry.drawing.formats.svg_tree import NAMESPACE, drawn, svg_scale, tag_of
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 ASSUMED = '(assumed: 96 pixels to an inch; give units, such as "pt" for 72)'
 """Said of a file whose width and height have no unit."""

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import svgelements
 
 from pinnray.geometry.drawing.formats.drawing import UNITS, Scale
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 LINK = "{http://www.w3.org/1999/xlink}href"

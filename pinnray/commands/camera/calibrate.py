@@ -6,10 +6,10 @@ from typing import Literal
 from rich.console import Console
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import say
-from pinnray.comparison.runtime.provenance import package_versions
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import Flag, OutputPath, Repeated
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import say
+from pinnray.runtime.machine import package_versions
 
 VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
 
@@ -40,7 +40,7 @@ def command(
         without: Photograph to leave out; may be repeated.
         out: Camera file, .json or .yaml.
     """
-    from pinnray.comparison.camera.calibration_report import calibration_table, draw_calibration, view_table
+    from pinnray.film.calibration_report import calibration_table, draw_calibration, view_table
     from pinnray.vision.calibration.camera_calibration import better_lens, calibrate_camera
     from pinnray.vision.calibration.camera_file import check_format, save_calibration
     from pinnray.vision.calibration.charuco import parse_board

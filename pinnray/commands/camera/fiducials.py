@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import say
 from pinnray.options.shared import FingerOptions, OutputPath
+from pinnray.runtime.exits import say
 
 
 @quietable
@@ -33,7 +33,7 @@ def command(
         dictionary: ArUco dictionary of a ChArUco board.
         out: Output folder.
     """
-    from pinnray.geometry.atomic import write_json, write_text
+    from pinnray.runtime.atomic import write_json, write_text
     from pinnray.vision.calibration.charuco import parse_board
     from pinnray.vision.rig.boards import board_svg, largest_square
     from pinnray.vision.tracking.workspace import Workspace, default_workspace, workspace_svg

@@ -7,9 +7,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import say
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OutputPath
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import say
 
 AMBIGUOUS = 0.05
 """Share of the image above which the colour may not tell markers from the rest, unless they stand apart."""

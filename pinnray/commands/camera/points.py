@@ -5,8 +5,8 @@ from typing import cast, get_args
 
 from pinnray.commands.camera.pick import read_numbers
 from pinnray.commands.quiet import quietable
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import FingerOptions, OutputPath
+from pinnray.runtime.errors import UserError
 
 
 @quietable

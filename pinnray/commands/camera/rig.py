@@ -6,9 +6,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pinnray.commands.quiet import quietable
-from pinnray.geometry.errors import UserError
 from pinnray.options.camera import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
 from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
+from pinnray.runtime.errors import UserError
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
 
@@ -43,11 +43,11 @@ def command(
         codec: ffv1 or png (lossless), mjpg or mp4v.
         out: Output folder.
     """
-    from pinnray.comparison.camera.filmed_force import filmed_course
-    from pinnray.comparison.camera.virtual_film import filmed_solution, write_film
     from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.comparison.runtime.output_folder import check_output
-    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.film.filmed_force import filmed_course
+    from pinnray.film.virtual_film import filmed_solution, write_film
+    from pinnray.runtime.output_folder import check_output
+    from pinnray.runtime.stages import Stages
     from pinnray.vision.rig.occluders import cables, check_covers
     from pinnray.vision.rig.recording import Recording
     from pinnray.vision.rig.recording_files import check_codec

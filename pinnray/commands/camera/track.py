@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.live import Live
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import say
-from pinnray.geometry.errors import UserError
 from pinnray.options.camera import FilmOptions, ForceOptions
 from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import say
 from pinnray.solvers.registry import make_solver
 
 
@@ -48,7 +48,8 @@ def command(
         without_video: Write no annotated video.
         out: Output folder.
     """
-    from pinnray.comparison.camera.force_estimate import (
+    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
+    from pinnray.film.force_estimate import (
         MESH,
         LiveForce,
         force_table,
@@ -56,12 +57,11 @@ def command(
         forces_of,
         write_forces,
     )
-    from pinnray.comparison.camera.publication import Publisher
-    from pinnray.comparison.camera.track_film import displacement_line, track_film, track_table
-    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.comparison.runtime.output_folder import check_output, replaced_folder, write_run
-    from pinnray.comparison.runtime.provenance import machine, package_versions
-    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.film.publication import Publisher
+    from pinnray.film.track_film import displacement_line, track_film, track_table
+    from pinnray.runtime.machine import machine, package_versions
+    from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
+    from pinnray.runtime.stages import Stages
 
     if publish is not None and not live:
         raise UserError("--publish is for --live")

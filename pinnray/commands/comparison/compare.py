@@ -7,9 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
-from pinnray.comparison.runtime.provenance import cores
-from pinnray.geometry.errors import UserError
 from pinnray.options.camera import FilmOptions
 from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
 from pinnray.options.shared import (
@@ -23,11 +20,14 @@ from pinnray.options.shared import (
     comma_list,
     existing,
 )
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import NOT_CONVERGED, say
+from pinnray.runtime.machine import cores
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pinnray.comparison.camera.film import Film
+    from pinnray.film.film import Film
     from pinnray.solvers.solver import Solver
 
 
@@ -85,9 +85,9 @@ def command(
     from pinnray.comparison.pipeline.shared_mesh import tolerance_reached
     from pinnray.comparison.pipeline.solving import second_process, worth_starting
     from pinnray.comparison.report.tables import body_table, marker_table
-    from pinnray.comparison.runtime.output_folder import RUN_FILE
-    from pinnray.comparison.runtime.stages import Stages
     from pinnray.options.preset_jobs import job_defaults
+    from pinnray.runtime.output_folder import RUN_FILE
+    from pinnray.runtime.stages import Stages
 
     earlier = read_options_file(from_) if from_ else None
     if from_ and earlier:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -18,6 +17,7 @@ from pinnray.options.shared import (
     read_formats,
     read_processes,
 )
+from pinnray.runtime.exits import NOT_CONVERGED, say
 
 if TYPE_CHECKING:
     from pinnray.comparison.crossval.study import SolverVariant
@@ -69,8 +69,8 @@ def command(
     from pinnray.comparison.crossval.folds import LOAD
     from pinnray.comparison.crossval.study import SIZES, CrossvalStudy
     from pinnray.comparison.crossval.tables import terminal_tables
-    from pinnray.comparison.runtime.stages import Stages
     from pinnray.geometry.registration import Registration
+    from pinnray.runtime.stages import Stages
     from pinnray.vision.measurements import read_measurements
 
     design, mesh = finger.read(options.preset, SIZES)

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import shown
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OptionalOutputPath
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import shown
 
 
 @quietable

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import FingerOptions, OutputPath, comma_list
+from pinnray.runtime.errors import UserError
 
 STEP = "finger"
 """Name of the STEP file, beside which its clamp and contact lie."""
@@ -29,11 +29,11 @@ def command(
         formats: File formats, separated by commas: step, stl, dxf, svg.
     """
     from pinnray.comparison.figures.design_drawing import draw_design
-    from pinnray.comparison.runtime.exits import say
-    from pinnray.geometry.atomic import write_text
     from pinnray.geometry.cache import cad_files
     from pinnray.geometry.drawing.drawn_finger import DrawnFinger, description_lines
     from pinnray.geometry.finger.design import Design
+    from pinnray.runtime.atomic import write_text
+    from pinnray.runtime.exits import say
 
     chosen, _ = finger.read()
     stem = Path(chosen.file).stem if isinstance(chosen, DrawnFinger) else STEP

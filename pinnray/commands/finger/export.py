@@ -7,8 +7,8 @@ from typing import Literal
 from rich.console import Console
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import FingerOptions, Flag, OutputPath, PhysicsOptions
+from pinnray.runtime.exits import NOT_CONVERGED, say
 from pinnray.solvers.registry import make_solver
 
 
@@ -44,11 +44,11 @@ def command(
         out: Output folder.
     """
     from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.comparison.runtime.stages import Stages
-    from pinnray.geometry.errors import UserError
+    from pinnray.robots.export import SIZES, ExportSettings, export_finger
+    from pinnray.robots.score import score_table
+    from pinnray.runtime.errors import UserError
+    from pinnray.runtime.stages import Stages
     from pinnray.solvers.problem import Problem
-    from pinnray.studies.robots.export import SIZES, ExportSettings, export_finger
-    from pinnray.studies.robots.score import score_table
 
     chosen, mesh = finger.read(usual=SIZES)
     if score and kind != "mujoco":

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OutputPath
+from pinnray.runtime.errors import UserError
 
 
 @quietable
@@ -29,7 +29,7 @@ def command(
         strain: Largest strain that counts: that of the finger is 0.1 to 0.3. Default: all.
         out: PNG file of the curves; default: none.
     """
-    from pinnray.comparison.runtime.tables import number, percent
+    from pinnray.runtime.tables import number, percent
     from pinnray.solvers.materials import MATERIALS, fitted, read_tensile_test
 
     if test is None:

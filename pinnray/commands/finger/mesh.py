@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import NOT_CONVERGED
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import Adapt, FingerOptions, OutputPath, PhysicsOptions
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import NOT_CONVERGED
 
 
 @quietable
@@ -27,7 +27,7 @@ def command(
     from pinnray.comparison.figures.mesh_drawing import draw_mesh
     from pinnray.comparison.pipeline.shared_mesh import shared_mesh, tolerance_reached, write_rounds
     from pinnray.comparison.report.output_files import write_mesh
-    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.runtime.stages import Stages
 
     chosen, settings = finger.read()
     material, load = physics.read()

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import say
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import say
 from pinnray.solvers.registry import make_solver
 
 
@@ -34,8 +34,8 @@ def command(
     from pinnray.comparison.evaluation.deformed_body import DeformedBody
     from pinnray.comparison.evaluation.plausibility import problem_remarks
     from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.comparison.runtime.stages import Stages
-    from pinnray.comparison.runtime.tables import write_csv
+    from pinnray.runtime.stages import Stages
+    from pinnray.runtime.tables import write_csv
     from pinnray.solvers.finger_figures import QUANTITIES
     from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
     from pinnray.solvers.problem import Problem

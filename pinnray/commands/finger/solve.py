@@ -4,8 +4,6 @@ from functools import partial
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import (
     Adapt,
     FingerOptions,
@@ -15,6 +13,8 @@ from pinnray.options.shared import (
     comma_list,
     existing_table,
 )
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
 @quietable
@@ -50,7 +50,7 @@ def command(
     from pinnray.comparison.pipeline.shared_mesh import shared_mesh, tolerance_reached
     from pinnray.comparison.report.figures_table import figures_lines
     from pinnray.comparison.report.output_files import write_vtu
-    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.runtime.stages import Stages
     from pinnray.solvers.finger_figures import break_warning
     from pinnray.solvers.problem import Problem
     from pinnray.solvers.registry import unknown_solver

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 
 
 @quietable
@@ -17,7 +17,7 @@ def command(sweep: Path, *, port: int = 8765, refit: bool = False) -> int:
         port: Of this machine; 0 takes any that is free.
         refit: Fit the emulator again.
     """
-    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.runtime.stages import Stages
     from pinnray.studies.fields.live import serve_explorer
     from pinnray.studies.fields.store import fields_of
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OptionalOutputPath
+from pinnray.runtime.errors import UserError
 
 
 @quietable
@@ -19,7 +19,7 @@ def command(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False)
         out: HTML file; default: explore.html in that folder.
         refit: Fit the emulator again.
     """
-    from pinnray.comparison.runtime.stages import Stages
+    from pinnray.runtime.stages import Stages
     from pinnray.studies.fields.explorer import write_explorer
     from pinnray.studies.fields.store import fields_of
 

@@ -8,8 +8,6 @@ from typing import Any
 from rich.console import Console
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -19,6 +17,8 @@ from pinnray.options.shared import (
     read_formats,
     read_processes,
 )
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import NOT_CONVERGED, say
 
 SOLVER = "pinn-std"
 SHORT = 2_000
@@ -53,8 +53,8 @@ def command(
         pictures: Formats of the picture besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/gridsearch-DESIGN.
     """
-    from pinnray.comparison.runtime.stages import Stages
     from pinnray.geometry.mesh.settings import MeshSettings
+    from pinnray.runtime.stages import Stages
     from pinnray.solvers.registry import make_solver
     from pinnray.studies.gridsearch.search import grid_study, runs_table, search_grid
     from pinnray.studies.gridsearch.training_run import FAILED, best_of

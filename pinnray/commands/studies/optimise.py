@@ -22,8 +22,8 @@ def command(
     Args:
         question: TOML file with objectives, constraints, the ranges of the parameters and the solver.
     """
-    from pinnray.comparison.runtime.stages import Stages
-    from pinnray.comparison.runtime.tables import terminal_table
+    from pinnray.runtime.stages import Stages
+    from pinnray.runtime.tables import terminal_table
     from pinnray.studies.optimum.page import front_grid, write_front
     from pinnray.studies.optimum.question import load_question
     from pinnray.studies.optimum.search import search_front

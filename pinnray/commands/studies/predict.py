@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from pinnray.commands.quiet import quietable
-from pinnray.geometry.errors import UserError
 from pinnray.options.shared import OptionalOutputPath, Repeated, existing
+from pinnray.runtime.errors import UserError
 
 if TYPE_CHECKING:
     from pinnray.studies.emulator.emulator import Emulator, Predictions
@@ -37,8 +37,8 @@ def command(
         refit: Fit the emulator again.
         out: CSV file of the predictions for --csv; default: beside it, NAME-predicted.csv.
     """
-    from pinnray.comparison.runtime.stages import Stages
-    from pinnray.geometry.atomic import write_text
+    from pinnray.runtime.atomic import write_text
+    from pinnray.runtime.stages import Stages
     from pinnray.studies.emulator.emulator import prediction_table
     from pinnray.studies.emulator.store import emulator_of
 
@@ -118,7 +118,7 @@ def finger_of_options(emulator: "Emulator", settings: dict[str, str], where: str
 
 def print_table(emulator: "Emulator", found: "Predictions") -> None:
     """Print the quantities of one finger."""
-    from pinnray.comparison.runtime.tables import terminal_table
+    from pinnray.runtime.tables import terminal_table
     from pinnray.solvers.finger_figures import QUANTITIES
 
     headings = ["quantity", "unit", "value", "95 % interval", "meaning"]

@@ -5,8 +5,8 @@ from pathlib import Path
 from rich.console import Console
 
 from pinnray.commands.quiet import quietable
-from pinnray.comparison.runtime.exits import NOT_CONVERGED, say
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
+from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
 @quietable
@@ -22,8 +22,8 @@ def command(
     Args:
         study: TOML file with the ranges of the parameters, the sampling and the solver.
     """
-    from pinnray.comparison.runtime.stages import Stages
-    from pinnray.comparison.runtime.tables import terminal_table
+    from pinnray.runtime.stages import Stages
+    from pinnray.runtime.tables import terminal_table
     from pinnray.studies.sweep.page import write_page
     from pinnray.studies.sweep.study import load_study
     from pinnray.studies.sweep.sweep import run_sweep

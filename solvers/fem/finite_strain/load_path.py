@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import ContactRegion, CylinderContact
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import ContactRegion
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.problem import Problem

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
 from pinnray.solvers.petsc import PETSc
 

@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
 from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
 from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
 from pinnray.solvers.constrained_elimination import ConstrainedElimination

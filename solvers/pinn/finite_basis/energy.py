@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.elasticity import Lame, LawName, check_known, deformation_jacobian, energy_density_of
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix, Factors

@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray, IntArray
 
 Points = TypeVar("Points", torch.Tensor, FloatArray)
 

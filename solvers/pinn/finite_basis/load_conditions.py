@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.problem import Problem, contact_functional, contact_nodes, front_points
 
 MOMENTS = 12

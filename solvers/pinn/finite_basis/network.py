@@ -13,8 +13,8 @@ from typing import ClassVar, Literal
 import numpy as np
 import torch
 
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from pinnray.solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
 from pinnray.solvers.pinn.threading import boxes_around, cut_into_patches, imap_in_threads

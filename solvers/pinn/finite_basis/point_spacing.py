@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.boundary import boundary_widths, mean_thickness, re_entrant_points
 from pinnray.geometry.mesh.quadrature import triangle_rule
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.pinn.finite_basis.load_conditions import contact_end_points
 from pinnray.solvers.problem import Problem, contact_ends, contact_nodes
 

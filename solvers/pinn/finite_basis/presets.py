@@ -7,9 +7,9 @@ from typing import ClassVar, cast
 import numpy as np
 import torch
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField

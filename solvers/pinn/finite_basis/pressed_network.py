@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from scipy.sparse import csr_matrix
 
-from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.cylinder_contact import ContactRegion, ContactState, CylinderContact
 from pinnray.solvers.lagrange import LagrangeSpace

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerFit
 from pinnray.solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
 from pinnray.solvers.assimilation.pictures import FreePictures

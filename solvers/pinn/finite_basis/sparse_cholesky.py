@@ -6,8 +6,8 @@ from weakref import finalize
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray, IntArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.petsc import PETSc
 
 PREFIX = "pinnray_network_"

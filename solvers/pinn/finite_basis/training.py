@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from scipy.optimize import minimize
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from pinnray.solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium
 from pinnray.solvers.pinn.finite_basis.windows import ShepardWindows

@@ -26,8 +26,8 @@ import numpy as np
 import torch
 from torch.nn.functional import softplus
 
-from pinnray.geometry.arrays import BoolArray, FloatArray, IntArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.errors import UserError
 
 NEGLIGIBLE = 1e-8
 """Share below which an encoder is left out in a box of points."""

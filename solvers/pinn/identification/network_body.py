@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import Lame, deformation_jacobian
 from pinnray.solvers.identification.body import Linearised
 from pinnray.solvers.pinn.finite_basis.energy import (

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.identification import FemBody
 from pinnray.solvers.identification.contradiction import with_doubts

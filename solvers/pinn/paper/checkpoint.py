@@ -13,9 +13,9 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.atomic import atomic_path, write_bytes
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import atomic_path, write_bytes
+from pinnray.runtime.errors import UserError
 
 FILE = "checkpoint.safetensors"
 

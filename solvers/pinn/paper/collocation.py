@@ -4,10 +4,10 @@ from typing import Literal
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.boundary import evenly_spaced_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 
 Collocation = Literal["nodes", "elements", "random"]
 """`nodes`: the mesh's nodes, all alike (the paper); `elements`: the rule of degree 2 in every triangle;

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 import torch.distributed
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import Lame, stress_of
 from pinnray.solvers.pinn.paper.mlp_passes import MlpPass
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights

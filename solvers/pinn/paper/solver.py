@@ -7,9 +7,9 @@ from typing import ClassVar, Literal
 import numpy as np
 import torch
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.content_hash import content_hash
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.content_hash import content_hash
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import Weighting
 from pinnray.solvers.pinn.network_solver import NetworkSolver
 from pinnray.solvers.pinn.paper.collocation import Collocation, base_points, collocation_points

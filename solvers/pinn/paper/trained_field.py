@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.point_location import LocatedPoints
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.energy_and_force import energy_and_force
 from pinnray.solvers.pinn.paper.mlp_passes import MlpPass
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp

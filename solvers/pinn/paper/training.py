@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.pinn.paper.checkpoint import HistoryFiles, load_checkpoint, save_checkpoint
 from pinnray.solvers.pinn.paper.loss import Loss, LossEvaluation
 from pinnray.solvers.solver import Progress, TrainingDiverged

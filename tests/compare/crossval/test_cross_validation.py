@@ -17,10 +17,10 @@ from pinnray.cli import main
 from pinnray.comparison.crossval.cross_validation import cross_validate
 from pinnray.comparison.crossval.folds import ALL, ONE
 from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.registration import HAND_HELD
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import BUILT_IN, make_solver

@@ -26,8 +26,8 @@ from pinnray.comparison.crossval.scores import Difference, ScoreInterval, differ
 from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
 from pinnray.comparison.crossval.tables import truth_tables, verdict_sentences
 from pinnray.comparison.evaluation.truths import EVERY_TRUTH, TRUTHS
-from pinnray.comparison.runtime.tables import terminal_table
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.tables import terminal_table
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import make_solver
 from tests.compare.figures.drawn_pages import page_of

@@ -11,12 +11,12 @@ from pinnray.comparison.crossval.scores import score
 from pinnray.comparison.crossval.solver_folds import SolverTask, run_folds, sweep_weights
 from pinnray.comparison.crossval.study import CrossvalStudy, SolverVariant
 from pinnray.comparison.crossval.true_fields import FieldSampler, TrueContact, TrueField
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.registration import Homography, Pictures
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import misfit_of
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem

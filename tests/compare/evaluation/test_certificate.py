@@ -13,12 +13,12 @@ from pinnray.comparison.evaluation.certification import Certifier, body_regions,
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import reference_differences
 from pinnray.comparison.report.text import certificate_sentences
-from pinnray.geometry.arrays import FloatArray, IntArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.mesher import build_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
 from pinnray.solvers.fem.linear import FemSolver

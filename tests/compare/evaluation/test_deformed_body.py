@@ -13,8 +13,8 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.report.html_report import report_html
 from pinnray.comparison.report.output_files import metrics
 from pinnray.geometry import MeshSettings, finger_mesh, load_design
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 
 SELF = "THE BODY GOES THROUGH ITSELF"
 

@@ -9,7 +9,7 @@ import pytest
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import ForceCurve, force_curves, write_force_displacement
 from pinnray.comparison.figures.force_charts import draw_force_displacement
-from pinnray.geometry.figure import MEASURED
+from pinnray.runtime.figure import MEASURED
 from pinnray.solvers.problem import Load
 from pinnray.solvers.solution import Estimated, IdentifiedForce
 from tests.compare.figures.drawn_pages import page_of

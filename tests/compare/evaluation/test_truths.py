@@ -18,12 +18,12 @@ from pinnray.comparison.evaluation.truths import (
     simulate,
 )
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.section import rib_axes
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.wall_motion import WallMotion
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
 from tests.fingers import beam

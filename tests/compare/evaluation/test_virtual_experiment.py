@@ -12,10 +12,10 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.truths import TRUTHS, UnfinishedExperimentError, virtual_experiment
 from pinnray.comparison.pipeline.job import Job
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver

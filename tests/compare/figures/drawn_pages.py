@@ -8,7 +8,7 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from pinnray.geometry.figure import Figure
+from pinnray.runtime.figure import Figure
 
 
 class Page(NamedTuple):

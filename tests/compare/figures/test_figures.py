@@ -17,10 +17,10 @@ from pinnray.comparison.figures import FORMATS, draw_all, pictures_beside
 from pinnray.comparison.figures.fields import QUANTITIES, draw_field
 from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
 from pinnray.comparison.figures.overlay import overlay_extent
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.figure import DPI, WIDTH
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.geometry.processes import Pool, ProcessFailed
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.figure import DPI, WIDTH
+from pinnray.runtime.processes import Pool, ProcessFailed
 from pinnray.solvers.problem import Problem
 from tests.compare.figures.drawn_pages import Page, page_of
 

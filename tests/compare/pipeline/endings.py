@@ -12,12 +12,12 @@ import numpy as np
 
 from pinnray.comparison.pipeline import solving
 from pinnray.comparison.pipeline.job import Job
-from pinnray.comparison.runtime.exits import interruptible
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import interruptible
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Progress, UnsupportedProblemError, silent

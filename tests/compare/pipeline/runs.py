@@ -7,7 +7,7 @@ from rich.console import Console
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.pipeline.job import Job
 from pinnray.comparison.pipeline.pipeline import run
-from pinnray.comparison.runtime.stages import Stages
+from pinnray.runtime.stages import Stages
 
 
 def quiet() -> Stages:

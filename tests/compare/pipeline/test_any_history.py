@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
 from pinnray.comparison.pipeline.job import Job
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution

@@ -12,8 +12,8 @@ from rich.console import Console
 
 from pinnray.comparison.pipeline.job import Job
 from pinnray.comparison.pipeline.pipeline import run
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Load
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Progress

@@ -15,13 +15,13 @@ import pyvista
 
 from pinnray.comparison.pipeline.job import Job
 from pinnray.comparison.report.output_files import metrics
-from pinnray.comparison.runtime.provenance import package_versions
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import FIXED, HAND_HELD
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_versions
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import Solution, Status

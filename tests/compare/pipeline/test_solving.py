@@ -19,9 +19,9 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.pipeline import solving
 from pinnray.comparison.pipeline.job import Job
 from pinnray.comparison.pipeline.solving import Outcome, solve_all
-from pinnray.comparison.runtime.stages import Stages
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.processes import Pool
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.processes import Pool
+from pinnray.runtime.stages import Stages
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Material

@@ -16,10 +16,10 @@ from pinnray.comparison.pipeline.job import Job, checked
 from pinnray.comparison.report.html_report import report_html
 from pinnray.comparison.report.output_files import metrics
 from pinnray.comparison.report.runs import read_runs, write_side_by_side
-from pinnray.comparison.runtime.html import PNG, SMALL, template_environment
 from pinnray.geometry import Design, UserError
-from pinnray.geometry.atomic import write_json
 from pinnray.geometry.drawing.description import Description
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.html import PNG, SMALL, template_environment
 from pinnray.solvers.registry import make_solver
 
 ROOT = Path(__file__).parents[3]

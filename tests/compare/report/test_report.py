@@ -13,8 +13,8 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.report.html_report import report_html
 from pinnray.comparison.report.text import sentence, solve_numbers, stat
-from pinnray.comparison.runtime.tables import percent
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.tables import percent
 from pinnray.solvers.fem.adaptive_refinement import Adaptation, RefinementRound
 from pinnray.solvers.problem import Load, Problem
 

@@ -10,9 +10,9 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.runtime.html import write_html
-from pinnray.comparison.runtime.tables import TextTable
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.html import write_html
+from pinnray.runtime.tables import TextTable
 from tests.compare.report.browser import TIMEOUT, Opened, opened
 
 

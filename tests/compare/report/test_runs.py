@@ -13,7 +13,7 @@ from PIL import Image
 from pinnray.cli import main
 from pinnray.comparison.report.output_files import metrics
 from pinnray.comparison.report.runs import differing_settings, read_runs
-from pinnray.geometry.atomic import write_json
+from pinnray.runtime.atomic import write_json
 from pinnray.solvers.solution import Estimated, IdentifiedForce
 from tests.compare.tables import rows_of
 

@@ -9,8 +9,8 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.arrays import FloatArray
 from tests.compare.report.browser import opened
 
 CANVAS = "document.getElementById('viewer-canvas')"

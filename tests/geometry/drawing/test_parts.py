@@ -10,9 +10,9 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.description import Description, load_description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger, description_lines
 from pinnray.geometry.drawing.load import finger_from_file
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.mesher import session
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.errors import UserError
 
 WHERE = {"markers": [[50, -2]], "materials": {"Strip": {"young": 2e5, "poisson": 0.3}}}
 

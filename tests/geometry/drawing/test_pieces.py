@@ -8,8 +8,8 @@ from scipy.spatial import cKDTree
 
 from pinnray.geometry.drawing.formats.closed_loops import closed_loops, nearest_piece, straightened
 from pinnray.geometry.drawing.formats.pieces import DEVIATION, arc_through, arcs_along, full_circle, line
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.section.loop import Loop
+from pinnray.runtime.errors import UserError
 
 
 def ellipse(parameters):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from pinnray.cli import main
-from pinnray.comparison.runtime.exits import BAD_INPUT
+from pinnray.runtime.exits import BAD_INPUT
 from tests.pinnray.commands.programs import run_python
 from tests.refusals.shell import FILES
 

@@ -15,12 +15,12 @@ import pytest
 import pyvista
 
 from pinnray.cli import compare_main, main
-from pinnray.comparison.runtime.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
 from pinnray.geometry.cache import cad_files, finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.options.preset_jobs import JOBS, JobDefaults, job_defaults
 from pinnray.options.shared import FingerOptions, PhysicsOptions, SolverOptions
+from pinnray.runtime.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
 from pinnray.solvers.fem import adaptive_refinement as adapt
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver

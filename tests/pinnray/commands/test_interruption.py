@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from pinnray.comparison.runtime.exits import INTERRUPTED
-from pinnray.geometry.processes import child_environment
+from pinnray.runtime.exits import INTERRUPTED
+from pinnray.runtime.processes import child_environment
 
 ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
@@ -69,7 +69,7 @@ def workers(parent: int) -> list[int]:
     return [
         int(word)
         for word in found
-        if "pinnray.geometry.processes" in Path(f"/proc/{word}/cmdline").read_text()
+        if "pinnray.runtime.processes" in Path(f"/proc/{word}/cmdline").read_text()
     ]
 
 

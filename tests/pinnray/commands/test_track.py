@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pinnray.cli import main
-from pinnray.comparison.camera.publication import FrameLine
-from pinnray.comparison.runtime.exits import BAD_INPUT
+from pinnray.film.publication import FrameLine
+from pinnray.runtime.exits import BAD_INPUT
 from pinnray.vision.frames.pictures import write_picture
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.measurements import read_measurements

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import binom, chi2, lognorm, norm, t
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import (
     Estimate,
     Parameter,

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
 from pinnray.solvers.assimilation.marker_weighting import FACTORS, MarkerWeighting
 from pinnray.solvers.assimilation.misfit import misfit_of

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.runtime.provenance import package_versions
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.machine import package_versions
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Traits, with_law

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import OutsideBodyError, UserError
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.errors import OutsideBodyError, UserError
 from pinnray.solvers.problem import Load, Material, Problem, contact_functional
 from pinnray.solvers.registry import make_solver, solver_names, usable_solvers
 from pinnray.solvers.solver import Solver, with_law

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.registry import (
     BUILT_IN,
     FORMER,

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem import ranks
 from pinnray.solvers.fem.ranks import communicator, lead, on_all_ranks
 from pinnray.solvers.problem import Load, Material, Problem

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem
 

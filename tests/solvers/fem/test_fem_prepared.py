@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem import equilibrium, linear_solvers
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
 from pinnray.solvers.fem.linear import FemSolver

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.section import rib_pitch
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.finger_figures import QUANTITIES, break_warning, figures_of
 from pinnray.solvers.finger_figures.measures import (

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import ShapeError, UserError
+from pinnray.runtime.errors import ShapeError, UserError
 from pinnray.solvers.fem.identification import FemBody, fem_law_tracker
 from pinnray.solvers.identification.model import EXACT, ResponseModel
 from pinnray.solvers.identification.tracker import ForceTracker

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.registration import FIXED, HAND_HELD, Homography, Registration
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.model import EXACT

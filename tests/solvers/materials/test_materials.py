@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.materials import MATERIALS, TensileTest, fitted, preset, read_tensile_test
 from pinnray.solvers.materials.tensile_test import nominal_stress
 from pinnray.solvers.registry import make_solver

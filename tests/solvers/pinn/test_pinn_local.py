@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.mesh.boundary import boundary_widths, singular_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.errors import UserError
 from pinnray.solvers import stability
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.pinn.paper.checkpoint import save_checkpoint
 from pinnray.solvers.pinn.paper.solver import PaperPinnSolver
 from pinnray.solvers.problem import Load, Problem

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import lame_constants
 from pinnray.solvers.pinn.finite_basis.energy import energy_density, piola_stress_and_tangent
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import gamma, kv
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 
 
 def matern(first: FloatArray, second: FloatArray, length: float, smoothness: float = 2.5) -> FloatArray:

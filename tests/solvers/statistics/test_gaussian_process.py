@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.statistics.gaussian_process import GaussianProcessSolver
 from pinnray.solvers.statistics.kernel_field import SMOOTHNESS

@@ -4,7 +4,7 @@ import csv
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from pinnray.geometry.atomic import write_json
+from pinnray.runtime.atomic import write_json
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.sampling import samples

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from pinnray.cli import main
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures import QUANTITIES, Quantity
 from pinnray.solvers.finger_figures.measures import narrowest_gap, thinnest_wall
 from pinnray.studies.emulator import emulator as module

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.presets import load_design
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.fields.snapshots import KnownSamples, Snapshots

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields
 from pinnray.studies.fields.explorer import write_explorer
 from pinnray.studies.fields.live import HOST, handler

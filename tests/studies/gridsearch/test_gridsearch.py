@@ -12,11 +12,11 @@ import pytest
 
 from pinnray.cli import main
 from pinnray.commands.studies.gridsearch import read_settings
-from pinnray.comparison.runtime.exits import NOT_CONVERGED
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.shared import SolverOptions
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import NOT_CONVERGED
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.lagrange import LagrangeField
 from pinnray.solvers.problem import Load, Problem

@@ -11,8 +11,8 @@ from pinnray.cli import main
 from pinnray.comparison.evaluation.deformed_body import THROUGH_ITSELF
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import finger_from
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.presets import load_design
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.problem import Problem
 from pinnray.studies.optimum.designs import write_designs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import sobol_indices, uniform
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities

@@ -20,9 +20,9 @@ import pytest
 from pinnray.cli import main
 from pinnray.comparison.figures.style import axes_at
 from pinnray.geometry.cache import cad_files
-from pinnray.geometry.errors import UserError
-from pinnray.geometry.figure import figure
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.figure import figure
 from pinnray.solvers.solution import Solution
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement, measured
@@ -130,7 +130,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def children(parent: int) -> set[int]:
     """Worker processes of a sweep."""
     listed = subprocess.run(
-        ["pgrep", "-P", str(parent), "-f", "pinnray.geometry.processes"], capture_output=True, text=True
+        ["pgrep", "-P", str(parent), "-f", "pinnray.runtime.processes"], capture_output=True, text=True
     )
     return {int(word) for word in listed.stdout.split()}
 

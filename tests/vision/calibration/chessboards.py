@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.calibration.charuco import DICTIONARIES, CharucoBoard
 from pinnray.vision.calibration.chessboard import Board

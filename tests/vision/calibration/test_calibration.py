@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pinnray.cli import main
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration import lens_fit
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.calibration.camera_calibration import better_lens, calibrate_camera, calibrate_views

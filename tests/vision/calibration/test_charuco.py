@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Pose
 from pinnray.vision.calibration.charuco import CharucoBoard
 from pinnray.vision.calibration.chessboard import Board

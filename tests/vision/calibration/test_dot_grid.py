@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera_calibration import calibrate_views
 from pinnray.vision.calibration.charuco import parse_board
 from pinnray.vision.calibration.dot_grid import DotGrid

@@ -6,7 +6,7 @@ from math import ceil
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.frames.frame import GreyImage
 from pinnray.vision.rig.exposure import Exposure

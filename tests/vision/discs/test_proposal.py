@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.discs.circle_proposals import highlight_colour, propose_circles
 from pinnray.vision.discs.colour import DARK, ColourRange
 from pinnray.vision.rig.bench import Bench

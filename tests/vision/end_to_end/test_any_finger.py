@@ -5,12 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.mesh.mesher import build_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.registration import HAND_HELD
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, error_of, images, recording, tracked
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.discs.colour import DARK, ColourRange
 from pinnray.vision.frames.frame import CapturedImage, Frames, Image

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.colour import DARK
 from pinnray.vision.tracking.scene import FilmedScene
 from pinnray.vision.tracking.tracker import track

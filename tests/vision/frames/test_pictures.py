@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.vision.frames.decoder import Decoder
 from pinnray.vision.frames.formats import PNG
 from pinnray.vision.frames.pictures import split
@@ -131,7 +131,7 @@ def test_a_header_alone_does_not_take_gigabytes(tmp_path):
     program = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from pinnray.geometry.errors import UserError\n"
+        "from pinnray.runtime.errors import UserError\n"
         "from pinnray.vision.frames.decoder import Decoder\n"
         "try:\n"
         "    list(Decoder()(Path(sys.argv[1]).read_bytes(), sys.argv[1], 'a'))\n"

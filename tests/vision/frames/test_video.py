@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.errors import UserError
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.frames.video import video_frames, video_writer
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.registration import Homography
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.tracking.marker_plane import (
     HOMOGRAPHY,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from pinnray.geometry.arrays import FloatArray
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
 from pinnray.vision.tracking.marker_plane import SIMILARITY, MarkerPlane

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
+from pinnray.runtime.errors import UserError
 from pinnray.vision.tracking.workspace import Workspace, default_workspace, load_workspace, workspace_svg
 from tests.fingers import beam
 

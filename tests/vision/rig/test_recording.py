@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.design import Design
+from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera_file import load_camera
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.measurements import read_measurements

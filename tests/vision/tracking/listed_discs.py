@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.discs.colour import Colour
 from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.tracking.annotation import annotated

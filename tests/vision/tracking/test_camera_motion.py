@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.tracking.camera_motion import find_camera_motion

@@ -6,7 +6,7 @@ from math import exp, log, pi, radians
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.vision.tracking.data_association import (
     associate_markers,
     distance_from_base,

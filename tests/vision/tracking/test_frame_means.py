@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
 from pinnray.vision.tracking.frame_means import LOSSY, mean_detections
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.colour import DARK, ColourRange
 from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.frames.frame import Image

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.tracking.layout_matching import match_layout
 
 DIAMETER, SCALE = 1.6, 8.0

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.geometry.arrays import FloatArray
-from pinnray.geometry.errors import UserError
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.tracking.marker_plane import SIMILARITY
 from pinnray.vision.tracking.rest_detection import RestIntervals

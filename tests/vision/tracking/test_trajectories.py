@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from pinnray.geometry.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.tracking.marker_plane import SIMILARITY, MarkerPlane
 from pinnray.vision.tracking.rest_detection import RestIntervals

@@ -17,8 +17,8 @@ def test_the_models_for_mujoco_are_near_finite_elements_at_loads_that_they_have_
 ):
     """Of a finger with four places for the fit and three for the score, short and stiff, so soon at rest."""
     pytest.importorskip("mujoco")
-    monkeypatch.setattr("pinnray.studies.robots.simulation.RAMP", 0.03)
-    monkeypatch.setattr("pinnray.studies.robots.simulation.HOLD", 0.04)
+    monkeypatch.setattr("pinnray.robots.simulation.RAMP", 0.03)
+    monkeypatch.setattr("pinnray.robots.simulation.HOLD", 0.04)
     made = pr.export("mujoco", SHORT, out=tmp_path, places=4, hinges=6, size=2.0, stroke=3.0, score=True)
     values = {each.model: each.values() for each in made.scores}
     assert values["chain"]["shape_error_mm"] < 0.12 * values["chain"]["motion_mm"]

@@ -5,15 +5,15 @@ import re
 import pytest
 
 from pinnray.cli import main
-from pinnray.comparison.runtime.exits import BAD_INPUT
 from pinnray.geometry.cache import drawn_finger, finger_mesh
 from pinnray.geometry.drawing.description import Description
-from pinnray.geometry.errors import UserError
 from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.mesh.element_size import estimated_triangles
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.cost import MeshCost, check_mesh_cost
 from pinnray.options.preset_jobs import job_defaults
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import BAD_INPUT
 from pinnray.solvers.registry import PRESETS, make_solver
 from pinnray.solvers.solver import Cost, Traits
 from tests.compare.pipeline.endings import Ending

@@ -1,0 +1,58 @@
+"""The course of a filmed finger, and the indenter's true force in every frame."""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pinnray.runtime.tables import Cell
+from pinnray.solvers.solution import Solution
+from pinnray.vision.rig.motion import Course
+from pinnray.vision.rig.recording import Recording
+
+LONGEST_STEP = 0.05
+"""Longest load step of a filmed simulation: a spline through its equilibria is then exact to micrometres."""
+
+
+def filmed_course(solution: Solution) -> Course:
+    """The nodal displacements of a solution on the way to its load, which a linear one reaches straight."""
+    nodes = solution.problem.mesh.at_nodes()
+    if not solution.states:
+        return Course.proportional(solution.displacement(nodes))
+    states = np.array([state.displacement(nodes) for state in solution.states])
+    return Course(solution.history["load_fraction"], states)
+
+
+def true_forces(solution: Solution, recording: Recording, depth: float) -> list[dict[str, Cell]]:
+    """A row for every frame: the force of the indenter and where it acts.
+
+    Args:
+        solution: Behind the recording's course.
+        recording: The film.
+        depth: Of the finger, mm.
+    """
+    history = solution.history
+    if solution.states:
+        shares = history["load_fraction"]
+        forces = np.column_stack([history["reaction_x"], history["reaction_y"]])
+    else:
+        shares, forces = np.array([0.0, 1.0]), np.array([np.zeros(2), solution.reaction])
+    force = CubicSpline(shares, forces)
+    places = history.get("force_abscissa_mm")
+    place = None if places is None else CubicSpline(shares, places)
+    rows: list[dict[str, Cell]] = []
+    for number in range(len(recording.motion)):
+        load = recording.load(number)
+        x, y = force(load).tolist()
+        size = float(np.hypot(x, y))
+        rows.append(
+            {
+                "frame": number,
+                "time_s": number / recording.motion.rate,
+                "load": load,
+                "force_x_N_per_mm": x,
+                "force_y_N_per_mm": y,
+                "N_per_mm": size,
+                "force_N": size * depth,
+                "position_mm": "" if place is None else float(place(load)),
+            }
+        )
+    return rows

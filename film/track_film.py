@@ -1,0 +1,255 @@
+"""Tracks a film and writes the displacements, the trajectories and pictures to check them by eye."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from pinnray.comparison.figures import Picture
+from pinnray.film.film import Film
+from pinnray.film.force_estimate import LiveForce
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.tables import NONE, Cell, significant, terminal_table, write_csv
+from pinnray.solvers.solver import Progress
+from pinnray.vision.frames.frame import DEFAULT_RATE, RIG_MARK, Frame, Frames, Image
+from pinnray.vision.frames.pictures import write_picture
+from pinnray.vision.frames.sources import open_frames
+from pinnray.vision.frames.video import video_writer
+from pinnray.vision.measurements import write_measurements
+from pinnray.vision.tracking.annotation import annotated
+from pinnray.vision.tracking.frame_tracker import FrameDetections
+from pinnray.vision.tracking.tracker import track
+from pinnray.vision.tracking.trajectories import Tracking
+
+BEFORE_AND_AFTER = 2
+"""Number of pictures whose times nobody asks for."""
+UNTIMED = (
+    f"times are counted at an assumed {DEFAULT_RATE:g} frames a second, which pictures and pipes do not say: "
+    "give the fps"
+)
+
+
+def track_film(
+    film: Film,
+    design: Finger,
+    folder: Path,
+    report: Progress,
+    *,
+    video: bool = True,
+    record: Path | None = None,
+    watch: Callable[[Frame, FrameDetections], None] | None = None,
+) -> tuple[Tracking, Observations]:
+    """Track a film and write `observations.csv`, `tracks.csv`, `track.json` and pictures into a folder.
+
+    Args:
+        film: The film.
+        design: The finger in it.
+        folder: An existing folder.
+        report: Called with the fraction done and a short text.
+        video: Whether to write the annotated video too.
+        record: Video of all frames that were seen, also of a film that is refused in the end; for a camera or
+            a pipe, which show them once.
+        watch: Called with every frame and its detections.
+
+    Raises:
+        UserError: If the film cannot be read or tracked.
+    """
+    scene = film.scene(design)
+    kept: dict[str, tuple[Image, FrameDetections]] = {}
+    with open_frames(film.source, rate=film.fps) as frames, ExitStack() as stack:
+        if film.fps and frames.count is not None and frames.rate != film.fps:
+            raise UserError(
+                f"fps {film.fps:g}: {frames.name} says {frames.rate:g} frames a second itself; leave it out"
+            )
+        if record is not None:
+            stack.enter_context(recorded(frames, record))
+        write = None
+        if video:
+            write = stack.enter_context(
+                video_writer(
+                    folder / "annotated.mp4",
+                    frames.size,
+                    frames.rate,
+                    comment=RIG_MARK if frames.simulated else "",
+                )
+            )
+
+        def see(frame: Frame, detections: FrameDetections) -> None:
+            kept.setdefault("initial", (frame.image, detections))
+            kept["final"] = (frame.image, detections)
+            seen = int(np.isfinite(detections.markers.radii).sum())
+            status = f"{seen} of {len(detections.places)} markers"
+            if write is not None:
+                lines = [f"frame {frame.number}, {frame.time:.3f} s", status]
+                write(annotated(frame.image, detections, lines))
+            if watch is not None:
+                watch(frame, detections)
+            share = (frame.number + 1) / frames.count if frames.count else 0.0
+            report(min(share, 1.0), f"frame {frame.number + 1}, {status}")
+
+        tracking = track(frames, scene, see)
+        if not frames.timed and len(tracking.times) > BEFORE_AND_AFTER:
+            tracking = replace(tracking, warnings=(*tracking.warnings, UNTIMED))
+    observations = tracking.observations(_sentence(film, tracking))
+    for name, end in (("initial", tracking.rest.initial), ("final", tracking.rest.final)):
+        image, detections = kept[name]
+        trajectories = list(tracking.pixels.swapaxes(0, 1)) if name == "final" else []
+        lines = [f"{name}: frames {end.start} to {end.stop - 1} are at rest", *tracking.warnings]
+        write_picture(folder / f"{name}.png", annotated(image, detections, lines, trajectories=trajectories))
+    write_measurements(folder / "observations.csv", observations)
+    write_csv(folder / "tracks.csv", track_rows(tracking))
+    write_json(folder / "track.json", track_summary(tracking, observations) | film.provenance())
+    return tracking, observations
+
+
+@contextmanager
+def recorded(frames: Frames, path: Path) -> Iterator[None]:
+    """Write the frames that are iterated in the block into a video, also if the block raises a `UserError`.
+
+    Raises:
+        UserError: If the frames are those of a file, which exists, or the video cannot be written.
+    """
+    if frames.count is not None:
+        raise UserError(f"{frames.name} is a file; a recording keeps the frames of a camera or a pipe")
+    refusal: UserError | None = None
+    with video_writer(path, frames.size, frames.rate, comment=RIG_MARK if frames.simulated else "") as write:
+        seen = 0
+
+        def keep(image: Image) -> None:
+            nonlocal seen
+            write(image)
+            seen += 1
+
+        frames.keep(keep)
+        try:
+            yield
+        except UserError as error:
+            if not seen:
+                raise
+            refusal = error
+    if refusal is not None:
+        raise refusal
+
+
+def _sentence(film: Film, tracking: Tracking) -> str:
+    """One sentence on the source and the accuracy of the displacements."""
+    initial, final = (len(end) for end in tracking.rest)
+    deviations = np.sqrt(np.diag(tracking.displacement_covariance)) if tracking.visible.any() else np.zeros(1)
+    aligned = f"; {tracking.alignment}" if tracking.alignment else ""
+    camera = "a calibrated camera" if film.camera else "no calibrated camera"
+    origin = f"{RIG_MARK}, tracked" if tracking.simulated else "measured"
+    return (
+        f"{origin} by pinnray track ({film.method}, {camera}) in {Path(film.source).name}, "
+        f"means of {initial} and {final} frames at rest, standard deviations {deviations.min():.2g} to "
+        f"{deviations.max():.2g} mm{aligned}"
+    )
+
+
+def track_rows(tracking: Tracking) -> list[dict[str, Cell]]:
+    """A row for every marker in every frame; empty cells where it was not detected."""
+    names = ("x_px", "y_px", "std_x_px", "std_y_px", "x_mm", "y_mm")
+    deviations = np.sqrt(np.diagonal(tracking.covariances, axis1=2, axis2=3))
+    values = np.concatenate([tracking.pixels, deviations, tracking.positions], axis=2).tolist()
+    detected = np.isfinite(tracking.pixels).all(axis=2)
+    return [
+        {"frame": frame, "time_s": time, "marker": marker + 1, "visible": int(seen)}
+        | {name: value if seen else "" for name, value in zip(names, row, strict=True)}
+        for frame, time in enumerate(tracking.times.tolist())
+        for marker, (seen, row) in enumerate(zip(detected[frame], values[frame], strict=True))
+    ]
+
+
+def track_summary(tracking: Tracking, observations: Observations) -> dict[str, Any]:
+    """The content of `track.json`, but for the film."""
+    initial, final = tracking.rest
+    return {
+        "schema": 1,
+        "simulated": tracking.simulated,
+        "frames": len(tracking.times),
+        "rest": {"initial": [initial.start, initial.stop - 1], "final": [final.start, final.stop - 1]},
+        "fiducials_rms_mm": tracking.plane.residual,
+        "markers": len(tracking.visible),
+        "visible": int(tracking.visible.sum()),
+        "offset_rms_mm": float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1)))),
+        "alignment": tracking.alignment and tracking.alignment.numbers(),
+        "displacement_covariance_mm2": tracking.displacement_covariance.tolist(),
+        "warnings": list(tracking.warnings),
+        "description": observations.source,
+    }
+
+
+def displacement_line(live: Live, force: LiveForce | None = None) -> Callable[[Frame, FrameDetections], None]:
+    """A function that shows the displacements, mm, since its first frame; a dash for an invisible marker.
+
+    Args:
+        live: Where they are shown.
+        force: Follows the force, which is shown below them.
+    """
+    start: FloatArray | None = None
+
+    def show(frame: Frame, detections: FrameDetections) -> None:
+        nonlocal start
+        if start is None:
+            start = detections.places
+        if force is not None:
+            force.watch(frame, detections)
+        moved = (detections.places - start).tolist()
+        seen = np.isfinite(detections.markers.radii)
+        cells = [f"{u:+.2f},{v:+.2f}" if known else "–" for (u, v), known in zip(moved, seen, strict=True)]
+        lines = [f"{frame.time:8.2f} s  {'  '.join(cells)}", *([force.line()] if force else [])]
+        live.update(Text("\n".join(lines), no_wrap=True, overflow="ellipsis"))
+
+    return show
+
+
+def track_table(tracking: Tracking, observations: Observations) -> Table:
+    """The displacements, for the terminal."""
+    frames = np.isfinite(tracking.pixels[:, :, 0]).sum(axis=0)
+    rows = []
+    for number, (x, y) in enumerate(observations.points):
+        cells = [NONE, NONE]
+        if observations.visible[number]:
+            pairs = zip(
+                observations.displacements[number], observations.standard_deviations[number], strict=True
+            )
+            cells = [f"{value:.4f} ±{significant(deviation, 2)}" for value, deviation in pairs]
+        rows.append([str(number + 1), f"{x:.3f}", f"{y:.3f}", *cells, str(frames[number])])
+    return terminal_table(
+        f"Displacements of the markers, mm ({observations.label})",
+        ("marker", "x", "y", "u", "v", "frames"),
+        rows,
+        caption="±: one standard deviation; frames: in which the marker was seen",
+    )
+
+
+def track_figures(folder: Path, tracking: Tracking) -> list[Picture]:
+    """The annotated pictures of a track, for a report."""
+    measured = "tracked in a simulated film" if tracking.simulated else "measured"
+    moved = np.hypot(*np.diff(tracking.rest_positions, axis=0)[0][tracking.visible].T)
+    seen, count = int(tracking.visible.sum()), len(tracking.visible)
+    camera = "virtual camera" if tracking.simulated else "camera"
+    remarks = " ".join(f"{warning[:1].upper()}{warning[1:]}." for warning in tracking.warnings)
+    return [
+        Picture(
+            folder / "initial.png",
+            f"The finger at rest, as the {camera} saw it",
+            "Green: the markers with their numbers; blue: the fiducials that give the plane.",
+            f"{int(np.isfinite(tracking.initial.radii).sum())} of {count} markers were detected.",
+        ),
+        Picture(
+            folder / "final.png",
+            f"The finger pressed, as the {camera} saw it",
+            f"Magenta: the marker trajectories. {seen} of {count} markers are {measured}. {remarks}".strip(),
+            f"The markers moved by {moved.min():.3g} to {moved.max():.3g} mm.",
+        ),
+    ]

@@ -1,0 +1,138 @@
+"""A matplotlib figure with the project's look, which saves itself as PNG and shows itself in a notebook."""
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as MplFigure
+
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
+
+WIDTH = 5.5
+"""Width of every figure, inches."""
+
+SMALL = 8.1
+"""Smallest type, points: 5 points in a journal's column of 3.4 inches, the least that journals print."""
+
+DPI = 300
+NOTEBOOK_DPI = 150
+LEFT, RIGHT, TITLE, BELOW = 0.55, 0.12, 0.3, 0.45
+"""Margins of the axes of `body_figure`, inches."""
+
+INK = "#1a1a1a"
+MUTED = "#767676"
+BODY = "#e4e4e4"
+CONTACT = "#d55e00"
+MEASURED = "#d1006c"
+"""Colour of measurements: occurs in none of the colour maps and for no solver."""
+
+SETTINGS: "dict[RcKeyType, Any]" = {
+    # A matplotlibrc of others in the working folder could have LaTeX read any file.
+    **{name: value for name, value in mpl.rcParamsDefault.items() if not name.startswith("backend")},
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.titlesize": 9,
+    "axes.labelsize": 8.5,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.5,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.fontsize": SMALL,
+    "legend.frameon": False,
+    "figure.titlesize": 10,
+    "mathtext.fontset": "dejavusans",
+    "savefig.dpi": "figure",
+    "pdf.fonttype": 42,  # letters as letters, as journals ask for
+    "svg.hashsalt": "pinnray",  # the same file every time
+}
+
+
+OPTIONS: dict[str, dict[str, Any]] = {
+    ".png": {"pil_kwargs": {"compress_level": 3}},  # quick
+    ".pdf": {"metadata": {"CreationDate": None}},  # equal figures are equal files
+    ".svg": {"metadata": {"Date": None}},
+}
+"""Options of a format, by its suffix."""
+
+
+class Figure(MplFigure):
+    """A matplotlib figure of `WIDTH` by a height in inches, drawn with the project's settings wherever it is.
+
+    It belongs to no pyplot window. Matplotlib gives such a figure no picture in a notebook: this one has it.
+    """
+
+    def __init__(self, height: float) -> None:
+        super().__init__(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+        FigureCanvasAgg(self)
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw with the project's settings, whatever settings the process has."""
+        with mpl.rc_context(SETTINGS):
+            super().draw(renderer)
+
+    def save(self, path: Path, formats: Collection[str] = ()) -> Path:
+        """Write the figure atomically, and return the path.
+
+        Args:
+            path: Where to write, in the format of its suffix.
+            formats: Others in which it is written beside it: `svg` or `pdf`.
+        """
+        with mpl.rc_context(SETTINGS):
+            for file in (path, *(path.with_suffix(f".{name}") for name in formats)):
+                buffer = BytesIO()
+                self.savefig(buffer, format=file.suffix.removeprefix("."), **OPTIONS.get(file.suffix, {}))
+                write_bytes(file, buffer.getvalue())
+        return path
+
+    def _repr_png_(self) -> bytes:
+        """The picture in a notebook."""
+        buffer = BytesIO()
+        with mpl.rc_context(SETTINGS):
+            self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
+        return buffer.getvalue()
+
+
+@contextmanager
+def figure(height: float) -> Iterator[Figure]:
+    """A new figure of a height in inches, to be filled in the block with the project's settings."""
+    with mpl.rc_context(SETTINGS):
+        yield Figure(height)
+
+
+@contextmanager
+def body_figure(points: FloatArray, title: str, *, foot: float = 0.0) -> Iterator[tuple[Figure, Axes]]:
+    """A figure with axes in mm, of equal scale, around points of shape (n, 2), mm.
+
+    Args:
+        points: What must be visible.
+        title: Of the figure.
+        foot: Room below the axes, inches.
+    """
+    margin = 0.03 * float(np.ptp(points[:, 0]))
+    (left, bottom), (right, top) = points.min(axis=0) - margin, points.max(axis=0) + margin
+    width = WIDTH - LEFT - RIGHT
+    height = width * (top - bottom) / (right - left)
+    total = TITLE + height + BELOW + foot
+    with figure(total) as drawn:
+        axes = drawn.add_axes((LEFT / WIDTH, (BELOW + foot) / total, width / WIDTH, height / total))
+        axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="x, mm", ylabel="y, mm", aspect="equal")
+        axes.set_title(title, weight="bold")
+        yield drawn, axes

@@ -1,0 +1,302 @@
+"""The output folder: one complete result, the last or the new one; or the finished parts of a long job.
+
+A run writes into `NAME.partial`, which carries a mark and replaces the output folder `NAME` at the end. A
+killed run leaves there its finished solutions and the checkpoints of the solver in training, from which a
+resumed run goes on.
+"""
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from ctypes import CDLL
+from pathlib import Path
+from typing import Any
+
+from pydantic_core import to_jsonable_python
+
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.atomic import is_partial, remove_partials, write_json
+from pinnray.runtime.content_hash import file_digest, sources_digest
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_versions
+from pinnray.solvers.problem import Load, Material
+
+RUN_FILE = "run.json"
+SCHEMA = 1
+"""Version of the form of `run.json`."""
+MARK = ".pinnray-unfinished"
+"""File in a folder that a run works in or removes; another folder is never replaced."""
+SOLUTIONS = "solutions"
+TRAINING = "training"
+
+
+def check_output(out: Path) -> None:
+    """Raise a `UserError` if the folder must not be replaced."""
+    try:
+        out.resolve(strict=out.is_symlink())
+    except (OSError, RuntimeError):  # Python 3.11 raises the latter for a loop of links
+        raise UserError(f"{out} is a link that leads nowhere; name an output folder") from None
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out} is a file; name an output folder")
+    if Path.cwd().is_relative_to(out.resolve()):
+        raise UserError(
+            f"{out} is replaced as a whole: the program cannot run inside it; name another folder"
+        )
+    check_links(out)
+    files = [path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file()]
+    ours = _written(out)
+    if files and not ours:
+        state = "its run.json is damaged" if (out / RUN_FILE).exists() else "it has no run.json"
+        raise UserError(
+            f"{out} holds {min(files)}, and {state}, which lists the files that a run has written, so that "
+            "files of yours could be lost; move the folder, or name another output folder"
+        )
+    if foreign := next((path for path in files if path.as_posix() not in ours), None):
+        raise UserError(
+            f"{out} holds {foreign}, which no run has written and which would be lost; move it, or name "
+            "another output folder"
+        )
+
+
+def check_links(folder: Path) -> None:
+    """Raise a `UserError` if a folder holds a symbolic link, through which a run would write elsewhere."""
+    if found := next((path for path in folder.rglob("*") if path.is_symlink()), None):
+        raise UserError(
+            f"{found} is a link, which no run has made and which leads to files elsewhere; remove it, or "
+            "name another folder"
+        )
+
+
+@contextmanager
+def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
+    """A folder that takes the place of `out` when the block ends without an error.
+
+    Args:
+        out: The output folder.
+        keep: Names of the solvers whose solutions and checkpoints of a killed run are kept.
+
+    Raises:
+        UserError: If the folder cannot be written, or another run is writing it.
+    """
+    out = out.resolve()
+    partial = out.with_name(f"{out.name}.partial")
+    missing = [folder for folder in partial.parents if not folder.exists()]
+    if partial.is_symlink():
+        raise UserError(
+            f"{partial} is a link, which no run has made; remove it, or name another output folder"
+        )
+    check_links(partial)
+    try:
+        partial.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"cannot write to {partial}: {error.strerror}") from None
+    with locked(partial):
+        ours = (partial / MARK).exists() or (keep and _is_whole(partial))
+        if not ours and any(partial.iterdir()):
+            raise UserError(
+                f"{partial} would be replaced, but it is not of an unfinished run; move it, or name another "
+                "folder"
+            )
+        (partial / MARK).touch()
+        _restore(out)
+        _clear(partial, keep)
+        try:
+            yield partial
+        except BaseException:
+            if not any([*partial.glob(f"{SOLUTIONS}/*.npz"), *partial.glob(f"{TRAINING}/*/*")]):
+                with suppress(OSError):
+                    _discard(partial)
+                for folder in missing:
+                    with suppress(OSError):  # in use by another program
+                        folder.rmdir()
+            raise
+        _take_place(partial, out)
+
+
+def write_run(folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Write `run.json`: the provenance, and the SHA-256 of every other file."""
+    files = {
+        path.relative_to(folder).as_posix(): file_digest(path)
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in (RUN_FILE, MARK)
+    }
+    write_json(folder / RUN_FILE, {"schema": SCHEMA, **provenance, "files_sha256": files})
+
+
+def take_training(name: str, source: Path, target: Path) -> None:
+    """Copy a solver's checkpoints from one output folder to another, replacing those there."""
+    left, place = source / TRAINING / name, target / TRAINING / name
+    if left != place:
+        shutil.rmtree(place, ignore_errors=True)
+        if left.is_dir():
+            copy = place.with_name(f".{name}.copy")  # whole or not there, whenever the process is killed
+            shutil.rmtree(copy, ignore_errors=True)
+            shutil.copytree(left, copy)
+            copy.replace(place)
+
+
+def _take_place(partial: Path, out: Path) -> None:
+    """Replace the output folder; the mark goes last, so that what a kill leaves is known as a run's."""
+    previous = _previous(out)
+    if previous.exists():
+        if not (previous / MARK).exists() and any(previous.iterdir()):
+            raise UserError(f"{previous} would be replaced, but no run has left it; move it")
+        _discard(previous)  # of a run that was killed right here
+    try:
+        if out.exists():
+            with locked(out):  # for a moment it has the name of an unfinished folder
+                (out / MARK).touch()
+                if _exchanged(partial, out):
+                    with suppress(OSError):  # a later run replaces it
+                        partial.replace(previous)
+                else:
+                    out.replace(previous)
+                    partial.replace(out)
+        else:
+            partial.replace(out)
+    except OSError as error:
+        with suppress(OSError):
+            _restore(out)
+        with suppress(OSError):
+            (partial / MARK).unlink()  # no later run may clear it
+        raise UserError(
+            f"cannot replace {out} ({error.strerror}); the complete result is in {partial}"
+        ) from None
+    with suppress(OSError):  # what is left does no harm
+        (out / MARK).unlink()
+    if previous.exists():
+        with suppress(OSError):
+            _discard(previous)
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Exchange two folders in one step; False where the file system cannot. Source: rename(2)."""
+    renameat2 = getattr(CDLL(None), "renameat2", None)
+    here, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    return renameat2 is not None and renameat2(here, bytes(one), here, bytes(other), exchange) == 0
+
+
+def _previous(out: Path) -> Path:
+    """Place of the last result for the moment in which the new one takes its name."""
+    return out.with_name(f".{out.name}.previous")
+
+
+def _restore(out: Path) -> None:
+    """Give the last result its name back, if a run ended between the two renames."""
+    previous = _previous(out)
+    if not out.exists() and (previous / MARK).exists() and _is_whole(previous):
+        previous.replace(out)
+        (out / MARK).unlink()
+
+
+def _discard(folder: Path) -> None:
+    """Remove a folder that carries the mark; the mark goes last."""
+    _clear(folder, keep=())
+    shutil.rmtree(folder)
+
+
+def _written(out: Path) -> set[str]:
+    """The files that `run.json` lists, and itself; none if it is missing or damaged."""
+    try:
+        return {RUN_FILE, *json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["files_sha256"]}
+    except (OSError, ValueError, LookupError, TypeError):
+        return set()
+
+
+def _is_whole(folder: Path) -> bool:
+    """Whether a folder has a `run.json` and every file that it lists."""
+    return all((folder / name).is_file() for name in _written(folder) or {RUN_FILE})
+
+
+def _clear(folder: Path, keep: Collection[str]) -> None:
+    """Remove everything but the mark, and the solutions and checkpoints of solvers to keep."""
+    kept = {folder / MARK, *(folder / TRAINING / name for name in keep)}
+    kept |= {folder / SOLUTIONS / f"{name}.npz" for name in keep}
+    kept |= {path.parent for path in kept}
+    for path in [*folder.glob(f"{SOLUTIONS}/*"), *folder.glob(f"{TRAINING}/*"), *folder.iterdir()]:
+        if path in kept:
+            continue
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Lock the folder against a second run; the lock ends with the process.
+
+    Files that a killed run has half written are removed.
+    """
+    busy = UserError(f"another run is writing to {folder}; wait for it, or name another output folder")
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # some network file systems have no locks
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise busy from None
+        if not folder.exists() or not os.path.samestat(os.fstat(handle), folder.stat()):
+            raise busy  # it has just given the folder its final name
+        remove_partials(folder)
+        yield
+    finally:
+        os.close(handle)
+
+
+def job_definition(
+    design: Finger, mesh: MeshSettings | None, material: Material, load: Load, module: str
+) -> dict[str, Any]:
+    """Everything that the result of a job on a finger depends on, if the module of this name makes it."""
+    return {
+        "schema": 1,
+        "design": design.definition(),
+        "mesh": mesh and mesh.model_dump(),
+        "material": material.model_dump(),
+        "load": load.model_dump(mode="json"),
+        "versions": package_versions(),
+        "program_sha256": sources_digest(module),
+    }
+
+
+def check_resumable_folder(
+    file: Path, definition: Mapping[str, Any], *, job: str, free: Collection[str] = ()
+) -> None:
+    """Refuse a folder that holds a job with another definition, or something else.
+
+    Args:
+        file: The definition of the job in the folder, if there is one.
+        definition: The definition of this job.
+        job: The kind of job, such as "grid search".
+        free: Entries that may differ, such as `study.samples`.
+    """
+    out = file.parent
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out} is a file; name an output folder")
+    if not out.exists() or all(is_partial(path) for path in out.iterdir()):
+        return
+    check_links(out)
+    try:
+        before = _flat(json.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        raise UserError(f"{out} holds files that are not of a {job}; name another output folder") from None
+    now = _flat(to_jsonable_python(definition))
+    names = [name for name in before | now if name not in free and before.get(name) != now.get(name)]
+    if names:
+        raise UserError(
+            f"{out} holds a {job} with other settings ({', '.join(names)}); "
+            "name another output folder, or remove that one"
+        )
+
+
+def _flat(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries, those of inner dictionaries as `key.name`."""
+    entries: dict[str, Any] = {}
+    for key, value in content.items():
+        inner = value if isinstance(value, dict) else {}
+        entries |= {f"{key}.{name}": each for name, each in inner.items()} or {key: value}
+    return entries
