@@ -1,4 +1,4 @@
-"""Camera films as the input of a comparison: tracking, its files and pictures, calibration tables.
+"""Films of a finger: tracking for a comparison, the force in each frame, publication, calibration tables.
 
-Imports `comparison.figures`, `comparison.evaluation`, `comparison.runtime`.
+Imports `comparison`, which knows a film only as a `comparison.pipeline.job.MarkerSource`.
 """

@@ -74,6 +74,10 @@ MATERIAL = tuple(Material.model_fields)
 LOAD = tuple(name for name in Physics.model_fields if name not in (*MATERIAL, "load"))
 
 
+SYNONYMS = {**Physics.synonyms, **MeshSettings.synonyms, "solver": "solvers", "solvers": "solver"}
+"""Words for those of a job's that are no parameters of a finger, which messages answer with the right one."""
+
+
 def read_job(
     design: object,
     material: Material | str | None,
@@ -100,7 +104,9 @@ def read_job(
     shape = {name: words.pop(name) for name in own}
     for name in words:
         if name not in allowed:
-            raise UserError(unknown_parameter(name, Parameters, besides=(*allowed, *besides)))
+            raise UserError(
+                unknown_parameter(name, Parameters, besides=(*allowed, *besides), synonyms=SYNONYMS)
+            )
     constants = {name: words.pop(name) for name in MATERIAL if name in words}
     if constants and material is not None:
         raise UserError(f"{next(iter(constants))} is part of the material that is given; change it there")

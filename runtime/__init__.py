@@ -1,4 +1,1 @@
-"""Runs of commands: processes, progress, output folders, provenance, HTML and terminal tables, exit codes.
-
-Imports nothing else of `compare`.
-"""
+"""Processes, files, hashes, progress, output folders, tables and pages; serves all packages, knows none."""

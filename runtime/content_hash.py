@@ -3,16 +3,16 @@
 import hashlib
 import json
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-PROGRAM = ("geometry", "solvers", "vision", "compare", "studies", "pinnray")
-"""The program's packages, from the lowest up."""
+_PROGRAM = __name__.partition(".")[0]
 
-_ROOT = Path(__file__).resolve().parent.parent
+_IMPORT = re.compile(rf"^[ \t]*(?:from|import) ({_PROGRAM}\.[\w.]+)".encode(), re.MULTILINE)
 
 
 def content_hash(content: Any) -> str:
@@ -31,30 +31,56 @@ def file_digest(path: Path) -> str:
 
 
 def sources_digest(*modules: str) -> str:
-    """SHA-256 over the sources of modules' packages and of the program's packages below them, in hexadecimal.
+    """SHA-256 over the sources that modules' results depend on, in hexadecimal.
 
-    No package of the program imports one above it, so that nothing a result depends on is left out. Code of
-    a notebook has no source file and does not count.
+    A module counts with all of its package, and so do the program's packages that it imports, directly or by
+    others. Code of a notebook has no source file and does not count.
 
     Args:
         modules: Names of the modules that make the result, with a solver's of another package.
     """
-    packages = {module.partition(".")[0] for module in modules}
-    ranks = [PROGRAM.index(package) for package in packages.intersection(PROGRAM)]
     sha = hashlib.sha256()
-    for package in sorted(packages.union(PROGRAM[: max(ranks, default=-1) + 1])):
-        file = getattr(sys.modules.get(package), "__file__", None)
-        start = _ROOT / package / "__init__.py" if package in PROGRAM else Path(file) if file else None
-        if start is not None:
-            sources = sorted(start.parent.rglob("*.py")) if start.name == "__init__.py" else [start]
-            for path in sources:
-                sha.update(os.fsencode(path.relative_to(start.parent.parent)) + b"\0" + path.read_bytes())
+    for name, path in sorted(
+        (os.fsencode(path.relative_to(place.parent)), path)
+        for place in packages_behind(*modules)
+        for path in _sources(place)
+    ):
+        sha.update(name + b"\0" + path.read_bytes())
     return sha.hexdigest()
 
 
 def has_source(module: str) -> bool:
     """Whether `sources_digest` counts the code of an imported module: no for that of a notebook or shell."""
     return getattr(sys.modules.get(module.partition(".")[0]), "__file__", None) is not None
+
+
+def packages_behind(*modules: str) -> set[Path]:
+    """Places of modules' packages and of the program's that they import, directly or by others."""
+    found, waiting = set[Path](), set(filter(None, map(_package, modules)))
+    while waiting:
+        place = waiting.pop()
+        found.add(place)
+        imported = {name for path in _sources(place) for name in _IMPORT.findall(path.read_bytes())}
+        waiting |= set(filter(None, map(_package, map(bytes.decode, imported)))) - found
+    return found
+
+
+def _sources(place: Path) -> list[Path]:
+    return sorted(place.rglob("*.py")) if place.is_dir() else [place]
+
+
+def _package(module: str) -> Path | None:
+    """The folder of a module's package, or its file; in the program the package below the root."""
+    names = module.split(".")
+    file = getattr(sys.modules.get(names[0]), "__file__", None)
+    if file is None:
+        return None
+    place = Path(file).parent if Path(file).name == "__init__.py" else Path(file)
+    if names[0] != _PROGRAM:
+        return place
+    inner = place.joinpath(*names[1:2])
+    module_file = inner.with_suffix(".py")
+    return inner if inner.is_dir() else module_file if module_file.is_file() else None
 
 
 def _array_or_text(value: object) -> object:

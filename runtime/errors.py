@@ -10,4 +10,8 @@ class ShapeError(UserError):
 
 
 class OutsideBodyError(UserError):
-    """A point lies outside the finger, where fields are undefined."""
+    """A point lies outside the body, where fields are undefined."""
+
+
+class InapplicableError(UserError):
+    """A part of a job does not apply to this case; its stage leaves no trace."""

@@ -15,8 +15,6 @@ from types import FrameType
 from typing import NoReturn
 from unicodedata import category
 
-from pinnray.runtime.processes import leave_signals_alone
-
 _signals: list[int] = []
 """The signals that asked this program to end."""
 
@@ -52,7 +50,6 @@ def ending_at_once() -> Iterator[None]:
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Raise KeyboardInterrupt in the block for every signal that asks the program to end."""
-    leave_signals_alone(os.environ)
     _signals.clear()
 
     def end(number: int, frame: FrameType | None) -> NoReturn:

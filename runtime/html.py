@@ -1,4 +1,4 @@
-"""HTML pages from the templates of `compare/templates`, which all extend the shell `page.html.j2`.
+"""HTML pages from templates, which all extend the shell `templates/page.html.j2` of this folder.
 
 Their numbers are arrays in one piece, compressed, which `packed.js` reads.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 from PIL import Image
@@ -20,6 +20,8 @@ from PIL import Image
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_text
 from pinnray.runtime.errors import UserError
+
+ROOM = __name__.rpartition(".")[0]
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -30,23 +32,30 @@ LONG = 24
 """Letters of a name that does not fit a line of a phone."""
 
 
-def write_html(path: Path, template: str, **values: Any) -> Path:
+def write_html(path: Path, template: str, *, room: str = ROOM, **values: Any) -> Path:
     """Render a template with values and write the page, atomically.
 
     `designs.html.j2` is a page of tables and pictures: it takes `title`, `sentences`, `tables` (each a
     `TextTable`), `pictures` (captions by the path of the PNG file) and `note`, its last line.
+
+    Args:
+        path: Where the page is written.
+        template: Name of the template.
+        room: Package whose folder `templates` has it, if not this one.
+        values: What the template shows.
     """
-    write_text(path, template_environment().get_template(template).render(**values))
+    write_text(path, template_environment(room).get_template(template).render(**values))
     return path
 
 
-def template_environment() -> Environment:
-    """The environment of `compare/templates`: HTML is escaped, and a missing name is an error.
+def template_environment(room: str) -> Environment:
+    """The environment of a package's templates and of this one's.
 
-    The filter `png` turns the path of a PNG file into a data URL; `unbroken` keeps names with hyphens whole.
+    HTML is escaped, and a missing name is an error. The filter `png` turns the path of a PNG file into a data
+    URL; `unbroken` keeps names with hyphens whole.
     """
     environment = Environment(
-        loader=PackageLoader("compare"),
+        loader=ChoiceLoader([PackageLoader(room), PackageLoader(ROOM)]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

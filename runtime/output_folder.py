@@ -17,13 +17,9 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
-from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.atomic import is_partial, remove_partials, write_json
-from pinnray.runtime.content_hash import file_digest, sources_digest
+from pinnray.runtime.content_hash import file_digest
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.machine import package_versions
-from pinnray.solvers.problem import Load, Material
 
 RUN_FILE = "run.json"
 SCHEMA = 1
@@ -246,21 +242,6 @@ def locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
-
-
-def job_definition(
-    design: Finger, mesh: MeshSettings | None, material: Material, load: Load, module: str
-) -> dict[str, Any]:
-    """Everything that the result of a job on a finger depends on, if the module of this name makes it."""
-    return {
-        "schema": 1,
-        "design": design.definition(),
-        "mesh": mesh and mesh.model_dump(),
-        "material": material.model_dump(),
-        "load": load.model_dump(mode="json"),
-        "versions": package_versions(),
-        "program_sha256": sources_digest(module),
-    }
 
 
 def check_resumable_folder(

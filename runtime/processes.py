@@ -25,7 +25,6 @@ from collections.abc import (
     Iterable,
     Iterator,
     Mapping,
-    MutableMapping,
     Sequence,
 )
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -94,7 +93,7 @@ class Pool:
         self._idle: list[_Child] = []
         self._abandoned, self._abandon = Pipe(duplex=False)  # A message ends all tasks
         with suppress(ValueError):  # outside of the main thread, where it cannot be set
-            signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python does; PETSc ends the program at one
+            signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python does
 
     def __enter__(self) -> Self:
         return self
@@ -215,7 +214,6 @@ class _Child:
         )
         environment = child_environment(os.environ) | {"PYTHONSAFEPATH": "1", "TMPDIR": self._folder}
         environment.setdefault("OMP_NUM_THREADS", str(threads))  # torch and OpenBLAS read it when loaded
-        leave_signals_alone(environment)
         patience = 0.0 if captured else PATIENCE_S
         self.process = subprocess.Popen(
             [sys.executable, "-c", _CHILD, str(theirs.fileno()), str(patience)],
@@ -297,18 +295,12 @@ def known_to_children(value: object) -> bool:
 
 
 def child_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """The environment without MPI's variables and with this program on the path."""
+    """The environment without MPI's variables and with the folder of this program's package on the path."""
     kept = {name: value for name, value in environment.items() if not name.startswith(FOREIGN_PREFIXES)}
-    root = str(Path(__file__).resolve().parent.parent)
+    package = import_module(__name__.partition(".")[0])
+    root = str(Path(str(package.__file__)).resolve().parent.parent)
     kept["PYTHONPATH"] = os.pathsep.join(filter(None, [root, kept.get("PYTHONPATH", "")]))
     return kept
-
-
-def leave_signals_alone(environment: MutableMapping[str, str]) -> None:
-    """Keep PETSc, once it is loaded, from ending the program at a signal with a page of text."""
-    options = environment.get("PETSC_OPTIONS", "")
-    if "-no_signal_handler" not in options:
-        environment["PETSC_OPTIONS"] = f"{options} -no_signal_handler".strip()
 
 
 def end_with_parent() -> None:

@@ -19,10 +19,10 @@ from rich.progress import (
 )
 from rich.table import Column
 
+from pinnray.runtime.errors import InapplicableError
 from pinnray.runtime.machine import cores, machine
 from pinnray.runtime.processes import Input, Output, Pool, ProcessFailed
-from pinnray.solvers.solver import Progress as Report
-from pinnray.solvers.solver import UnsupportedProblemError
+from pinnray.runtime.progress import Progress as Report
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 
@@ -127,7 +127,7 @@ class Stages:
         stage = Stage(self, name)
         try:
             yield stage.report
-        except UnsupportedProblemError:
+        except InapplicableError:
             self._progress.remove_task(stage.task)
             raise
         stage.end()

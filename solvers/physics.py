@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import cos, isfinite, radians, sin
 from numbers import Real
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
@@ -52,6 +53,10 @@ class Material(CheckedModel):
     `Material(E=3, nu=0.4)`. A `UserError` says that a constant is out of its range, or that the law is not
     given for plane stress.
     """
+
+    synonyms = MappingProxyType(
+        dict.fromkeys(("e", "modulus", "elastic_modulus", "stiffness"), "young") | {"nu": "poisson"}
+    )
 
     young: float = _number(11.4, 1e-6, 1e7, "MPa", "Young's modulus", "E", gt=0)
     poisson: float = _number(0.45, -0.99, 0.4999, "", "Poisson's ratio", "nu", gt=-1, lt=0.5)
@@ -164,6 +169,11 @@ class Load(CheckedModel):
     friction: float = bounded(0.0, 0.0, ROUGHEST, "", "", "Coefficient of friction of a cylinder")
 
     other_words: ClassVar = ("stroke", "direction", "slide")
+    synonyms = MappingProxyType(
+        dict.fromkeys(("travel", "indentation"), "stroke")
+        | dict.fromkeys(("mu", "friction_coefficient"), "friction")
+        | {"angle": "direction"}
+    )
 
     if TYPE_CHECKING:
 
@@ -256,6 +266,8 @@ class Physics(Material):
     Raises:
         UserError: If the indenter does not press, or a value does not go with the kind of load.
     """
+
+    synonyms = MappingProxyType({**Material.synonyms, **Load.synonyms})
 
     load: LoadKind = "mean"  #: See `Load`
     stroke: float = _number(10.0, 1e-6, 1e4, "mm", "Travel of the indenter")

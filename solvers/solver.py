@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.errors import UserError
+from pinnray.runtime.errors import InapplicableError, UserError
+from pinnray.runtime.progress import Progress as Progress
+from pinnray.runtime.progress import silent as silent
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import Solution, Status
 
@@ -24,15 +26,8 @@ NONE_SEEN = "none of the markers is visible; at least one is needed, or leave th
 
 Family = Literal["finite elements", "neural network", "statistics"]
 
-Progress = Callable[[float, str], None]
-"""Called with the fraction done (0 to 1) and a short text; a fast solver may ignore it."""
 
-
-def silent(fraction: float, text: str) -> None:
-    """Discard the progress."""
-
-
-class UnsupportedProblemError(UserError):
+class UnsupportedProblemError(InapplicableError):
     """The solver does not support the problem."""
 
 

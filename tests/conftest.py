@@ -19,12 +19,12 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.processes import child_environment, leave_signals_alone
+from pinnray.runtime.processes import child_environment
 from pinnray.solvers.solver import silent
 
-leave_signals_alone(
-    os.environ
-)  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
+os.environ["PETSC_OPTIONS"] = (
+    "-no_signal_handler"  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
+)
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 

@@ -58,6 +58,7 @@ def write_results(
     write_html(
         out / "report.html",
         "crossval.html.j2",
+        room="pinnray.comparison",
         result=result,
         answers=answers,
         tables=all_tables(result),

@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from pinnray.comparison.crossval.folds import ALL, SCHEMES
+from pinnray.comparison.evaluation.definition import job_definition
 from pinnray.comparison.evaluation.truths import EVERY_TRUTH, SLIDING, TRUTHS, Truth, check_truths
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.design import Design
@@ -18,7 +19,6 @@ from pinnray.geometry.registration import FIXED, PARTS, Homography, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
-from pinnray.runtime.output_folder import job_definition
 from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, check_load, check_name, with_law

@@ -1,23 +1,45 @@
 """A comparison to make, and the checks that refuse an impossible one before anything is computed."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
 
-from pinnray.comparison.evaluation.comparison import supported_solvers
+from pinnray.comparison.evaluation.comparison import Results, supported_solvers
 from pinnray.comparison.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
-from pinnray.comparison.figures import check_formats
-from pinnray.film.film import Film
+from pinnray.comparison.figures import Picture, check_formats
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.content_hash import has_source
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.stages import Stages
 from pinnray.solvers.fem.adaptive_refinement import check_adaptable
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, check_name
 from pinnray.vision.measurements import read_measurements
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a source of markers has measured, and how a report shows it."""
+
+    observations: Observations
+    warnings: Sequence[str]
+    pictures: Sequence[Picture]  #: Of the source, such as annotated frames.
+    compared: Callable[[Results], Sequence[Picture]]  #: Draws solutions into the source's pictures.
+
+
+@runtime_checkable
+class MarkerSource(Protocol):
+    """Measures the markers when a run begins, such as a film that is tracked."""
+
+    def measured(self, design: Finger, folder: Path, stages: Stages) -> Measured:
+        """Measure the markers of a finger; files about it go into the output folder of the run."""
+
+    def provenance(self) -> dict[str, Any]:
+        """Names, settings and hashes of the source, for `run.json`."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +54,8 @@ class Job:
     adapt: float | None = None  #: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
     material: Material = field(default_factory=Material)  #: Elastic constants; each solver has its own law.
     load: Load = field(default_factory=Load)  #: Motion of the indenter.
-    #: Marker displacements, their CSV file, or a film to track; simulated if None.
-    measurements: Observations | Path | Film | None = None
+    #: Marker displacements, their CSV file, or a source such as a film; simulated if None.
+    measurements: Observations | Path | MarkerSource | None = None
     truth: str = SLIDING.name  #: Key of `TRUTHS` to simulate.
     reference: str | None = None  #: Solver to compare the others with; `fem`, else the first, if None.
     out: Path = Path("out/default")  #: Output folder.

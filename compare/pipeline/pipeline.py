@@ -1,6 +1,5 @@
 """The main job: mesh, measure, solve, evaluate; then draw and write."""
 
-from collections import deque
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import partial
@@ -20,11 +19,10 @@ from pinnray.comparison.evaluation.truths import (
     virtual_experiment,
 )
 from pinnray.comparison.figures import Picture, draw_all, pictures_beside
-from pinnray.comparison.pipeline.job import Job, checked
+from pinnray.comparison.pipeline.job import Job, MarkerSource, checked
 from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
 from pinnray.comparison.pipeline.solving import ERRORS, solve_all
 from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
-from pinnray.film.film import Film
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.content_hash import file_digest
@@ -36,7 +34,6 @@ from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.shared_work import SharedWork
 from pinnray.solvers.solver import Solver, Traits
-from pinnray.vision.frames.frame import Frame
 from pinnray.vision.measurements import write_measurements
 
 
@@ -55,36 +52,22 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
     check_output(job.out)
     kept = job.names if job.resume else ()
     with replaced_folder(job.out, keep=kept) as folder:
-        if not isinstance(job.measurements, Film):
+        if not isinstance(job.measurements, MarkerSource):
             comparison = compute(job, stages, folder, pool)
             _write(folder, job, comparison, stages, pool)
             return comparison
-        # They need OpenCV.
-        from pinnray.film.predicted_frame import predicted_frame
-        from pinnray.film.track_film import track_figures, track_film
-
-        last: deque[Frame] = deque(maxlen=1)
-        track = folder / "track"
-        with stages.stage("track") as progress:
-            track.mkdir()
-            tracking, measurements = track_film(
-                job.measurements,
-                job.design,
-                track,
-                progress,
-                video=False,
-                watch=lambda frame, _: last.append(frame),
-            )
-        photographs = track_figures(track, tracking)
-        comparison = compute(replace(job, measurements=measurements), stages, folder, pool)
-        comparison = replace(comparison, warnings=[*tracking.warnings, *comparison.warnings])
-        photographs.append(predicted_frame(track, comparison, tracking, last[0].image))
+        measured = job.measurements.measured(job.design, folder, stages)
+        comparison = compute(replace(job, measurements=measured.observations), stages, folder, pool)
+        comparison = replace(comparison, warnings=[*measured.warnings, *comparison.warnings])
+        photographs = [*measured.pictures, *measured.compared(comparison)]
         _write(folder, job, comparison, stages, pool, photographs)
     return comparison
 
 
 def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) -> Results:
-    """Mesh, solve and evaluate a checked job without film; solutions and checkpoints go into the folder.
+    """Mesh, solve and evaluate a checked job whose markers are known or simulated.
+
+    Solutions and checkpoints go into the folder.
 
     Raises:
         UserError: If the mesh, the virtual experiment or a solver refuses.
@@ -175,7 +158,7 @@ def _write(
     pool: Pool | None,
     photographs: Sequence[Picture] = (),
 ) -> None:
-    """Write every file of a comparison but its solutions; photographs of the tracking are for the report."""
+    """Write every file of a comparison but its solutions; photographs are for the report."""
     # They need the libraries of pictures.
     from pinnray.comparison.report.html_report import viewer, write_report
     from pinnray.comparison.report.output_files import metrics, write_vtu
@@ -221,7 +204,7 @@ def _provenance(folder: Path, job: Job, comparison: Results, stages: Stages) -> 
         "material": job.material.model_dump(),
         "load": job.load.model_dump(),
         "measurements_sha256": file_digest(folder / "observations.csv"),
-        "film": job.measurements.provenance() if isinstance(job.measurements, Film) else None,
+        "film": job.measurements.provenance() if isinstance(job.measurements, MarkerSource) else None,
         "solvers": settings,
         "left_out": comparison.unsupported,
         "failed": comparison.failed,

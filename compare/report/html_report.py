@@ -214,7 +214,7 @@ def report_html(
 
 @cache  # compiling takes a fifth of a second
 def _template() -> Template:
-    environment = template_environment()
+    environment = template_environment("pinnray.comparison")
     filters = (millimetres, number, distance, percent)
     environment.filters |= {each.__name__: each for each in filters}
     return environment.get_template("report.html.j2")

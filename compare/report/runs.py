@@ -237,6 +237,7 @@ def write_side_by_side(folder: Path, runs: Sequence[Run]) -> tuple[Path, Path]:
     page = write_html(
         folder / "runs.html",
         "runs.html.j2",
+        room="pinnray.comparison",
         runs=runs,
         differences=differing_settings(runs),
         ranges=ranges(runs),

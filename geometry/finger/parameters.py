@@ -8,6 +8,7 @@ import reprlib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from textwrap import shorten
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
@@ -42,6 +43,8 @@ class CheckedModel(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     other_words: ClassVar[tuple[str, ...]] = ()  # which `__init__` turns into parameters
+    #: Words that are not understood, which messages answer with the parameter's name.
+    synonyms: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     if not TYPE_CHECKING:  # type checkers see the parameters instead, each with its type
 
@@ -78,6 +81,8 @@ class Parameters(CheckedModel):
     places and the line that their slope is measured from, roundings, the foot, the contact's width and the
     markers: those values are this project's.
     """
+
+    synonyms = MappingProxyType({"ribs": "rib_count", "length": "height", "width": "base_width"})
 
     name: str = Field(
         default="default",
@@ -202,28 +207,6 @@ def symbols(model: type[BaseModel]) -> dict[str, str]:
 SYMBOLS = symbols(Parameters)
 """Parameter names by the paper's symbols."""
 
-SYNONYMS = {
-    "ribs": "rib_count",
-    "e": "young",
-    "modulus": "young",
-    "elastic_modulus": "young",
-    "stiffness": "young",
-    "nu": "poisson",
-    "length": "height",
-    "width": "base_width",
-    "travel": "stroke",
-    "indentation": "stroke",
-    "angle": "direction",
-    "friction_coefficient": "friction",
-    "mu": "friction",
-    "mesh_size": "size",
-    "element_size": "size",
-    "elements": "size",
-    "solver": "solvers",
-    "solvers": "solver",
-}
-"""Other words for parameters, which messages answer with the right one; none of them is understood."""
-
 
 def by_parameter_name(values: Mapping[str, Any], model: type[BaseModel] = Parameters) -> dict[str, Any]:
     """The values with a model's symbols replaced by the names of its parameters.
@@ -242,18 +225,25 @@ def by_parameter_name(values: Mapping[str, Any], model: type[BaseModel] = Parame
     return named
 
 
-def unknown_parameter(key: str, *models: type[BaseModel], besides: Sequence[str] = ()) -> str:
+def unknown_parameter(
+    key: str,
+    *models: type[CheckedModel],
+    besides: Sequence[str] = (),
+    synonyms: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """The message for a parameter that no model has: near matches, or the whole list.
 
     Args:
         key: The unknown word.
         models: Models that were searched.
         besides: Further words that would have been understood.
+        synonyms: Words for these that messages answer with the right one, besides those of the models.
     """
     titles = {name: with_symbol(name, model) for model in models for name in model.model_fields}
     titles |= {name: name for name in besides}
     word = key.lower()
-    near = [SYNONYMS[word]] if SYNONYMS.get(word) in titles else []
+    meant = {other: name for model in models for other, name in model.synonyms.items()} | dict(synonyms)
+    near = [meant[word]] if meant.get(word) in titles else []
     near = near or difflib.get_close_matches(word, titles, n=3, cutoff=0.6)
     if len(word) > 2:  # a single letter is part of nearly every name
         near = near or [name for name in titles if word in name or word[:3] == name[:3]]

@@ -43,6 +43,7 @@ def launched(command: Callable[[], Any]) -> int:
     """Run a command and return its exit code; of several ranks one runs it, the others serve its solves."""
     _write_any_letter()
     _give_libraries_a_cache()
+    _leave_signals_alone()
     command = partial(_with_enough_files, command)
     return guarded(lambda: _on_ranks(command) if on_ranks() else command())
 
@@ -153,6 +154,13 @@ def _give_libraries_a_cache() -> None:
     except OSError:
         os.environ["XDG_CACHE_HOME"] = cache
         os.environ.setdefault("MPLCONFIGDIR", str(Path(cache) / "matplotlib"))
+
+
+def _leave_signals_alone() -> None:
+    """Keep PETSc, whoever loads it, from ending the program at a signal with a page of text."""
+    options = os.environ.get("PETSC_OPTIONS", "")
+    if "-no_signal_handler" not in options:
+        os.environ["PETSC_OPTIONS"] = f"{options} -no_signal_handler".strip()
 
 
 def _with_enough_files(command: Callable[[], Any]) -> Any:

@@ -60,6 +60,7 @@ def write_explorer(emulator: FieldEmulator, path: Path, live: str = "") -> Path:
     return html.write_html(
         path,
         "explorer.html.j2",
+        room="pinnray.studies",
         title=f"Explorer: {emulator.study.name}",
         study=emulator.study,
         count=len(emulator.known),

@@ -5,10 +5,10 @@ from dataclasses import asdict
 
 from rich.table import Table
 
+from pinnray.comparison.evaluation.definition import job_definition
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import finger_from
 from pinnray.runtime.atomic import write_json
-from pinnray.runtime.output_folder import job_definition
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import NONE, Cell, terminal_table, write_csv
 from pinnray.solvers.problem import Problem

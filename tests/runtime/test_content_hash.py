@@ -1,6 +1,7 @@
 """The digest of the sources that a result depends on."""
 
 import importlib
+import re
 import sys
 from collections.abc import Iterator
 from hashlib import sha256
@@ -8,56 +9,69 @@ from pathlib import Path
 
 import pytest
 
-from pinnray.geometry import content_hash
+from pinnray.runtime import content_hash
 from pinnray.runtime.content_hash import file_digest, sources_digest
 
 
 @pytest.fixture
-def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The folder of a program, and packages of others that use it."""
-    for package in ("geometry", "solvers", "compare", "researchers", "researchers/deep"):
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A program whose packages import one another, and packages of others that use it."""
+    for package in (
+        "program",
+        "program/low",
+        "program/middle",
+        "program/high",
+        "researchers",
+        "researchers/deep",
+    ):
         (tmp_path / package).mkdir()
         (tmp_path / package / "__init__.py").write_text("")
         (tmp_path / package / "law.py").write_text("")
+    (tmp_path / "program/middle/law.py").write_text("def law():\n    from program.low.law import law\n")
+    (tmp_path / "program/high/law.py").write_text("import program.middle.law\n")
+    (tmp_path / "researchers/deep/law.py").write_text("from program.middle import law\n")
     (tmp_path / "single.py").write_text("")
-    monkeypatch.setattr(content_hash, "_ROOT", tmp_path)
+    monkeypatch.setattr(content_hash, "_PROGRAM", "program")
+    pattern = content_hash._IMPORT.pattern.replace(b"pinnray", b"program")
+    monkeypatch.setattr(content_hash, "_IMPORT", re.compile(pattern, re.MULTILINE))
     monkeypatch.syspath_prepend(str(tmp_path))
-    for name in ("researchers", "single"):
+    for name in ("program", "researchers", "single"):
         importlib.import_module(name)
     yield tmp_path
-    for name in ("researchers", "single"):
+    for name in ("program", "researchers", "single"):
         del sys.modules[name]
 
 
 @pytest.mark.parametrize(
     ("modules", "changed", "counts"),
     [
-        (["pinnray.solvers.fem"], "solvers/law.py", True),  # its own package
-        (["pinnray.solvers.fem"], "geometry/law.py", True),  # one that it may import
-        (["pinnray.solvers.fem"], "compare/law.py", False),  # one that imports it
+        (["program.middle.other"], "program/middle/law.py", True),  # its own package
+        (["program.middle.law"], "program/low/law.py", True),  # one that it imports, if only in a function
+        (["program.high.law"], "program/low/law.py", True),  # one that an imported one imports
+        (["program.middle.law"], "program/high/law.py", False),  # one that imports it
         (["researchers.solver"], "researchers/deep/law.py", True),  # any module of others, loaded or not
-        (["researchers.solver", "compare.metrics"], "geometry/law.py", True),
+        (["researchers.solver"], "program/low/law.py", True),  # what others import of the program
         (["single"], "single.py", True),  # a module without a package
         (["single"], "researchers/law.py", False),
     ],
 )
-def test_sources_that_count(program, modules, changed, counts):
+def test_sources_that_count(folder, modules, changed, counts):
     before = sources_digest(*modules)
-    (program / changed).write_text("number = 2\n")
+    (folder / changed).write_text("number = 2\n")
     assert (sources_digest(*modules) != before) == counts
 
 
-def test_a_source_that_is_renamed_counts(program):
+def test_a_source_that_is_renamed_counts(folder):
     before = sources_digest("researchers")
-    (program / "researchers/law.py").rename(program / "researchers/other.py")
+    (folder / "researchers/law.py").rename(folder / "researchers/other.py")
     assert sources_digest("researchers") != before
 
 
-def test_order_and_repetition_do_not_count(program):
+def test_order_and_repetition_do_not_count(folder):
     assert sources_digest("single", "researchers") == sources_digest("researchers", "single", "single")
 
 
-def test_code_of_a_notebook_has_no_source(program):
+def test_code_of_a_notebook_has_no_source(folder):
     assert sources_digest("builtins", "absent") == sha256().hexdigest()
 
 

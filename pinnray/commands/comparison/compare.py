@@ -27,7 +27,7 @@ from pinnray.runtime.machine import cores
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pinnray.film.film import Film
+    from pinnray.film.measured_film import MeasuredFilm
     from pinnray.solvers.solver import Solver
 
 
@@ -175,10 +175,12 @@ def _truth(name: str | None, measurements: str | None) -> str:
     return SLIDING.name if name is None else name
 
 
-def _measurements(source: str | None, options: FilmOptions) -> "Path | Film | None":
+def _measurements(source: str | None, options: FilmOptions) -> "Path | MeasuredFilm | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
         if source is None and options != FilmOptions():
             raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
-        return None if source is None else options.film(source)
+        from pinnray.film.measured_film import MeasuredFilm
+
+        return None if source is None else MeasuredFilm(options.film(source))
     return existing(Path(source))

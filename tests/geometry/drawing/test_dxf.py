@@ -194,7 +194,9 @@ def test_markers_drawn_of_arcs_are_circles(tmp_path):
 def test_ezdxf_is_silent(tmp_path):
     """Its notes about a unit that it does not know went to the standard error."""
     write_dxf(tmp_path / "a.dxf", [BEAM])
-    code = "import logging; from pathlib import Path\nfrom pinnray.geometry.drawing.formats.dxf import read_dxf\n"
-    code += f"read_dxf(Path({str(tmp_path / 'a.dxf')!r})); logging.getLogger('ezdxf').warning('a note')"
+    code = "import logging, pathlib\nfrom pinnray.geometry.drawing.formats.dxf import read_dxf\n"
+    code += (
+        f"read_dxf(pathlib.Path({str(tmp_path / 'a.dxf')!r})); logging.getLogger('ezdxf').warning('a note')"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stderr == ""
