@@ -57,10 +57,10 @@ nitpick_ignore_regex = [
         r"(numpy|pathlib|annotated_types|collections\.abc|types|pandas|pd|matplotlib|pydantic|pyvista)\..*",
     ),
     ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|(.*\.)?T|.*Options)"),
-    ("py:.*", r"compare\.(runtime|figures|camera|crossval|evaluation\.truths)\..*"),
-    ("py:.*", r"geometry\.(finger\.(rules|parameters)|drawing\.placement|processes)\..*"),
-    ("py:.*", r"(pinnray\.observations|studies|vision)\..*"),
-    ("py:.*", r"solvers\.fem\.adaptive_refinement\..*"),
+    ("py:.*", r"pinnray\.comparison\.(figures|crossval|evaluation\.truths)\..*"),
+    ("py:.*", r"pinnray\.geometry\.(finger\.(rules|parameters)|drawing\.placement)\..*"),
+    ("py:.*", r"pinnray\.(film|observations|robots|runtime|studies|vision)\..*"),
+    ("py:.*", r"pinnray\.solvers\.fem\.adaptive_refinement\..*"),
 ]
 
 html_theme = "pydata_sphinx_theme"
