@@ -1,25 +1,23 @@
 """Cache of meshes and CAD files, keyed by a hash of everything they depend on."""
 
 import importlib.metadata
-import os
-import warnings
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.geometry.worker import run_task
-from pinnray.runtime.atomic import remove_partials, write_bytes
+from pinnray.runtime.atomic import write_bytes
+from pinnray.runtime.cache import Result, cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.worker import Task, run_task
 
 TIMEOUT_S = 300.0
 
@@ -27,8 +25,6 @@ CAD_FORMATS = ("step", "stl", "dxf", "svg")
 
 MAKERS = ("cadquery", "cadquery-ocp", "ezdxf", "gmsh", "numpy", "svgelements")
 """Packages on whose versions the results depend."""
-
-_Result = TypeVar("_Result")
 
 
 def finger_mesh(
@@ -59,15 +55,10 @@ def finger_mesh(
             return replace(finger.mesh, depth=finger.depth)
         finger.check_materials()
     settings = settings or MeshSettings()
-    task: dict[str, object] = {
-        "kind": "mesh",
-        "what": f"meshing design {finger.name!r}",
-        "finger": finger.definition(),
-        "settings": settings.model_dump(),
-        **({} if across is None else {"across": across}),
-    }
-    entry = _entry(task, finger.digest, ".npz", cache_dir)
-    return _cached(entry, task, timeout_s, TriangleMesh.load, TriangleMesh.save if keep else None)
+    sizes = settings.model_dump()
+    task = Task(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))
+    entry = _entry("mesh", finger.digest, (sizes, across), ".npz", cache_dir)
+    return _made(entry, task, timeout_s, TriangleMesh.load, TriangleMesh.save if keep else None)
 
 
 def mesh_sizes(
@@ -107,15 +98,12 @@ def drawn_finger(
     """
     if not file.is_file():
         raise UserError(f"there is no drawing {file}")
-    task: dict[str, object] = {
-        "kind": "drawing",
-        "what": f"reading {file.name}",
-        "file": str(file.absolute()),  # the child process has its own working directory
-        "name": file.name,
-        "description": description.model_dump(mode="json"),
-    }
-    entry = _entry(task, file_digest(file), ".json", cache_dir)
-    return _cached(entry, task, timeout_s, DrawnFinger.load, DrawnFinger.save)
+    lines = description.model_dump(mode="json")
+    task = Task(
+        f"reading {file.name}", _reader, (file.absolute(), lines)
+    )  # the child has its own folder
+    entry = _entry("drawing", file_digest(file), (file.name, lines), ".json", cache_dir)
+    return _made(entry, task, timeout_s, DrawnFinger.load, DrawnFinger.save)
 
 
 def cad_files(
@@ -144,79 +132,59 @@ def cad_files(
     unknown = sorted(set(formats) - set(CAD_FORMATS))
     if unknown:
         raise UserError(f"unknown CAD format {unknown[0]!r}; there are {', '.join(CAD_FORMATS)}")
-    task: dict[str, object] = {
-        "kind": "cad",
-        "what": f"CAD of design {finger.name!r}",
-        "finger": finger.definition(),
-        "formats": sorted(set(formats)),
-    }
-    entry = _entry(task, finger.digest, ".zip", cache_dir)
-    contents = _cached(entry, task, timeout_s, _unpack, _pack)
+    wanted = sorted(set(formats))
+    task = Task(f"CAD of design {finger.name!r}", _cad_writer, (finger.definition(), wanted))
+    entry = _entry("cad", finger.digest, wanted, ".zip", cache_dir)
+    contents = _made(entry, task, timeout_s, _unpack, _pack)
     for name, content in contents.items():
         write_bytes(folder / name, content)
     return [folder / name for name in contents]
 
 
-def cache_folder() -> Path:
-    """`PINNRAY_CACHE` if set, else `pinn-ray` in `XDG_CACHE_HOME` or `~/.cache`."""
-    if chosen := os.environ.get("PINNRAY_CACHE"):
-        return Path(chosen)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "pinn-ray"
-
-
-@contextmanager
-def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
-    """Warn, if the block cannot write to the cache `folder`, that `what` has to be done again next time."""
-    try:
-        yield
-    except OSError as error:
-        warnings.warn(
-            f"cannot write to the cache folder {folder} ({error.strerror}), so that {what} is repeated next "
-            "time; set PINNRAY_CACHE to a folder that can be written",
-            RuntimeWarning,
-            stacklevel=4,
-        )
-
-
-def cache_key(digest: str, task: dict[str, object]) -> str:
-    """SHA-256 over a finger's or file's digest, task, package versions and this package's own sources."""
-    kept = {key: value for key, value in task.items() if key not in ("what", "finger", "file")}
-    parts = {
-        "content": digest,
-        "task": kept,
-        "versions": {package: _version(package) for package in MAKERS},
-        "sources": sources_digest(__name__),
-    }
+def cache_key(digest: str, asked: object) -> str:
+    """SHA-256 over the digest of a finger or file, what is asked, package versions and the sources."""
+    versions = {package: _version(package) for package in MAKERS}
+    parts = {"content": digest, "asked": asked, "versions": versions, "sources": sources_digest(__name__)}
     return content_hash(parts)
 
 
-def _entry(task: dict[str, object], digest: str, suffix: str, cache_dir: Path | None) -> Path:
-    return (cache_dir or cache_folder()) / f"{task['kind']}-{cache_key(digest, task)}{suffix}"
+def _entry(kind: str, digest: str, asked: object, suffix: str, cache_dir: Path | None) -> Path:
+    return (cache_dir or cache_folder()) / f"{kind}-{cache_key(digest, asked)}{suffix}"
 
 
-def _cached(
+def _made(
     entry: Path,
-    task: dict[str, object],
+    task: Task,
     timeout_s: float,
-    load: Callable[[Path], _Result],
-    save: Callable[[_Result, Path], None] | None,
-) -> _Result:
-    """Load a task's result; make it first if it is missing or cannot be read."""
-    if entry.exists():
-        try:
-            return load(entry)
-        except Exception as error:  # a damaged file can make the reader raise anything
-            warnings.warn(
-                f"rebuilding {entry.name}: the cached file is damaged ({type(error).__name__})",
-                RuntimeWarning,
-                stacklevel=3,
-            )
-    made: _Result = run_task(task, timeout_s)
-    if save:
-        with kept_if_possible(entry.parent, str(task["what"])):
-            remove_partials(entry.parent, older_than_s=86_400.0)  # after a day its process has ended
-            save(made, entry)
-    return made
+    load: Callable[[Path], Result],
+    save: Callable[[Result, Path], None] | None,
+) -> Result:
+    return cached(entry, task.what, lambda: run_task(task, timeout_s), load, save)
+
+
+def _mesher() -> Callable[..., TriangleMesh]:
+    from pinnray.geometry.drawing.drawn_finger import finger_from
+    from pinnray.geometry.mesh.mesher import MIN_ELEMENTS, build_mesh
+
+    def mesh(definition: Mapping[str, Any], sizes: Mapping[str, Any], across: int | None) -> TriangleMesh:
+        return build_mesh(
+            finger_from(definition), MeshSettings(**sizes), MIN_ELEMENTS if across is None else across
+        )
+
+    return mesh
+
+
+def _reader() -> Callable[..., DrawnFinger]:
+    from pinnray.geometry.drawing.load import finger_from_file
+
+    return lambda file, lines: finger_from_file(file, Description(**lines))
+
+
+def _cad_writer() -> Callable[..., dict[str, bytes]]:
+    from pinnray.geometry.cad import cad_contents
+    from pinnray.geometry.drawing.drawn_finger import finger_from
+
+    return lambda definition, formats: cad_contents(finger_from(definition), formats)
 
 
 def _pack(contents: dict[str, bytes], path: Path) -> None:

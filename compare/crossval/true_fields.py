@@ -10,13 +10,14 @@ from pinnray.comparison.crossval.folds import LoadCase
 from pinnray.comparison.crossval.study import SIZES, CrossvalStudy
 from pinnray.comparison.evaluation.evaluation import field_difference
 from pinnray.comparison.evaluation.truths import Truth, simulate
-from pinnray.geometry.cache import cache_folder, finger_mesh, kept_if_possible
+from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_arrays
+from pinnray.runtime.cache import cache_folder, kept_if_possible
 from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions

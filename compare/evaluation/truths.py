@@ -13,12 +13,13 @@ from math import isfinite, radians, tan
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.geometry.cache import cache_folder, finger_mesh, kept_if_possible
+from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.section import rib_feet, rib_pitch, rib_slope
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.cache import cache_folder, kept_if_possible
 from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions

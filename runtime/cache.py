@@ -1,0 +1,66 @@
+"""Results that are kept in a folder of the user's, under names that tell everything they depend on."""
+
+import os
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+from pinnray.runtime.atomic import remove_partials
+
+Result = TypeVar("Result")
+
+
+def cache_folder() -> Path:
+    """`PINNRAY_CACHE` if set, else `pinn-ray` in `XDG_CACHE_HOME` or `~/.cache`."""
+    if chosen := os.environ.get("PINNRAY_CACHE"):
+        return Path(chosen)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "pinn-ray"
+
+
+@contextmanager
+def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
+    """Warn, if the block cannot write to the cache `folder`, that `what` has to be done again next time."""
+    try:
+        yield
+    except OSError as error:
+        warnings.warn(
+            f"cannot write to the cache folder {folder} ({error.strerror}), so that {what} is repeated next "
+            "time; set PINNRAY_CACHE to a folder that can be written",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+def cached(
+    entry: Path,
+    what: str,
+    make: Callable[[], Result],
+    load: Callable[[Path], Result],
+    save: Callable[[Result, Path], None] | None,
+) -> Result:
+    """Load a result; make it first if it is missing or cannot be read.
+
+    Args:
+        entry: Its file in the cache.
+        what: Its description in warnings, such as "meshing design 'default'".
+        make: Makes it.
+        load: Reads it from a file.
+        save: Writes it into a file; None keeps nothing.
+    """
+    if entry.exists():
+        try:
+            return load(entry)
+        except Exception as error:  # a damaged file can make the reader raise anything
+            warnings.warn(
+                f"rebuilding {entry.name}: the cached file is damaged ({type(error).__name__})",
+                RuntimeWarning,
+                stacklevel=3,
+            )
+    made = make()
+    if save:
+        with kept_if_possible(entry.parent, what):
+            remove_partials(entry.parent, older_than_s=86_400.0)  # after a day its process has ended
+            save(made, entry)
+    return made
