@@ -99,9 +99,7 @@ def drawn_finger(
     if not file.is_file():
         raise UserError(f"there is no drawing {file}")
     lines = description.model_dump(mode="json")
-    task = Task(
-        f"reading {file.name}", _reader, (file.absolute(), lines)
-    )  # the child has its own folder
+    task = Task(f"reading {file.name}", _reader, (file.absolute(), lines))  # the child has its own folder
     entry = _entry("drawing", file_digest(file), (file.name, lines), ".json", cache_dir)
     return _made(entry, task, timeout_s, DrawnFinger.load, DrawnFinger.save)
 
@@ -159,7 +157,11 @@ def _made(
     load: Callable[[Path], Result],
     save: Callable[[Result, Path], None] | None,
 ) -> Result:
-    return cached(entry, task.what, lambda: run_task(task, timeout_s), load, save)
+    def make() -> Result:
+        made: Result = run_task(task, timeout_s)
+        return made
+
+    return cached(entry, task.what, make, load, save)
 
 
 def _mesher() -> Callable[..., TriangleMesh]:

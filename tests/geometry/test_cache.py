@@ -1,24 +1,20 @@
 """Cache and worker: quick hits, damaged entries, time limits, one-line failures."""
 
 import os
-import resource
 import shutil
-import signal
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from pinnray.geometry import Design, MeshSettings, UserError, cad_files, finger_mesh, worker
-from pinnray.geometry.cache import cache_folder, cache_key, drawn_finger
+from pinnray.geometry import Design, MeshSettings, UserError, cad_files, finger_mesh
+from pinnray.geometry.cache import cache_key, drawn_finger
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.geometry.worker import perform, run_task
-from pinnray.runtime.processes import Pool, child_environment
+from pinnray.runtime.cache import cache_folder
+from pinnray.runtime.processes import child_environment
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
 
@@ -66,22 +62,20 @@ def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypat
     rebuilt = []
 
     def run(task, timeout_s):  # type: ignore[no-untyped-def]
-        rebuilt.append(task["kind"])
+        rebuilt.append(task.what)
         return mesh
 
     monkeypatch.setattr("pinnray.geometry.cache.run_task", run)
     entry.write_bytes(damage(good))
     with pytest.warns(RuntimeWarning, match="rebuilding mesh-.* is damaged"):
         finger_mesh(Design(), settings=COARSE, cache_dir=folder)
-    assert rebuilt == ["mesh"]
+    assert rebuilt == ["meshing design 'default'"]
     assert entry.read_bytes() == good
 
 
 def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPatch) -> None:
     def key(design: Design | None = None, **settings: float) -> str:
-        return cache_key(
-            (design or Design()).digest, {"kind": "mesh", "settings": MeshSettings(**settings).model_dump()}
-        )
+        return cache_key((design or Design()).digest, MeshSettings(**settings).model_dump())
 
     keys = {key(), key(Design(rib_angle=19)), key(size=0.3), key(corner_size=0.1)}
     monkeypatch.setattr("pinnray.geometry.cache._version", lambda package: "0")
@@ -96,13 +90,6 @@ def test_time_limit_ends_the_worker_with_advice(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_refusal_in_the_worker_comes_back_as_its_own_line() -> None:
-    task = {"kind": "mesh", "what": "meshing", "settings": {}}
-    with pytest.raises(UserError, match="ribs") as refused:
-        run_task({**task, "finger": {"rib_count": 50}}, 60)
-    assert "\n" not in str(refused.value)
-
-
 def test_the_worker_stays_and_follows_a_change_of_folder(tmp_path, monkeypatch):
     finger_mesh(Design(), settings=COARSE, cache_dir=tmp_path / "first")
     monkeypatch.chdir(tmp_path)
@@ -113,57 +100,6 @@ def test_the_worker_stays_and_follows_a_change_of_folder(tmp_path, monkeypatch):
     drawn = drawn_finger(Path("beam.svg"), Description(), cache_dir=Path("cache"))
     assert drawn.section.area == pytest.approx(600)
     assert finger_mesh(drawn, settings=COARSE, cache_dir=Path("cache")).areas.sum() == pytest.approx(600)
-
-
-def test_crash_in_the_worker_gives_one_line() -> None:
-    task = {"kind": "mesh", "what": "meshing", "settings": {}, "finger": None}  # a fault of our own
-    with pytest.raises(UserError, match=r"meshing failed \(exit code 1\)") as refused:
-        run_task(task, 60)
-    assert "\n" not in str(refused.value)
-
-
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is limited on Linux only")
-def test_a_task_that_needs_more_memory_than_is_free_is_one_line() -> None:
-    """A task that takes a gigabyte, then one that takes a megabyte, with 0.5 GB free."""
-    tasks = {name: {"what": name, "bytes": size} for name, size in {"large": 10**9, "small": 10**6}.items()}
-    with Pool(1) as pool:
-        answers = dict(pool.answers(fill_memory, tasks))
-    assert str(answers["large"]) == "large needs more than 0.5 GB, which is what is free; use larger elements"
-    assert answers["small"] == 10**6
-
-
-def fill_memory(task: dict[str, Any], report: Callable[..., None]) -> object:
-    worker._work = lambda kind: lambda task: len(bytearray(task["bytes"]))
-    return perform({**task, "kind": "mesh", "memory_gb": 0.5}, report)
-
-
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is limited on Linux only")
-@pytest.mark.parametrize(
-    ("crowded", "end"), [(False, r"failed \(exit code -11\)"), (True, r"needs more than 0\.45 GB")]
-)
-def test_a_crash_counts_as_lack_of_memory_only_if_that_task_took_it(crowded, end, monkeypatch):
-    """After another child that took more than is free, from a process that has taken as much itself."""
-    monkeypatch.setattr(worker, "free_memory_gb", lambda: 0.5)
-    monkeypatch.setattr(worker, "perform", crash)
-    fill = "len(b'x' * 6 * 10**8)"
-    subprocess.run([sys.executable, "-c", fill], check=True)
-    exec(fill)
-    with pytest.raises(UserError, match=f"^reading {end}"):
-        run_task({"what": "reading", "crowded": crowded}, 60)
-
-
-def crash(task: dict[str, Any], report: Callable[..., None]) -> object:
-    """End by a signal, if asked after taking more memory than the process ever had."""
-
-    def work(task: dict[str, Any]) -> None:
-        resource.setrlimit(resource.RLIMIT_DATA, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-        peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        taken = b"x" * (peak + 10**8 if task["crowded"] else 10**7)
-        os.kill(os.getpid(), signal.SIGSEGV)
-        raise AssertionError(len(taken))
-
-    worker._work = lambda kind: work
-    return perform({**task, "kind": "mesh"}, report)
 
 
 def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_path: Path) -> None:
