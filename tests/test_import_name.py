@@ -15,7 +15,7 @@ from tests.program import ROOMS, ROOT
 SCRIPT = """
 import pinnray as pr
 
-assert pr.compare("default", ["fem"], size=2.0, out="out").reference == "fem"
+assert list(pr.compare("default", ["fem"], size=2.0, out="out").table().index) == ["fem"]
 print(pr.__file__)
 """
 

@@ -12,8 +12,8 @@ from pinnray.runtime.machine import program_version
 COMMANDS = (
     *("comparison.compare", "comparison.report"),
     *("finger.design", "finger.mesh", "finger.material", "finger.solve", "finger.sensitivity"),
-    *("finger.export", "pinnray.studies.sweep", "studies.predict", "studies.explore", "studies.app"),
-    *("studies.optimise", "pinnray.studies.gridsearch", "comparison.crossval", "comparison.solvers"),
+    *("finger.export", "studies.sweep", "studies.predict", "studies.explore", "studies.app"),
+    *("studies.optimise", "studies.gridsearch", "comparison.crossval", "comparison.solvers"),
     *("camera.fiducials", "camera.calibrate", "camera.pick", "camera.points", "camera.rig", "camera.track"),
 )
 """Modules of this package with a function `command`; each is imported when its command is asked for."""

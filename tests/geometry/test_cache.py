@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from pinnray.geometry import Design, MeshSettings, UserError, cad_files, finger_mesh
+from pinnray.geometry import Design, MeshSettings, UserError, cache, cad_files, finger_mesh
 from pinnray.geometry.cache import cache_key, drawn_finger
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.cache import cache_folder
-from pinnray.runtime.processes import child_environment
+from pinnray.runtime.processes import Pool, child_environment
+from pinnray.runtime.worker import Task, perform
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
 
@@ -113,10 +114,10 @@ def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_p
 @pytest.mark.parametrize(
     ("task", "end"),
     [
-        ({"kind": "mesh", "settings": COARSE.model_dump()}, ": File too large"),
+        (Task("this", cache._mesher, ({}, COARSE.model_dump(), None)), ": File too large"),
         # OpenCASCADE writes a part and says nothing
         pytest.param(
-            {"kind": "cad", "formats": ["step"]},
+            Task("this", cache._cad_writer, ({}, ["step"])),
             "/finger.step: a part was not written; is the disk full?",
             marks=pytest.mark.slow,
         ),
@@ -124,9 +125,8 @@ def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_p
     ids=["mesh", "cad"],
 )
 def test_a_full_disk_in_the_worker_names_the_place(full_disk, task, end):
-    more = {"what": "this", "finger": {}, "memory_gb": 8.0}
     with Pool(1) as pool:  # a new process, which inherits the full disk
-        ((_, answer),) = pool.answers(perform, {"this": {**task, **more}})
+        ((_, answer),) = pool.answers(perform, {"this": (task, 8.0)})
     assert str(answer).startswith("this failed: /")
     assert str(answer).endswith(end)
 
