@@ -13,7 +13,6 @@ from pinnray.options.camera import FilmOptions, ForceOptions
 from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
-from pinnray.solvers.registry import make_solver
 
 
 @quietable
@@ -62,6 +61,7 @@ def command(
     from pinnray.runtime.machine import machine, package_versions
     from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
     from pinnray.runtime.stages import Stages
+    from pinnray.solvers.registry import make_solver
 
     if publish is not None and not live:
         raise UserError("--publish is for --live")

@@ -9,7 +9,6 @@ from rich.console import Console
 from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, Flag, OutputPath, PhysicsOptions
 from pinnray.runtime.exits import NOT_CONVERGED, say
-from pinnray.solvers.registry import make_solver
 
 
 @quietable
@@ -49,6 +48,7 @@ def command(
     from pinnray.runtime.errors import UserError
     from pinnray.runtime.stages import Stages
     from pinnray.solvers.problem import Problem
+    from pinnray.solvers.registry import make_solver
 
     chosen, mesh = finger.read(usual=SIZES)
     if score and kind != "mujoco":

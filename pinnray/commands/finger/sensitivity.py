@@ -6,7 +6,6 @@ from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
-from pinnray.solvers.registry import make_solver
 
 
 @quietable
@@ -39,6 +38,7 @@ def command(
     from pinnray.solvers.finger_figures import QUANTITIES
     from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
     from pinnray.solvers.problem import Problem
+    from pinnray.solvers.registry import make_solver
 
     if figure not in QUANTITIES:
         raise UserError(f"--figure {figure}: there are {', '.join(QUANTITIES)}")
