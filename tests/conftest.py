@@ -138,7 +138,7 @@ def discs_fitted_once() -> Iterator[None]:
     """Discs are not fitted again in a picture where they were: tests share films, and it takes longest."""
     from pinnray.vision.discs import disc_detector
 
-    fit, known = disc_detector.fit_discs, {}
+    fit, known = disc_detector.fit_discs, {}  # type: ignore[attr-defined]
 
     def fitted(*what: Any, **options: Any) -> object:
         key = hashlib.sha256(pickle.dumps((what, options))).digest()

@@ -23,7 +23,7 @@ def keyed_modules() -> list[str]:
     for path in SOURCES:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             digest = isinstance(node, ast.Call) and ast.unparse(node.func) in DIGESTS
-            if digest and any(ast.unparse(argument) == "__name__" for argument in node.args):
+            if digest and any(ast.unparse(argument) == "__name__" for argument in node.args):  # type: ignore[attr-defined]
                 found.append(module_name(path))
     return found
 

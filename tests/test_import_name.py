@@ -82,5 +82,5 @@ def test_the_wheel_has_one_name_and_leaves_the_users_modules_alone(folder, tmp_p
 
 def test_no_public_name_is_that_of_a_package_or_module():
     """Importing the one would put it in the place of the other, as `pinnray.compare` once did."""
-    found = [name for name in pr.__all__ if importlib.util.find_spec(f"pinnray.{name}") is not None]
+    found = [name for name in pr.__all__ if importlib.util.find_spec(f"pinnray.{name}") is not None]  # type: ignore[attr-defined]
     assert found == []

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import yaml
+import yaml  # type: ignore[import-untyped]
 
 from benchmarks.results.default_run import PAGES, TABLES, Figures, kept_figures
 from benchmarks.tables import table_of

@@ -138,7 +138,7 @@ def main(count: int, solver: str = "fem") -> None:
     wrong = {said for each in found for said in each.wrong}
     ends = [states[state] for state in ("done", "not converged", "refused")]
     worst = (max(each.slowest for each in found), max(each.peak for each in found))
-    row = Row(solver, states.total(), *ends, len(wrong), *worst)
+    row = Row(solver, states.total(), *ends, len(wrong), *worst)  # type: ignore[call-arg]
     keep_rows(ROWS, Row, [row, *others])
     print(*row, flush=True)
 

@@ -62,7 +62,7 @@ def figures_of(name: str, entry: Mapping[str, Any]) -> Figures:
     """The figures of a solver out of its entry in a run's `metrics.json`."""
     given = entry["markers"] if entry["markers"]["in_sample"] else {}
     held_out = entry["held_out"] or {}
-    return Figures(
+    return Figures(  # type: ignore[call-arg]
         name,
         given.get("mae_u"),
         given.get("mae_v"),

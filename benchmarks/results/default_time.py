@@ -125,7 +125,7 @@ def stage_times(command: list[str]) -> list[StageTime]:
     floor = process_time()
     from pinnray.cli import main as pinnray
 
-    stages.Stages = Timed  # type: ignore[misc]
+    stages.Stages = Timed
     for kind, places in NEEDED.items():
         for place in places:
             module, _, path = place.partition(":")

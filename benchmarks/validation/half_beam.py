@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from benchmarks.validation.laws import LAWS
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.fem.dolfinx_compat import dolfinx
+from pinnray.solvers.fem.dolfinx_compat import dolfinx  # type: ignore[attr-defined]
 from pinnray.solvers.petsc import PETSc
 
 LENGTH, WIDTH, HEIGHT = 100.0, 30.0, 30.0
@@ -177,7 +177,7 @@ def taylor_hood(mesh: Any, cell: str) -> Any:
     import basix.ufl
 
     parts = [basix.ufl.element("Lagrange", cell, 2, shape=(3,)), basix.ufl.element("Lagrange", cell, 1)]
-    return dolfinx.fem.functionspace(mesh, basix.ufl.mixed_element(parts))
+    return dolfinx.fem.functionspace(mesh, basix.ufl.mixed_element(parts))  # type: ignore[attr-defined]
 
 
 def loaded_nodes(nodes: FloatArray, strip: float) -> tuple[IntArray, FloatArray]:

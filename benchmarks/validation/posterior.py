@@ -77,7 +77,7 @@ def main() -> Table:
 
 def chains(model: Any, markers: MarkerModel, found: Any) -> tuple[FloatArray, FloatArray]:
     """Samples of the standardised values, shape (n, p), and their autocorrelation times (p,), steps."""
-    import emcee
+    import emcee  # type: ignore[import-not-found]
 
     data, parameters = markers.measurement, found.parameters
     bounds = np.array([parameter.bounds for parameter in parameters])

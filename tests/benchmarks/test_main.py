@@ -17,7 +17,7 @@ def test_headings_are_whole_in_a_terminal_of_80_columns() -> None:
     table.add_row(*["0.123"] * 6)
     console = Console(file=StringIO(), width=80)
     show(table, console)
-    assert all(heading in console.file.getvalue() for heading in headings)
+    assert all(heading in console.file.getvalue() for heading in headings)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("name", BENCHMARKS)

@@ -17,7 +17,7 @@ CASES: dict[str, Design] = {
     "front markers": Design(marker_layout="front"),
     "contact near the base": Design(contact_position=3, contact_width=5),
     "contact on the tip": Design(contact_position=84, contact_width=1),
-    "longer, six ribs": Design(N=6, H=110),
+    "longer, six ribs": Design(N=6, H=110),  # type: ignore[call-arg]
 } | {f"preset {name}": load_design(name) for name in preset_names() if name != "csiro"}
 """Wedges with the right angle at the front, whose closed forms tests know."""
 

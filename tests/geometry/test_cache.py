@@ -57,12 +57,12 @@ def test_worker_gives_the_same_mesh_as_meshing_here(folder: Path) -> None:
         lambda content: b"not an archive at all",
     ],
 )
-def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypatch) -> None:
     (entry,) = folder.glob("mesh-*.npz")
     good, mesh = entry.read_bytes(), TriangleMesh.load(entry)
     rebuilt = []
 
-    def run(task, timeout_s):  # type: ignore[no-untyped-def]
+    def run(task, timeout_s):
         rebuilt.append(task.what)
         return mesh
 
@@ -211,7 +211,7 @@ def test_import_needs_neither_cadquery_nor_gmsh() -> None:
 def test_every_public_name_can_be_imported() -> None:
     from pinnray import geometry
 
-    for name in geometry.__all__:
+    for name in geometry.__all__:  # type: ignore[attr-defined]
         assert getattr(geometry, name) is not None
     with pytest.raises(AttributeError, match="nothing"):
-        _ = geometry.nothing
+        _ = geometry.nothing  # type: ignore[attr-defined]

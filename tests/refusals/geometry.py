@@ -135,7 +135,7 @@ def square(**changes: object) -> TriangleMesh:
         "marker_nodes": [1, 2],
         "contact_node": 2,
     }
-    return TriangleMesh(**{**parts, **changes})  # type: ignore[arg-type]
+    return TriangleMesh(**{**parts, **changes})
 
 
 def observations(**changes: object) -> Observations:
@@ -149,4 +149,4 @@ def observations(**changes: object) -> Observations:
         "simulated": True,
         "marker_radius": 0.8,
     }
-    return Observations(**{**parts, **changes})  # type: ignore[arg-type]
+    return Observations(**{**parts, **changes})

@@ -118,7 +118,7 @@ def media(brand: bytes, *others: bytes) -> bytes:
 
 def recorded(*given: object) -> None:
     """A video of no frame."""
-    with video_writer(*given):  # type: ignore[arg-type]
+    with video_writer(*given):
         pass
 
 

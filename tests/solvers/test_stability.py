@@ -91,7 +91,7 @@ def test_an_identified_finger_is_checked_with_its_contact_held(problem, monkeypa
     rest = model.response(np.zeros(1))
     assert model.unstable(rest) == 0
     monkeypatch.setattr(LoadPath, "_stable", lambda path, point: point)
-    straight = FemNonlinearSolver().solve(problem).field.values
+    straight = FemNonlinearSolver().solve(problem).field.values  # type: ignore[attr-defined]
     assert model.unstable(replace(rest, state=straight)) > 0
 
 

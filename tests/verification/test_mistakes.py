@@ -47,7 +47,7 @@ def test_wrong_law(mistake, case, monkeypatch):
 
 
 def test_wrong_law_of_finite_strain(monkeypatch):
-    right = Material.lame.fget
+    right = Material.lame.fget  # type: ignore[attr-defined]
     monkeypatch.setattr(Material, "lame", property(lambda self: too_much(right(self))))
     rows = FINITE_STRAIN.measure()
     assert not passes(rows, degree=1)
@@ -62,7 +62,7 @@ def test_plane_strain_for_plane_stress(case, monkeypatch):
 
 def test_too_few_integration_points(monkeypatch):
     """One point a triangle leaves P2 motions without energy: MUMPS fails, or rounding spoils its solution."""
-    monkeypatch.setattr(equilibrium.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))
+    monkeypatch.setattr(equilibrium.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))  # type: ignore[attr-defined]
     rows, refused = (), ""
     try:
         rows = MANUFACTURED.measure()

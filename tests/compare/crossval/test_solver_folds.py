@@ -70,7 +70,7 @@ class Doubled(FemSolver):
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         found = super().solve(problem)
-        return replace(found, field=replace(found.field, values=self.factor * found.field.values))
+        return replace(found, field=replace(found.field, values=self.factor * found.field.values))  # type: ignore[attr-defined]
 
 
 class Tripled(Doubled):
@@ -129,7 +129,7 @@ def test_a_variant_keeps_class_and_settings_and_changes_the_seed(kind):
     variant = SolverVariant("drawing", kind(size=2.0))
     made = [variant.make(seed) for seed in (0, 2)]
     assert [type(each) for each in made] == [kind, kind]
-    assert [each.given for each in made] == [(3, 2.0), (5, 2.0)]
+    assert [each.given for each in made] == [(3, 2.0), (5, 2.0)]  # type: ignore[attr-defined]
     assert variant.settings == {"seed": 3, "size": 2.0}
 
 
@@ -189,7 +189,7 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     squares = [(rule.weights * values**2).sum() for values in (mine - true, true)]
     assert outcome.fields["von_mises"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
     if name in ("gp", "statfem"):
-        spread = solution.field.standard_deviation(coarse_mesh.locate(observations.points))
+        spread = solution.field.standard_deviation(coarse_mesh.locate(observations.points))  # type: ignore[attr-defined]
         np.testing.assert_allclose(outcome.deviations, np.hypot(spread, NOISE), rtol=1e-5)
     else:
         assert outcome.deviations is None
@@ -214,7 +214,7 @@ def test_an_identified_finger_is_carried_to_half_the_load(task, coarse_mesh, obs
     (outcome,) = judged(own)
     problem = Problem(coarse_mesh, Material(law="neo-hookean"), observations=observations)
     half = replace(problem, load=task.load_cases[1].load)
-    carried = solver.transferred(solver.refitter(problem)(observations), problem, half)
+    carried = solver.transferred(solver.refitter(problem)(observations), problem, half)  # type: ignore[attr-defined]
     points, means = misfit_of(problem).sampling()
     errors = means @ carried.displacement_in_space(points) - 0.5 * observations.displacements
     np.testing.assert_allclose(outcome.errors, errors, atol=1e-6)

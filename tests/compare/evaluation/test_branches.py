@@ -35,7 +35,7 @@ def solutions(problem):
     x, y = space.nodes.T
     powers = [(p, q) for p in range(2) for q in range(8)]
     terms = np.column_stack([x**p * (y / HEIGHT) ** q for p, q in powers])
-    fitted = np.linalg.lstsq(terms, own.field.values, rcond=None)[0]
+    fitted = np.linalg.lstsq(terms, own.field.values, rcond=None)[0]  # type: ignore[attr-defined]
     mirrored = (terms * [(-1) ** p for p, _ in powers]) @ fitted * [-1, 1]
     (across,) = equilibria_near(problem, [mirrored])
     other = replace(

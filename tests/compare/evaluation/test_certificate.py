@@ -62,10 +62,10 @@ def sampled(
 def disturbed(problem: Problem, size: float, *, at_base: bool = False) -> FloatArray:
     """The solution of `fem` plus a random displacement of so many mm, at the base and the contact too."""
     field = FemSolver().solve(problem).field
-    random = size * np.random.default_rng(3).uniform(-1, 1, field.values.shape)
+    random = size * np.random.default_rng(3).uniform(-1, 1, field.values.shape)  # type: ignore[attr-defined]
     if not at_base:
-        random[field.space.boundary_nodes("base")] = 0.0
-    return field.values + random
+        random[field.space.boundary_nodes("base")] = 0.0  # type: ignore[attr-defined]
+    return field.values + random  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
@@ -100,7 +100,7 @@ def test_energies_of_any_displacement_against_another_program(finger, load):
         return 0.5 * float(vector @ (stiffness @ vector))
 
     assert certificate.energy == pytest.approx(energy(nodal), rel=1e-9)
-    difference = energy(nodal - FemSolver().solve(problem).field.values)
+    difference = energy(nodal - FemSolver().solve(problem).field.values)  # type: ignore[attr-defined]
     assert certificate.excess + certificate.violation == pytest.approx(difference, rel=1e-6)
     assert min(certificate.excess, certificate.violation) > 1e-3 * difference
     assert certificate.weak_residual == pytest.approx(np.sqrt(certificate.rel_excess), rel=1e-6)
@@ -132,7 +132,7 @@ def test_missed_conditions_are_told_in_mm(finger, load):
     """Everything moved by (0.02, -0.03) mm, base and contact included, which takes no energy."""
     problem = Problem(finger, load=load)
     solution = FemSolver().solve(problem)
-    moved = solution.field.values + np.array([0.02, -0.03])
+    moved = solution.field.values + np.array([0.02, -0.03])  # type: ignore[attr-defined]
     reported = sampled(problem, moved, solution.energy, solution.reaction)
     certificate = Certifier(problem).certificate(reported)
     assert certificate.base == pytest.approx(np.hypot(0.02, 0.03))

@@ -98,6 +98,6 @@ def test_the_whole_curve_of_the_simulated_finger_and_an_identified_force_are_dra
     assert "fem-id, 0.6 N/mm, identified" in page.text
     (lesser,) = [line for line in axes.lines if line.get_linestyle() == ":"]
     np.testing.assert_allclose(lesser.get_xydata(), [[0, 0], [4, 0.3], [10, 0.6]])
-    (interval,) = axes.containers[0].lines[2]
+    (interval,) = axes.containers[0].lines[2]  # type: ignore[attr-defined]
     np.testing.assert_allclose(interval.get_segments()[0][:, 1], [0.5, 0.8])
     assert (page.cut_off(), page.overlaps()) == ([], [])

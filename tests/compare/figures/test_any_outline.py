@@ -108,6 +108,6 @@ def test_a_cylinder_stands_on_a_curved_front() -> None:
         found, load=found.load.model_copy(update={"kind": "cylinder", "radius": 5.0, "position": 35.0})
     )
     axes, *_ = draw(aside, "overlay").figure.axes
-    starts = [text.xyann for text in axes.texts if not text.get_text()]
+    starts = [text.xyann for text in axes.texts if not text.get_text()]  # type: ignore[attr-defined]
     height = float(ring().section.front_point(35.0)[1])
     assert min(abs(y - height) for _, y in starts) < 0.05

@@ -57,7 +57,7 @@ def test_numbers_of_markers_at_joints_lie_neither_on_the_outline_nor_on_another_
 def test_the_clamp_is_hatched_along_every_piece_of_the_base_on_its_outer_side() -> None:
     for finger in (load_design("csiro"), ring()):
         (axes,) = draw_design(finger).axes
-        strokes = np.concatenate([lines.get_segments() for lines in axes.collections])
+        strokes = np.concatenate([lines.get_segments() for lines in axes.collections])  # type: ignore[attr-defined]
         assert finger.section.clearance(strokes[:, 0]).min() > -1e-3  # they start on the outline
         assert finger.section.clearance(strokes[:, 1]).max() < 0
         for loop, which in finger.section.named("base"):

@@ -183,7 +183,7 @@ def test_a_circle_shows_a_training_error_that_vanishes(fem, pinn, observations, 
 
 def test_a_marker_that_was_not_seen_has_no_bar(pages: dict[str, Page]) -> None:
     for axes in pages["marker_errors"].figure.axes:
-        middles = {round(bar.get_x() + bar.get_width() / 2) for bar in axes.patches}
+        middles = {round(bar.get_x() + bar.get_width() / 2) for bar in axes.patches}  # type: ignore[attr-defined]
         assert middles == {1, 3}
     assert pages["marker_errors"].text.count("×") == 6
 
@@ -258,7 +258,7 @@ def test_errors_of_solvers_that_are_far_apart_are_all_seen(fem, pinn, compared, 
     heights = []
     for axes in (figure.axes[0], figure.axes[2]):
         low, high = np.log10(axes.get_ylim())
-        heights.append((np.log10(axes.patches[0].get_height()) - low) / (high - low))
+        heights.append((np.log10(axes.patches[0].get_height()) - low) / (high - low))  # type: ignore[attr-defined]
     assert min(heights) > 0.1
 
 

@@ -84,6 +84,6 @@ def main() -> None:
             PROBLEM,
             MARKERS,
             Path(sys.argv[1]),
-            Said(),  # type: ignore[arg-type]
+            Said(),
             pool,
         )

@@ -21,8 +21,8 @@ from pinnray.geometry.drawing.description import Description
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.html import PNG, SMALL, template_environment
 from pinnray.solvers.registry import make_solver
+from tests.program import ROOT, SOURCES
 
-ROOT = Path(__file__).parents[3]
 HOSTILE = """</script></table><x-evil onerror="x()">&amp; ' "><img src=x onerror=x()>"""
 UP = ["../up", "/tmp/up", "a/../../up", "..", "a/b", "a\x00b", "\N{FULLWIDTH SOLIDUS}up"]
 
@@ -135,8 +135,8 @@ def test_a_text_of_others_is_no_formula_and_no_command_of_the_terminal(hostile, 
 
 
 def test_no_template_and_no_script_puts_text_in_as_html() -> None:
-    assert template_environment().autoescape is True
-    for path in sorted((ROOT / "compare" / "templates").iterdir()):
+    assert template_environment("pinnray.comparison").autoescape is True
+    for path in sorted(ROOT.glob("*/templates/*")):
         text = path.read_text(encoding="utf-8")
         found = re.findall(
             r"\|\s*safe\b|autoescape|innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(", text
@@ -146,7 +146,7 @@ def test_no_template_and_no_script_puts_text_in_as_html() -> None:
 
 def test_html_is_made_of_constants_alone() -> None:
     """`Markup` marks a text as safe; texts of others come in by its method `format`, which escapes them."""
-    for path in sorted((ROOT / "compare").rglob("*.py")):
+    for path in SOURCES:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Markup":
                 assert all(isinstance(each, ast.Constant) for each in node.args), f"{path}:{node.lineno}"

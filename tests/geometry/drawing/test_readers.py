@@ -103,7 +103,7 @@ def test_dxf_curves_and_units(tmp_path):
     assert drawing.unit == 1000
     assert drawing.loops[0].area == pytest.approx(np.pi * 30 * 15, rel=1e-4)
     spline = next(entity for entity in space if entity.dxftype() == "SPLINE")
-    polygon = np.array([(point.x, point.y) for point in spline.flattening(1e-9)]) * 1000
+    polygon = np.array([(point.x, point.y) for point in spline.flattening(1e-9)]) * 1000  # type: ignore[attr-defined]
     x, y = polygon.T
     shoelace = 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
     assert drawing.loops[1].area == pytest.approx(shoelace, rel=1e-4)

@@ -8,7 +8,7 @@ import pytest
 from pinnray.geometry import Design, UserError
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, parameter_info
 from pinnray.geometry.finger.rules import Rule, RuleResult
-from pinnray.geometry.finger.validation import RULES, STEP, advice, obeys
+from pinnray.geometry.finger.validation import RULES, STEP, advice, obeys  # type: ignore[attr-defined]
 
 BAD_DESIGNS = [
     # parameters, parameter that the message must give a range for
@@ -74,7 +74,7 @@ def test_default_is_the_papers_finger() -> None:
 
 
 def test_symbols_are_aliases() -> None:
-    by_symbol = Design(H=100, L=32, W=18, L_angle=15, L_tip=22, N=5, t_rib=1.5, t_flex=2.2, t_back=2.1)
+    by_symbol = Design(H=100, L=32, W=18, L_angle=15, L_tip=22, N=5, t_rib=1.5, t_flex=2.2, t_back=2.1)  # type: ignore[call-arg]
     by_parameter_name = Design(
         height=100, base_width=32, depth=18, rib_angle=15, tip_length=22, rib_count=5,
         rib_thickness=1.5, front_thickness=2.2, back_thickness=2.1,

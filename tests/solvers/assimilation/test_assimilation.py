@@ -136,5 +136,5 @@ def test_a_disc_does_not_reach_beyond_the_body(problem):
 def test_the_disc_is_that_of_the_designs_markers(problem, preset, name):
     radius = load_design(preset).marker_diameter / 2
     observed = replace(problem, observations=replace(problem.observations, marker_radius=radius))
-    assert make_solver(name).weighting.misfit(observed).radius == radius
-    assert make_solver(name, marker_radius=0.3).weighting.misfit(observed).radius == 0.3
+    assert make_solver(name).weighting.misfit(observed).radius == radius  # type: ignore[attr-defined]
+    assert make_solver(name, marker_radius=0.3).weighting.misfit(observed).radius == 0.3  # type: ignore[attr-defined]

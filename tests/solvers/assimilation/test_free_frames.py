@@ -57,7 +57,7 @@ def test_frames_are_those_of_the_joint_normal_distribution(problem):
     """Of `statfem`: mean and covariance of z given the observations, from the covariance of both together."""
     observed, _ = pictured(problem, OFF)
     solution = make_solver("statfem").solve(replace(problem, observations=observed))
-    posterior = solution.field.posterior
+    posterior = solution.field.posterior  # type: ignore[attr-defined]
     data, (factor, amplitudes, lengths) = posterior.data, posterior.constants
     count, shapes = 2 * len(data.points), data.shapes.reshape(len(data.load), -1)
     by_load = (factor * data.load_deviation) ** 2 * shapes.T @ shapes
@@ -101,11 +101,11 @@ def test_deviations_in_the_picture_are_those_of_markers_left_out(problem, solver
     found, seen = make_solver(solver).solve(hidden), hidden.observations.visible
     there = problem.mesh.locate(observed.points)
     shown = found.uncertainty.shown(there)
-    framed = found.field.posterior
+    framed = found.field.posterior  # type: ignore[attr-defined]
     z, pictures = framed.frames[0], FreePictures.of(hidden.observations)
     seen_there = found.shown(observed.points, found.displacement(there))[[4]]
     place = replace(pictures, points=observed.points[[4]], shown=seen_there)
-    own_shapes = found.field._own(there)[:, [4]]
+    own_shapes = found.field._own(there)[:, [4]]  # type: ignore[attr-defined]
     _, variance = framed.at(observed.points[[4]], own_shapes, place.about(z).frames)
     np.testing.assert_allclose(shown[4] ** 2, variance[0], rtol=1e-6)
     assert shown[seen].max() < 0.011  # as exactly as it was seen
@@ -165,7 +165,7 @@ def test_a_marker_is_left_out_of_the_frames_as_well(problem):
         one = observed.points[[marker]]
         predicted = without.shown(one, without.displacement(one))[0]
         np.testing.assert_allclose(whole.left_out[marker], predicted, atol=0.02)
-    again = made.refitter(problem)(observed)
+    again = made.refitter(problem)(observed)  # type: ignore[attr-defined]
     np.testing.assert_allclose(again.displacement(observed.points), whole.displacement(observed.points))
     assert again.stats["pressed_turn"] == pytest.approx(whole.stats["pressed_turn"])
 

@@ -100,7 +100,7 @@ def test_a_broken_package_warns_and_the_rest_goes_on(tmp_path, monkeypatch, plac
 @pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "a b", "<b>", "x" * 65, "truth", "a\n"])
 def test_a_name_that_no_file_can_have_is_refused(name, plugin_folder, monkeypatch):
     monkeypatch.syspath_prepend(str(plugin_folder))
-    from pinnray_skfem import SkfemSolver
+    from pinnray_skfem import SkfemSolver  # type: ignore[import-not-found]
 
     monkeypatch.setattr(SkfemSolver, "name", name)
     with pytest.raises(UserError, match="a solver is called"):

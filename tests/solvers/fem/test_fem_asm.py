@@ -147,7 +147,7 @@ def test_the_curve_is_what_other_weights_give(problem):
 def test_without_markers_it_is_fem(coarse_mesh):
     problem = Problem(coarse_mesh)
     solution = FemAsmSolver().solve(problem)
-    assert solution.field.values.tolist() == FemSolver().solve(problem).field.values.tolist()
+    assert solution.field.values.tolist() == FemSolver().solve(problem).field.values.tolist()  # type: ignore[attr-defined]
     assert solution.solver == "fem-asm"
     assert solution.left_out is None
 

@@ -47,7 +47,7 @@ def test_weak_weights_give_fem_nonlinear(kind, law):
     plain = FemNonlinearSolver(degree=1).solve(replace(problem, observations=None))
     weak = FemAsmSolver(degree=1, asm_weight=1e-12).solve(problem)
     assert weak.status.converged
-    np.testing.assert_allclose(weak.field.values, plain.field.values, atol=1e-6)
+    np.testing.assert_allclose(weak.field.values, plain.field.values, atol=1e-6)  # type: ignore[attr-defined]
     assert weak.energy == pytest.approx(plain.energy, rel=1e-6)
     np.testing.assert_allclose(weak.reaction, plain.reaction, atol=1e-6 * np.abs(plain.reaction).max())
 
@@ -61,8 +61,8 @@ def test_small_displacements_give_the_linear_minimiser(kind):
         load = Load(kind=kind, displacement=(0.1 * size, -size))
         seen = replace(problem.observations, displacements=size * problem.observations.displacements)
         own = replace(problem, load=load, observations=seen)
-        stiff = SOFT.solve(own).field.values
-        linear = SOFT.solve(replace(own, material=Material())).field.values
+        stiff = SOFT.solve(own).field.values  # type: ignore[attr-defined]
+        linear = SOFT.solve(replace(own, material=Material())).field.values  # type: ignore[attr-defined]
         distances.append(np.linalg.norm(stiff - linear) / np.linalg.norm(linear))
     assert distances[1] < 0.02
     assert np.log2(distances[0] / distances[1]) == pytest.approx(1.0, abs=0.1)
@@ -90,12 +90,12 @@ def functional(problem, space, slack):
 def test_it_is_stationary_and_a_minimum_nearby(bent):
     solver = replace(SOFT, contact_deviation=0.5)
     solution = solver.solve(bent)
-    space = solution.field.space
+    space = solution.field.space  # type: ignore[attr-defined]
     equilibrium, total = functional(bent, space, slack=solver.weighting.slack)
-    least, random = total(solution.field.values), np.random.default_rng(1)
+    least, random = total(solution.field.values), np.random.default_rng(1)  # type: ignore[attr-defined]
     for _ in range(3):
         step = np.where(equilibrium.clamped, 0.0, 1e-3 * random.normal(size=space.nodes.shape))
-        up, down = (total(solution.field.values + sign * step) - least for sign in (1, -1))
+        up, down = (total(solution.field.values + sign * step) - least for sign in (1, -1))  # type: ignore[attr-defined]
         assert min(up, down) > 0
         assert abs(up - down) < 1e-2 * up
 
@@ -150,5 +150,5 @@ def test_a_load_that_is_not_reached_is_said():
 def test_without_markers_it_is_fem_nonlinear(bent):
     alone = replace(bent, observations=None)
     solution = FemAsmSolver().solve(alone)
-    np.testing.assert_array_equal(solution.field.values, FemNonlinearSolver().solve(alone).field.values)
+    np.testing.assert_array_equal(solution.field.values, FemNonlinearSolver().solve(alone).field.values)  # type: ignore[attr-defined]
     assert solution.solver == "fem-asm"

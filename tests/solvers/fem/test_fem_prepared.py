@@ -50,7 +50,7 @@ def test_loads_share_a_factorisation_and_solutions_are_those_of_fresh_solves(
     assert len(factorised) == factorisations
     for load, solution in zip(loads, solutions, strict=True):
         fresh = FemSolver().solve(Problem(coarse_mesh, load=load))
-        assert relative(solution.field.values - fresh.field.values, fresh.field.values) < 1e-9
+        assert relative(solution.field.values - fresh.field.values, fresh.field.values) < 1e-9  # type: ignore[attr-defined]
         np.testing.assert_allclose(solution.reaction, fresh.reaction, atol=1e-8)
         assert solution.energy == pytest.approx(fresh.energy, rel=1e-9)
         assert solution.problem.load == load
@@ -71,7 +71,7 @@ def test_iterations_find_what_the_factorisation_finds(coarse_mesh, degree, kind)
     direct, iterative = (
         FemSolver(degree=degree, linear_solver=name).solve(problem) for name in ("direct", "iterative")
     )
-    difference = relative(iterative.field.values - direct.field.values, direct.field.values)
+    difference = relative(iterative.field.values - direct.field.values, direct.field.values)  # type: ignore[attr-defined]
     assert difference < 1e-7
     np.testing.assert_allclose(iterative.reaction, direct.reaction, rtol=1e-6, atol=1e-8)
     assert (direct.stats["linear_solver"], iterative.stats["linear_solver"]) == ("direct", "iterative")

@@ -84,7 +84,7 @@ def test_feet_that_turn_with_the_line_between_them_carry_the_finger_along(pair):
 @pytest.mark.parametrize("name", ["foot_1_give", "foot_1_turn", "foot_2_give", "foot_2_turn"])
 def test_derivatives_by_the_feet_pass_the_taylor_test(pair, name):
     there = {"foot_1_give": 0.05, "foot_1_turn": -0.06, "foot_2_give": -0.08, "foot_2_turn": 0.1}
-    check_taylor(*pair, name, PRESSED | there)
+    check_taylor(*pair, name, PRESSED | there)  # type: ignore[call-arg]
 
 
 @pytest.mark.slow

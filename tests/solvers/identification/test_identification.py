@@ -13,7 +13,7 @@ from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.model import EXACT
 from pinnray.solvers.identification.search import Identifier
-from pinnray.solvers.identification.unknowns import DEFAULT, PARTS
+from pinnray.solvers.identification.unknowns import DEFAULT, PARTS  # type: ignore[attr-defined]
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Load
 from tests.solvers.conftest import observed_at
@@ -157,7 +157,7 @@ def test_the_stress_deviation_is_that_of_refits(problem):
         observed, _ = twin(problem, "neo-hookean", {"normal_force": 0.18}, seed=seed)
         solution = refit(observed)
         found.append(solution.state(centroids).von_mises)
-        stated.append(solution.field.von_mises_deviation(centroids))
+        stated.append(solution.field.von_mises_deviation(centroids))  # type: ignore[attr-defined]
     scatter, mean = np.std(found, axis=0, ddof=1), np.mean(stated, axis=0)
     # The scatter of 12 is known to 20 %; an inflated φ of single draws widens the stated one.
     assert 0.7 < np.median(scatter / mean) < 1.3
@@ -226,7 +226,7 @@ def test_only_an_identified_finger_is_carried_and_only_to_where_it_has_an_equili
 def test_without_markers_it_is_fem_nonlinear(problem):
     small = replace(problem, load=Load(displacement=(0.0, -1.0)))
     plain = FemIdSolver(degree=1).solve(small)
-    np.testing.assert_array_equal(plain.field.values, FemNonlinearSolver(degree=1).solve(small).field.values)
+    np.testing.assert_array_equal(plain.field.values, FemNonlinearSolver(degree=1).solve(small).field.values)  # type: ignore[attr-defined]
     assert plain.solver == "fem-id"
 
 

@@ -8,7 +8,7 @@ import pytest
 from pinnray.geometry.registration import Registration
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel
-from pinnray.solvers.identification.unknowns import CONTACT, DEFAULT, PARTS
+from pinnray.solvers.identification.unknowns import CONTACT, DEFAULT, PARTS  # type: ignore[attr-defined]
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.twins import NAMES, NOISE, VALUES, model_of, values_of
 
@@ -78,7 +78,7 @@ def test_a_force_holds_the_finger_where_a_prescribed_displacement_does(problem):
     assert response is not None
     # Gauss points of the two differ in number, which is worth some 1e-4 of a contact two elements wide.
     np.testing.assert_allclose(response.contact, [response.contact[0], -6.0], rtol=2e-3)
-    np.testing.assert_allclose(response.state, moved.field.values, atol=2e-3 * 6.0)
+    np.testing.assert_allclose(response.state, moved.field.values, atol=2e-3 * 6.0)  # type: ignore[attr-defined]
     lame = problem.material.lame
     assert model.body.energy(response.state, lame, np.zeros(4)) == pytest.approx(moved.energy, rel=4e-3)
 
@@ -127,7 +127,7 @@ def unregistered(problem):
 
 @pytest.mark.parametrize("name", [*PICTURES, "normal_force", "base_compliance", "rib_thickness"])
 def test_derivatives_by_the_frames_pass_the_taylor_test(unregistered, name):
-    check_taylor(*unregistered, name, VALUES | PICTURES)
+    check_taylor(*unregistered, name, VALUES | PICTURES)  # type: ignore[call-arg]
 
 
 def test_a_finger_beside_its_drawing_shows_what_lies_where_the_markers_are(problem, unregistered):

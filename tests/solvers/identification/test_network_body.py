@@ -119,7 +119,10 @@ def test_slopes_by_walls_and_moduli_are_those_of_differences(body, state, change
     constants = np.array(LAME)
     for found, one in zip(moduli, np.diag(constants)[:2], strict=True):
         expected = slope(
-            lambda lame: body.linearised(state, LAME._make(lame), changes).force, constants, one, 1e-4
+            lambda lame: body.linearised(state, LAME._make(lame), changes).force,  # type: ignore[call-arg]
+            constants,
+            one,
+            1e-4,
         )
         np.testing.assert_allclose(found * one.sum(), expected, atol=1e-6 * np.abs(expected).max())
 
@@ -143,9 +146,9 @@ def test_a_stretched_body_without_moved_material_has_the_energy_of_its_own_gradi
     stretch = np.zeros((1, count, 2, 2))
     stretch[..., 0, 0] = 1.0
     moved = NetworkBody(body._energy, stretch)
-    gradient = body._energy.gradients(network_body.torch.from_numpy(state)[None])[0].clone()
+    gradient = body._energy.gradients(network_body.torch.from_numpy(state)[None])[0].clone()  # type: ignore[attr-defined]
     gradient[:, :, 0] /= 1.1
-    density = network_body.energy_density(gradient, LAME, body._law)
+    density = network_body.energy_density(gradient, LAME, body._law)  # type: ignore[attr-defined]
     expected = 1.1 * float(body._energy.weights @ density)
     assert moved.energy(state, LAME, np.array([0.1])) == pytest.approx(expected, rel=1e-12)
 

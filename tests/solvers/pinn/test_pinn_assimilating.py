@@ -96,7 +96,7 @@ def test_finite_strain_has_the_least_energy_plus_misfit_nearby(bent):
     solution = solver.solve(bent)
     assert solution.status.converged, solution.status.message
     level, misfit, seen, direction = functional(solver, bent)
-    least, _ = find_equilibrium(level, solution.field.output, 1.0)
+    least, _ = find_equilibrium(level, solution.field.output, 1.0)  # type: ignore[attr-defined]
     outputs = [least.output + size * direction for size in (1e-4, 0, -1e-4)]
     ahead, here, behind = (level.energy.total(each) + misfit.value(seen(each)) for each in outputs)
     curvature = ahead - 2 * here + behind

@@ -34,7 +34,7 @@ def straight(problem) -> Solution:
 
 
 def assert_identical(first: Solution, second: Solution) -> None:
-    assert torch.equal(first.field.parameters, second.field.parameters)
+    assert torch.equal(first.field.parameters, second.field.parameters)  # type: ignore[attr-defined]
     for name, column in first.history.items():
         if name != "seconds":
             np.testing.assert_array_equal(column, second.history[name], err_msg=name)
@@ -196,7 +196,7 @@ def test_two_processes_train_as_one(problem, tmp_path):
     assert done.returncode == 0, done.stderr
     two = [np.load(tmp_path / f"rank{rank}.npy") for rank in range(2)]
     np.testing.assert_array_equal(*two)
-    np.testing.assert_allclose(two[0], one.field.parameters.numpy(), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(two[0], one.field.parameters.numpy(), rtol=1e-9, atol=1e-12)  # type: ignore[attr-defined]
     assert [(tmp_path / f"told{rank}").read_text() for rank in range(2)] == ["15", "0"]
     assert len(rows(tmp_path)) == 15
 
@@ -206,7 +206,7 @@ def test_two_processes_train_as_one(problem, tmp_path):
 def test_a_gpu_trains_as_the_processor_does(problem):
     settings = {"precision": "double", "epochs": 15}
     cpu, gpu = (replace(SMALL, device=device, **settings).solve(problem) for device in ("cpu", "cuda"))
-    torch.testing.assert_close(gpu.field.parameters, cpu.field.parameters, rtol=1e-9, atol=1e-12)
+    torch.testing.assert_close(gpu.field.parameters, cpu.field.parameters, rtol=1e-9, atol=1e-12)  # type: ignore[attr-defined]
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="a CUDA device is there")

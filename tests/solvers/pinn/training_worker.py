@@ -20,7 +20,7 @@ def main(folder: Path) -> None:
     told: list[str] = []
     problem = Problem(bar_mesh(24.0, 4.0, 12, 4, contact=(14.0, 18.0)))
     solution = solver.solve(problem, lambda _, text: told.append(text))
-    np.save(folder / f"rank{rank}.npy", solution.field.parameters.numpy())
+    np.save(folder / f"rank{rank}.npy", solution.field.parameters.numpy())  # type: ignore[attr-defined]
     (folder / f"told{rank}").write_text(str(len(told)))
 
 

@@ -67,7 +67,7 @@ def test_mean_and_deviation_are_those_of_the_process(solution, coarse_mesh):
 @pytest.mark.parametrize("kernel", SMOOTHNESS)
 def test_the_constants_are_those_that_scikit_learn_finds(problem, kernel):
     """From its start in its ranges: 1e-6 of them, where the search ends at the flat top of the likelihood."""
-    found = GaussianProcessSolver(kernel=kernel).solve(problem).field.posterior.constants
+    found = GaussianProcessSolver(kernel=kernel).solve(problem).field.posterior.constants  # type: ignore[attr-defined]
     observations = problem.observations
     seen = observations.visible
     start = ConstantKernel(10.0, (1e-4, 1e6)) * Matern(30.0, (1.0, 1000.0), SMOOTHNESS[kernel])
@@ -130,7 +130,7 @@ def test_the_evidence_is_that_of_the_normal_distribution(problem, kernel):
     observations = problem.observations
     seen, smoothness = observations.visible, {"matern32": 1.5, "gaussian": np.inf}[kernel]
     points, expected = observations.points[seen], 0.0
-    constants = solution.field.posterior.constants
+    constants = solution.field.posterior.constants  # type: ignore[attr-defined]
     for axis in (0, 1):
         variance, length = constants.amplitudes[axis] ** 2, constants.lengths[axis]
         covariance = variance * matern(points, points, length, smoothness)

@@ -20,8 +20,8 @@ def points():
 
 @pytest.mark.parametrize("kernel", SMOOTHNESS)
 def test_kernels_are_those_of_the_textbook(points, kernel):
-    found = correlation(*points, 17.0, kernel)
-    np.testing.assert_allclose(found, matern(*points, 17.0, SMOOTHNESS[kernel]), atol=1e-12)
+    found = correlation(*points, 17.0, kernel)  # type: ignore[call-arg]
+    np.testing.assert_allclose(found, matern(*points, 17.0, SMOOTHNESS[kernel]), atol=1e-12)  # type: ignore[call-arg]
     np.testing.assert_allclose(np.diag(correlation(points[0], points[0], 17.0, kernel)), 1.0)
 
 

@@ -142,7 +142,7 @@ def test_a_component_that_is_free_has_no_load(problem, load):
 def test_without_markers_it_is_fem(coarse_mesh):
     problem = Problem(coarse_mesh)
     solution = StatFemSolver().solve(problem)
-    assert solution.field.values.tolist() == FemSolver().solve(problem).field.values.tolist()
+    assert solution.field.values.tolist() == FemSolver().solve(problem).field.values.tolist()  # type: ignore[attr-defined]
     assert (solution.solver, solution.left_out) == ("statfem", None)
 
 

@@ -157,8 +157,8 @@ def test_a_path_between_its_equilibria_is_a_spline():
     shares = np.array([0, 0.2, 0.45, 0.6, 0.8, 1.0])
     from types import SimpleNamespace
 
-    states = [LagrangeField(None, np.full((3, 2), share + share**3)) for share in shares]  # type: ignore[arg-type]
+    states = [LagrangeField(None, np.full((3, 2), share + share**3)) for share in shares]
     history = {"load_fraction": shares, "reaction_x": shares, "reaction_y": shares, "energy": shares}
-    path = FieldPath.of(SimpleNamespace(history=history, states=states), STROKES)  # type: ignore[arg-type]
+    path = FieldPath.of(SimpleNamespace(history=history, states=states), STROKES)
     wanted = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
     assert path.nodal[:, 0, 0] == pytest.approx(wanted + wanted**3, abs=1e-12)

@@ -67,7 +67,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[GridPoint]]:
                     values = {**dict.fromkeys(TRAINING, 1.0), "rel_l2_displacement": ended, "loss": 1 / ended}
                     yield Measurement(number, "done", "", 0.1, values)
                 else:
-                    yield Measurement(number, *ended, 0.1)
+                    yield Measurement(number, *ended, 0.1)  # type: ignore[call-arg]
 
         monkeypatch.setattr(Workers, "answers", answers)
         return trained

@@ -41,7 +41,7 @@ def test_fit_and_covariance_are_those_of_the_dense_problem(seen):
     begin = [*CAMERA.intrinsics[:8], *np.column_stack([placed().rotations.as_rotvec(), placed()[1]]).ravel()]
     dense = least_squares(missed, begin, x_scale="jac", xtol=1e-12, ftol=1e-12, jac="3-point")
     upper = np.linalg.qr(dense.jac, mode="r")
-    covariance = np.linalg.inv(upper.T @ upper) * 2 * dense.cost / (dense.jac.shape[0] - 44)
+    covariance = np.linalg.inv(upper.T @ upper) * 2 * dense.cost / (dense.jac.shape[0] - 44)  # type: ignore[attr-defined]
     deviations = np.sqrt(np.diag(covariance))[:8]
     assert (np.abs(found.camera.intrinsics[:8] - dense.x[:8]) < 1e-3 * deviations).all()
     scale = np.outer(deviations, deviations)

@@ -58,7 +58,7 @@ def film(pictures: Sequence[Image], *, live: bool = False, simulated: bool = Fal
                 raise KeyboardInterrupt
             yield CapturedImage(image, 0.1 * number, f"picture {number}", simulated)
 
-    return Frames("the film", shots(), rate=10.0, count=None if live else len(pictures))  # type: ignore[arg-type]
+    return Frames("the film", shots(), rate=10.0, count=None if live else len(pictures))
 
 
 def pressed(listed: ListedDiscs, **end: Any) -> list[Image]:

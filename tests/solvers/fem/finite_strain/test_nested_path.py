@@ -60,12 +60,12 @@ def test_the_end_is_the_equilibrium_of_the_path_on_fine_elements(kind):
 @pytest.mark.slow
 def test_where_coarse_elements_lead_elsewhere_the_path_is_followed_on_the_fine_ones(monkeypatch):
     """The guess is spoilt: the equilibrium found from it is far from it."""
-    followed = solver.LoadPath.interpolated
+    followed = solver.LoadPath.interpolated  # type: ignore[attr-defined]
 
     def elsewhere(path, way, nodal):
         return 1.2 * followed(path, way, nodal)
 
-    monkeypatch.setattr(solver.LoadPath, "interpolated", elsewhere)
+    monkeypatch.setattr(solver.LoadPath, "interpolated", elsewhere)  # type: ignore[attr-defined]
     found = SOLVER.solve(FINE)
     assert found.status.converged
     assert "on elements of" not in found.status.message
