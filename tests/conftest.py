@@ -19,7 +19,7 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.processes import child_environment
+from pinnray.runtime.processes.pool import child_environment
 from pinnray.solvers.solver import silent
 
 os.environ["PETSC_OPTIONS"] = (
@@ -130,7 +130,7 @@ def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
         for name, each in tasks.items():
             yield name, work(each, silent)
 
-    monkeypatch.setattr("pinnray.runtime.processes.Pool.answers", inline)
+    monkeypatch.setattr("pinnray.runtime.processes.pool.Pool.answers", inline)
 
 
 @pytest.fixture(scope="session")

@@ -24,7 +24,8 @@ from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores, package_versions
 from pinnray.runtime.output_folder import SOLUTIONS, TRAINING, take_training
-from pinnray.runtime.processes import Pool, ProcessFailed, end_with_parent, known_to_children
+from pinnray.runtime.processes.child import ProcessFailed, end_with_parent
+from pinnray.runtime.processes.pool import Pool, known_to_children
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import solver_modules
