@@ -20,7 +20,6 @@ from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.processes.pool import child_environment
-from pinnray.solvers.solver import silent
 
 os.environ["PETSC_OPTIONS"] = (
     "-no_signal_handler"  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
@@ -128,7 +127,7 @@ def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def inline(_: object, work: object, tasks: Mapping[str, object], **__: object) -> Generator:
         for name, each in tasks.items():
-            yield name, work(each, silent)
+            yield name, work(each, lambda *_: None)
 
     monkeypatch.setattr("pinnray.runtime.processes.pool.Pool.answers", inline)
 
