@@ -120,16 +120,6 @@ def test_finite_strain_tends_to_hooke(law, flat):
         np.testing.assert_allclose(b, a, atol=1e-9)
 
 
-def test_st_venant_kirchhoff_stretch_has_the_stress_of_the_closed_form():
-    """Stretch s along x: E_xx = (s^2 - 1) / 2, σ_xx = (λ + 2 μ) E_xx s, σ_yy = σ_zz = λ E_xx / s."""
-    s = 1.4
-    strain = 0.5 * (s * s - 1)
-    stress, stress_zz = stress_of("st-venant-kirchhoff", np.diag([s - 1, 0.0])[None], LAME)
-    expected = np.diag([(LAME.λ + 2 * LAME.μ) * strain * s, LAME.λ * strain / s])
-    np.testing.assert_allclose(stress[0], expected, rtol=1e-12)
-    assert stress_zz[0] == pytest.approx(LAME.λ * strain / s, rel=1e-12)
-
-
 @pytest.mark.parametrize("law", ["linear", *FINITE])
 def test_a_plane_deformation_of_a_solid_has_the_state_of_plane_strain(law, flat, coarse_mesh):
     problem = Problem(coarse_mesh, Material(law=law))

@@ -53,7 +53,7 @@ CASES = [
 """On a curved base and on a divided one; on every body networks are compared on the finer mesh."""
 
 NETWORKS = {
-    **dict.fromkeys(("ring", "tilted wedge", "thin ribs", "arch"), "fast"),
+    **dict.fromkeys(("ring", "tilted wedge", "arch"), "fast"),
     **dict.fromkeys(("beam", "feet and slot", "notched"), "local"),
 }
 """Preset by body."""
