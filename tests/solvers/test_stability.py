@@ -154,10 +154,8 @@ def test_from_a_saddle_both_wells_are_found():
 
 def test_no_step_is_no_descent():
     assert descended(np.ones(2), double_well, lambda state, shift: None) is None
-    stuck = replace_step(newton_step)
-    assert descended(np.array([0.3, 0.0]), double_well, stuck) is None
 
+    def uphill(state, shift):
+        return ShiftedStep(-newton_step(state, 10.0).change, 0 if shift else 1)
 
-def replace_step(step):
-    """Uphill, with a shift that the descent has to keep."""
-    return lambda state, shift: ShiftedStep(-step(state, 10.0).change, 0 if shift else 1)
+    assert descended(np.array([0.3, 0.0]), double_well, uphill) is None

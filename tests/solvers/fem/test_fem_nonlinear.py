@@ -86,3 +86,4 @@ def test_load_that_tears_the_mesh_stops_with_advice(coarse_mesh):
     assert not solution.status.converged
     assert "Newton's method fails beyond (SNES: diverged_" in solution.status.message
     assert solution.stats["halved_steps"] > 0
+    assert solution.error is None

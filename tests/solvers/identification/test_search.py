@@ -62,27 +62,6 @@ def test_a_wrong_marker_is_found_and_not_used(identified, problem):
     assert np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
 
 
-def failing(monkeypatch, *laws):
-    """Let fits of some laws find no equilibrium."""
-    fit = LawFits.fit
-
-    def failed(self, law, *arguments, **options):
-        if law in laws:
-            raise NoSolutionError(f"no equilibrium of the {law} law")
-        return fit(self, law, *arguments, **options)
-
-    monkeypatch.setattr(LawFits, "fit", failed)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_a_law_without_an_equilibrium_is_left_out_and_said(identified, problem, monkeypatch, law):
-    failing(monkeypatch, law)
-    solution = sought(problem, identified[0])
-    assert [solution.problem.material.law] == [each for each in LAWS if each != law]
-    assert f"no equilibrium of the {law} law was found near the markers" in solution.status.message
-    assert f"probability {law}" not in solution.stats
-
-
 def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, problem, monkeypatch):
     settled = Identifier._settled
 
@@ -98,7 +77,10 @@ def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, prob
 
 
 def test_without_any_law_it_has_no_solution(identified, problem, monkeypatch):
-    failing(monkeypatch, *LAWS)
+    def failed(*_, **__):
+        raise NoSolutionError("no equilibrium of the law")
+
+    monkeypatch.setattr(LawFits, "fit", failed)
     with pytest.raises(NoSolutionError, match="no equilibrium of the"):
         sought(problem, identified[0])
 
@@ -135,6 +117,7 @@ def test_a_law_without_an_equilibrium_where_another_one_has_it_is_left_out_at_on
     solution = sought(problem, observed)
     assert solution.problem.material.law == LAWS[0]
     assert "no equilibrium of the st-venant-kirchhoff law" in solution.status.message
+    assert "probability st-venant-kirchhoff" not in solution.stats
     assert len(asked) <= 3
 
 
@@ -161,7 +144,7 @@ def test_no_load_is_no_force(problem):
 def test_on_a_fine_mesh_the_unknowns_are_sought_on_a_coarse_one(monkeypatch):
     """The result is that of the fine mesh, of which few systems are solved."""
     design = Design()
-    mesh = finger_mesh(design, settings=MeshSettings(size=0.3))
+    mesh = finger_mesh(design, settings=MeshSettings(size=0.5))
     problem = Problem(mesh, Material(law="neo-hookean"), Load(displacement=(None, -6.0)), finger=design)
     observed, _ = twin(problem, "neo-hookean", TRUE)
     sizes, linearised = [], FemBody.linearised

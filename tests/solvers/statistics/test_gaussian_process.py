@@ -12,7 +12,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.statistics.gaussian_process import GaussianProcessSolver
 from pinnray.solvers.statistics.kernel_field import SMOOTHNESS
-from tests.solvers.conftest import check_gradient, hiding, observed_at
+from tests.solvers.conftest import hiding, observed_at
 from tests.solvers.statistics.kernels import matern
 
 
@@ -76,10 +76,6 @@ def test_the_constants_are_those_that_scikit_learn_finds(problem, kernel):
         fitted = process.fit(observations.points[seen], observations.displacements[seen, axis])
         expected = np.exp(fitted.kernel_.theta)
         assert [found.amplitudes[axis] ** 2, found.lengths[axis]] == pytest.approx(expected, rel=1e-6)
-
-
-def test_gradient_is_the_derivative(solution, coarse_mesh):
-    check_gradient(solution, coarse_mesh.at_centroids().points[::40], 1e-7)
 
 
 def test_a_marker_that_is_left_out_has_no_say_at_all(problem, solution):
