@@ -42,7 +42,9 @@ def bent_force(problem):
     return np.pi**2 * modulus * WIDTH**3 / 12 / (2 * HEIGHT) ** 2 * (1 + STROKE / (2 * HEIGHT))
 
 
-@pytest.mark.parametrize("solver", [FemNonlinearSolver(), LOCAL], ids=lambda solver: solver.name)
+@pytest.mark.parametrize(
+    "solver", [FemNonlinearSolver(), pytest.param(LOCAL, marks=pytest.mark.slow)], ids=["fem", "network"]
+)
 def test_a_column_buckles_under_eulers_load(problem, solver):
     """Within 1 %: shear and the shortening of the axis are less; straight it would bear 48 times as much.
 
