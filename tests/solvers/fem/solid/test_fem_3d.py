@@ -20,7 +20,7 @@ from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import bar_mesh
 from tests.solvers.fem.test_fem_ranks import reported
 
-SLIDING, FINITE = Load(kind="patch", displacement=(None, -4.0)), ("neo-hookean", "st-venant-kirchhoff")
+SLIDING = Load(kind="patch", displacement=(None, -4.0))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_pure_bending_is_exact():
         np.testing.assert_allclose(state.von_mises, np.abs(expected), atol=1e-12)
 
 
-@pytest.mark.parametrize("law", ["linear", *(pytest.param(law, marks=pytest.mark.slow) for law in FINITE)])
+@pytest.mark.parametrize("law", ["linear", pytest.param("neo-hookean", marks=pytest.mark.slow)])
 def test_held_side_faces_make_plane_strain(wedge, law):
     problem = Problem(wedge, Material(law=law), SLIDING)
     solid = Fem3dSolver(sides="held", layers=2).solve(problem)
