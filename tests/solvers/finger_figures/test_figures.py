@@ -72,6 +72,7 @@ def test_the_largest_stress_of_a_uniform_strain_is_that_strains() -> None:
     assert strain == pytest.approx(0.01, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_largest_stress_depends_little_on_the_mesh() -> None:
     problems = [Problem(finger_mesh(FINGER, settings=MeshSettings(size=size))) for size in (0.5, 0.25)]
     found = [largest_away_from_corners(FemSolver(estimate=False).solve(each))[0] for each in problems]

@@ -45,6 +45,7 @@ def test_markers_that_are_well_known_tell_the_law_that_is_less_expected(problem)
     assert solution.stats["force_low"] < np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
 
 
+@pytest.mark.slow
 def test_a_contact_that_wraps_is_told_not_to_be_believed(problem):
     """On a printed finger the force of such a contact was half of the forward one."""
     extent = np.ptp(problem.mesh.points[problem.mesh.boundary("front").ravel(), 0])
@@ -64,7 +65,9 @@ def turned(problem):
     return observed, true, moved, shown
 
 
-@pytest.mark.parametrize("known", [Registration(3.0, 0.3, 0.01, 0.01), HAND_HELD])
+@pytest.mark.parametrize(
+    "known", [Registration(3.0, 0.3, 0.01, 0.01), pytest.param(HAND_HELD, marks=pytest.mark.slow)]
+)
 def test_the_frame_of_the_pressed_picture_is_found(problem, turned, known):
     """The force is as if all were right."""
     observed, true, moved, shown = turned
@@ -106,6 +109,7 @@ def test_a_finger_with_a_depth_is_in_no_plane_state(identified):
     np.testing.assert_allclose(deep.von_mises_deviation(there), expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_force_of_a_finger_with_a_depth_is_known_to_the_difference_of_the_planes(identified, problem):
     observed, forces = identified[0], {}
     for finger in (None, Design()):

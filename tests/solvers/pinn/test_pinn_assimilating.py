@@ -147,17 +147,6 @@ def test_what_it_says_of_a_marker_that_is_left_out_is_what_it_says_without(probl
     assert np.abs(solution.left_out - again.displacement(problem.mesh.markers))[:6].max() > 1e-3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("choose", ["left-out", "evidence"])
-def test_the_chosen_weights_are_those_of_the_factor(problem, choose):
-    rough = {**QUICK, "tolerance": 1.0, "weights": "precision"}
-    solution = PinnAsmSolver(**rough, choose=choose).solve(problem)
-    given = PinnAsmSolver(**rough, scale=solution.stats["weight_factor"]).solve(problem)
-    moved = [each.displacement(problem.mesh.points) for each in (solution, given)]
-    np.testing.assert_allclose(*moved, atol=1e-8)
-    assert solution.stats["weight_factor"] != 1
-
-
 def test_a_contact_that_is_not_certain_is_one_on_springs(problem):
     """Their force is the indenter's; near the same of finite elements, far from a contact that is certain."""
     settings = {"weights": "precision", "contact_deviation": 0.8, "scale": 0.02}

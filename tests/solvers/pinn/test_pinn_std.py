@@ -91,14 +91,6 @@ def test_slopes_are_those_of_automatic_differentiation(tree, points):
         torch.testing.assert_close(gradient.T, slopes[:, :, encoder], rtol=1e-9, atol=1e-11)
 
 
-def test_an_encoder_has_its_largest_share_near_its_centre(tree, centres):
-    shares = tree.values(torch.from_numpy(centres), torch.arange(tree.count)).numpy()
-    spacing = 0.2 + 0.1 * np.linalg.norm(centres, axis=1)
-    distance = np.linalg.norm(centres - centres[shares.argmax(axis=0)], axis=1)
-    assert np.median(distance / spacing) < 1
-    assert (distance / spacing).max() < 6
-
-
 def test_one_encoder_needs_no_gate(points):
     tree = GateTree.over(np.zeros((1, 2)), np.ones(1), width=1.0, rng=np.random.default_rng(0))
     (near,) = tree.near(boxes_around([points]))
