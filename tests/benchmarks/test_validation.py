@@ -80,6 +80,7 @@ def test_both_films_of_gravity_have_the_same_rest():
     assert together < 0.1 < 0.3 < alone
 
 
+@pytest.mark.slow
 def test_coarse_tetrahedra_have_the_figures_of_comsol():
     """The page promises 0.2 mm; the other law, or the load 6 mm lower, is further away."""
     found = all_cases(HalfBeam(cell="tetrahedron", strip=0.0), comsol.MODULUS)

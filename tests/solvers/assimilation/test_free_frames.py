@@ -93,6 +93,7 @@ def test_a_turned_picture_is_found(problem, solver):
         assert off < 0.2 * np.abs(as_it_is.displacement(observed.points) - moved).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["statfem", "gp"])
 def test_a_marker_left_out_is_predicted_in_its_picture(problem, solver):
     """Its deviation has a part by the frame."""

@@ -74,6 +74,7 @@ def test_the_force_is_within_three_percent_on_the_way_up_and_down(drawn_path, tr
     np.testing.assert_allclose(column(found, "position")[large], POSITION, atol=1.0)
 
 
+@pytest.mark.slow
 def test_intervals_hold_for_walls_that_are_not_those_drawn(printed_path, tracker_of):
     places, forces = printed_path
     found = readings(tracker_of(), places)

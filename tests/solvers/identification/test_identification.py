@@ -166,6 +166,7 @@ def test_gradients_of_several_states_are_those_of_their_fields(identified, probl
         np.testing.assert_allclose(found, each.drawn.gradient(location), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_marker_left_out_in_closed_form_is_nearly_that_of_a_refit(identified, problem):
     observed, _, solution = identified
     refit = FemIdSolver(degree=1).refitter(problem)

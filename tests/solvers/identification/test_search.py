@@ -131,6 +131,7 @@ def test_three_hidden_markers_open_the_intervals(identified, problem):
     assert np.isnan(solution.left_out[[2, 5, 8]]).all()
 
 
+@pytest.mark.slow
 def test_no_load_is_no_force(problem):
     """Noise alone: the interval of the force holds zero, and nothing is said to be known of the place."""
     noise = NOISE * np.random.default_rng(3).normal(size=(9, 2))

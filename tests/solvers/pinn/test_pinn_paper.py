@@ -72,12 +72,6 @@ def test_elements_integrate_and_random_points_estimate(coarse_mesh):
         assert (shares * points[:, 0] ** 2).sum() == pytest.approx(mean, rel=tolerance), kind
 
 
-def test_nodes_are_those_of_the_mesh_and_alike(coarse_mesh):
-    points, shares = collocation_points(coarse_mesh, "nodes", 0)
-    np.testing.assert_array_equal(points, coarse_mesh.points)
-    assert len(set(shares)) == 1
-
-
 def test_base_points_are_evenly_spaced_over_the_whole_base(coarse_mesh):
     points = base_points(coarse_mesh, 31)
     np.testing.assert_allclose(points[:, 0], 0.0, atol=1e-12)

@@ -151,6 +151,7 @@ def test_multigrid_finds_what_factors_find(wedge, law, load):
     assert np.abs(gap).max() < 1e-5  # mm
 
 
+@pytest.mark.slow
 def test_an_indefinite_matrix_is_solved_by_minres(wedge):
     """The stiffness minus 4e-6 of its diagonal has a negative eigenvalue."""
     finite = Problem(wedge, Material(law="neo-hookean"))
