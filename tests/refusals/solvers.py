@@ -7,16 +7,29 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import torch
 
+from benchmarks.verification.cases import calculix
+from benchmarks.verification.hyperelastic import Hyperelastic
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.solvers.elasticity import (
+    energy_density_of,
+    lame_constants,
+    lame_derivatives,
+    piola_stress,
+    strain_of,
+    stress_of,
+)
 from pinnray.solvers.fem.adaptive_refinement import adapted
 from pinnray.solvers.fem.solid import affordable
 from pinnray.solvers.finger_figures import figures_of
 from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
+from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.materials import TensileTest, fitted, preset, read_tensile_test
 from pinnray.solvers.physics import Physics
+from pinnray.solvers.pinn.finite_basis.energy import piola_stress_and_tangent
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import solved

@@ -59,23 +59,6 @@ def feet_and_slot() -> tuple[Section, float]:
     return Section(Loop.polygon(corners, names)), 45.0
 
 
-def thin_ribs(thickness: float = 0.8, ribs: int = 3) -> tuple[Section, float]:
-    """A wedge with walls of 1.5 mm and thin ribs that lean by 35 degrees."""
-    slope, length, height = tan(radians(35.0)), 52.0, 20.0
-    outline = Loop.polygon([(0, 0), (0, -height), (length, 0)], ["base", "back", "front"])
-    pitch, cavities = 30.0 / ribs, []
-    for rib in range(ribs):
-        left, right = 3.0 + rib * pitch, 3.0 + (rib + 1) * pitch - thickness
-        corners = []
-        for x, top in ((left, True), (left, False), (right, False), (right, True)):
-            # A leaning side through (x, -1.5) ends 1.6 mm above the back, y = height (x / length - 1).
-            meeting = (1.6 - height + height / length * (x - 1.5 * slope)) / (1 + height / length * slope)
-            lean = -1.5 if top else meeting
-            corners.append((x + slope * (-1.5 - lean), lean))
-        cavities.append(Loop.polygon([corners[0], corners[3], corners[2], corners[1]]))
-    return Section(outline, tuple(cavities)), 20.0
-
-
 def notched() -> tuple[Section, float]:
     """A bar with two V-notches, a round notch that leaves a thin hinge, and a narrow slit."""
     corners = [
@@ -105,7 +88,6 @@ BODIES: dict[str, Callable[[], tuple[Section, float]]] = {
     "beam": beam,
     "tilted wedge": tilted_wedge,
     "feet and slot": feet_and_slot,
-    "thin ribs": thin_ribs,
     "notched": notched,
     "arch": arch,
 }

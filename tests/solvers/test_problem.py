@@ -56,11 +56,3 @@ def test_the_mean_can_be_taken_anywhere_on_the_front_face(coarse_mesh, position)
     second = 4 * (1 / 12 - 1 / (2 * np.pi**2))
     assert weights @ (points[:, 0] - position) ** 2 == pytest.approx(second, rel=1e-3)
     assert np.abs(coarse_mesh.points[contact_nodes(problem)] - [position, 0]).max() < 1 + 1e-9
-
-
-def test_where_the_mesh_has_its_contact_the_position_changes_nothing(coarse_mesh):
-    for kind in ("mean", "point"):
-        own = contact_functional(Problem(coarse_mesh, load=Load(kind=kind)))
-        given = contact_functional(Problem(coarse_mesh, load=Load(kind=kind, position=35.0)))
-        for ours, theirs in zip(own, given, strict=True):
-            np.testing.assert_allclose(ours, theirs, atol=1e-12)

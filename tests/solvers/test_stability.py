@@ -42,7 +42,9 @@ def bent_force(problem):
     return np.pi**2 * modulus * WIDTH**3 / 12 / (2 * HEIGHT) ** 2 * (1 + STROKE / (2 * HEIGHT))
 
 
-@pytest.mark.parametrize("solver", [FemNonlinearSolver(), LOCAL], ids=lambda solver: solver.name)
+@pytest.mark.parametrize(
+    "solver", [FemNonlinearSolver(), pytest.param(LOCAL, marks=pytest.mark.slow)], ids=["fem", "network"]
+)
 def test_a_column_buckles_under_eulers_load(problem, solver):
     """Within 1 %: shear and the shortening of the axis are less; straight it would bear 48 times as much.
 
@@ -154,10 +156,8 @@ def test_from_a_saddle_both_wells_are_found():
 
 def test_no_step_is_no_descent():
     assert descended(np.ones(2), double_well, lambda state, shift: None) is None
-    stuck = replace_step(newton_step)
-    assert descended(np.array([0.3, 0.0]), double_well, stuck) is None
 
+    def uphill(state, shift):
+        return ShiftedStep(-newton_step(state, 10.0).change, 0 if shift else 1)
 
-def replace_step(step):
-    """Uphill, with a shift that the descent has to keep."""
-    return lambda state, shift: ShiftedStep(-step(state, 10.0).change, 0 if shift else 1)
+    assert descended(np.array([0.3, 0.0]), double_well, uphill) is None

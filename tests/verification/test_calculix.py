@@ -10,10 +10,8 @@ from benchmarks.verification.document import PAGE, page
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem import equilibrium
-from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Load, Material, Problem
 
 SHORT = Design(height=50, rib_count=1, tip_length=12, contact_position=20, depth=6.0)
@@ -45,21 +43,6 @@ def test_tetrahedra_have_positive_volumes_and_their_edges_middles():
     assert np.linalg.det(places[:, 1:4] - places[:, :1]).min() > 0
     for middle, (first, second) in enumerate(calculix.TETRAHEDRON, 4):
         np.testing.assert_allclose(places[:, middle], (places[:, first] + places[:, second]) / 2, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("material", "said"),
-    [
-        (Material(law="gent"), "the law 'gent' is not known here; take linear or st-venant-kirchhoff"),
-        (Material(law="neo-hookean"), "the law 'neo-hookean' is not known here"),  # NLGEOM has another law
-        (Material(plane="stress"), "the plane state 'stress' is not known here; take strain"),  # of CPE6
-    ],
-)
-def test_what_the_other_program_is_not_told_is_refused(material, said):
-    mesh = finger_mesh(SHORT, settings=COARSE)
-    problem = Problem(mesh, material, Load(kind="patch", displacement=(None, -4.0)))
-    with pytest.raises(UserError, match=f"^{said}"):
-        calculix.deck(problem, LagrangeSpace(mesh, 2))
 
 
 def test_the_last_table_of_its_output_is_read():

@@ -60,7 +60,7 @@ ACCURACY = {
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training."""
 
 
-SLOW = ("fem-3d", "pinn-std local", "pinn-asm local", "pinn-id")
+SLOW = ("fem-3d", "fem-id", "pinn-std local", "pinn-asm", "pinn-asm local", "pinn-id")
 """Solvers that have a quicker one of their kind beside them."""
 
 

@@ -16,10 +16,12 @@ networks' equations have large condition numbers.
 TIGHT = 5e-9
 """Of all others: ten times the largest difference, in a displacement that is a thousandth of the largest."""
 
+SLOW = ("pinn", "fem-id", "fem-nonlinear", "statfem")
+
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * name.startswith(("pinn", "fem-id"))) for name in JOBS],
+    [pytest.param(name, marks=[pytest.mark.slow] * name.startswith(SLOW)) for name in JOBS],
 )
 def test_the_numbers_are_those_that_are_stored(name):
     stored = json.loads(NUMBERS.read_text(encoding="utf-8"))["jobs"][name]

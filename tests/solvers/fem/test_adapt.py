@@ -39,6 +39,7 @@ def test_the_tolerance_is_reached_and_true(adaptation, exact):
     assert off(adaptation.mesh, exact)[0] < 2e-3
 
 
+@pytest.mark.slow
 def test_it_beats_uniform_refinement(adaptation, medium_mesh, exact):
     """With about the unknowns of uniform 0.5 mm elements (24 and 21 thousand) a fifth of the error."""
     fine, count = off(adaptation.mesh, exact)

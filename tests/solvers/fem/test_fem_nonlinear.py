@@ -12,10 +12,10 @@ NEO_HOOKEAN = Material(law="neo-hookean")
 
 
 @pytest.fixture(scope="module")
-def pressed(medium_mesh):
+def pressed(coarse_mesh):
     """The virtual experiment: a sliding patch pressed in by 10 mm."""
     return FemNonlinearSolver().solve(
-        Problem(medium_mesh, NEO_HOOKEAN, Load(kind="patch", displacement=(None, -10.0)))
+        Problem(coarse_mesh, NEO_HOOKEAN, Load(kind="patch", displacement=(None, -10.0)))
     )
 
 
@@ -35,20 +35,20 @@ def test_small_strokes_tend_to_the_linear_solution_with_slope_one(coarse_mesh, l
     assert abs(np.log2(differences[0] / differences[1]) - 1) < 0.02
 
 
-def test_gap_to_the_linear_point_model_is_that_of_the_paper(pressed, medium_mesh):
+def test_gap_to_the_linear_point_model_is_that_of_the_paper(pressed, coarse_mesh):
     """About 1.4 and 0.5 mm; the paper's table has 1.41 and 0.39 mm between simulation and experiment."""
-    linear = FemSolver().solve(Problem(medium_mesh, load=Load(kind="point")))
-    moved = [each.displacement(medium_mesh.markers) for each in (pressed, linear)]
+    linear = FemSolver().solve(Problem(coarse_mesh, load=Load(kind="point")))
+    moved = [each.displacement(coarse_mesh.markers) for each in (pressed, linear)]
     assert np.abs(moved[0] - moved[1]).mean(axis=0) == pytest.approx([1.41, 0.52], abs=0.05)
 
 
-def test_sliding_patch_has_no_friction_and_one_height(pressed, medium_mesh):
+def test_sliding_patch_has_no_friction_and_one_height(pressed, coarse_mesh):
     assert pressed.status.converged
     fractions = pressed.history["load_fraction"]
     assert (fractions[0], fractions[-1], pressed.history["energy"][-1]) == (0, 1, pressed.energy)
     assert (np.diff(fractions) > 0).all()
     assert abs(pressed.reaction[0]) < 1e-6 * abs(pressed.reaction[1])
-    contact = medium_mesh.points[np.unique(medium_mesh.boundary("contact"))]
+    contact = coarse_mesh.points[np.unique(coarse_mesh.boundary("contact"))]
     moved = pressed.displacement(contact)
     np.testing.assert_allclose(moved[:, 1], -10.0, atol=1e-9)
     assert np.ptp(moved[:, 0]) > 1e-3
@@ -86,3 +86,4 @@ def test_load_that_tears_the_mesh_stops_with_advice(coarse_mesh):
     assert not solution.status.converged
     assert "Newton's method fails beyond (SNES: diverged_" in solution.status.message
     assert solution.stats["halved_steps"] > 0
+    assert solution.error is None

@@ -1,8 +1,5 @@
 """One factorisation for many loads, and the choice of the linear solver."""
 
-import resource
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -88,16 +85,3 @@ def test_many_unknowns_are_solved_by_iterations(coarse_mesh, monkeypatch):
     monkeypatch.setattr(equilibrium, "ITERATIVE_BEYOND", 2 * len(coarse_mesh.points))
     found = [FemSolver(degree, estimate=False).solve(Problem(coarse_mesh)) for degree in (1, 2)]
     assert [each.stats["linear_solver"] for each in found] == ["direct", "iterative"]
-
-
-def test_factors_that_nobody_holds_any_more_are_freed(coarse_mesh):
-    """Those of one problem take 16 MB."""
-
-    def resident() -> int:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-
-    FemSolver(estimate=False).prepare(Problem(coarse_mesh))
-    before = resident()
-    for _ in range(5):
-        FemSolver(estimate=False).prepare(Problem(coarse_mesh))
-    assert resident() - before < 40e6

@@ -49,6 +49,7 @@ def test_rank_0_leads_and_all_solve(start, expected, coarse_mesh):
     assert report["launcher"] == []
 
 
+@pytest.mark.slow
 def test_every_rank_may_run_the_whole_program(start, expected, coarse_mesh):
     assert reported(start("everywhere"), 0, expected[:1], coarse_mesh)["sharing"] == [2]
 

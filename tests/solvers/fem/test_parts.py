@@ -69,20 +69,6 @@ def test_a_sandwich_stretches_by_the_mean_of_its_plane_moduli(law):
     assert solution.reaction[0] == pytest.approx(mean * height * strain.mean(), rel=1e-3)
 
 
-@pytest.mark.parametrize("solver", [FemSolver(), FemNonlinearSolver()], ids=lambda each: each.name)
-def test_parts_of_the_bodys_own_material_change_nothing(solver, coarse_mesh):
-    law = solver.laws[0]
-    problem = Problem(coarse_mesh, Material(law=law), Load(displacement=(0.0, -2.0)))
-    own = (problem.material.young, problem.material.poisson)
-    parted = replace(coarse_mesh, moduli=np.tile(own, (len(coarse_mesh.triangles), 1)))
-    one, other = (solver.solve(each) for each in (problem, replace(problem, mesh=parted)))
-    moved = [each.displacement(coarse_mesh.points) for each in (one, other)]
-    np.testing.assert_allclose(*moved, atol=1e-9)
-    assert other.energy == pytest.approx(one.energy, rel=1e-9)
-    centroids = coarse_mesh.at_centroids()
-    np.testing.assert_allclose(*(each.state(centroids).von_mises for each in (one, other)), rtol=1e-6)
-
-
 def test_moduli_are_a_part_of_the_mesh(coarse_mesh, tmp_path):
     parted = replace(coarse_mesh, moduli=np.tile(STIFF, (len(coarse_mesh.triangles), 1)))
     assert parted.digest != coarse_mesh.digest

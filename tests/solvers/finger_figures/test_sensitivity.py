@@ -37,11 +37,14 @@ def solved(problem: Problem) -> dict[str, float]:
     ("law", "load", "names"),
     [
         ("linear", Load(stroke=4.0), ("height", "poisson", "direction")),
-        ("neo-hookean", Load(stroke=4.0), ("rib_thickness", "contact_position")),
-        ("neo-hookean", Load("patch", stroke=4.0, direction=10.0), ("front_thickness", "direction")),
+        pytest.param(
+            *("neo-hookean", Load("patch", stroke=4.0, direction=10.0)),
+            ("front_thickness", "rib_thickness", "contact_position", "direction"),
+            marks=pytest.mark.slow,
+        ),
         ("neo-hookean", Load("cylinder", stroke=4.0, radius=6.0), ("back_thickness", "radius")),
     ],
-    ids=["linear", "mean", "patch", "cylinder"],
+    ids=["linear", "patch", "cylinder"],
 )
 def test_the_derivatives_are_those_of_solved_problems(monkeypatch, mesh, law, load, names):
     """Central differences with a step of 0.0005 mm are within 1e-4: rounding and the step's square."""
@@ -57,17 +60,6 @@ def test_the_derivatives_are_those_of_solved_problems(monkeypatch, mesh, law, lo
             largest = max(abs(slope) for slope in found.derivatives[name].values())
             own = found.derivatives[name][each.name]
             assert own == pytest.approx(difference, rel=1e-4, abs=1e-5 * largest), (name, each.name)
-
-
-def test_the_force_of_a_finger_meshed_anew_changes_as_much():
-    """Two with ribs of 1.9 and 2.1 mm; another mesh changes each force by up to 0.2 %, their slope by 5 %."""
-    found = pr.sensitivity(SHORT, size=0.5, stroke=4.0)
-    forces = [
-        pr.solve(SHORT.replaced(rib_thickness=thickness), "fem", size=0.5, stroke=4.0).figures.force
-        for thickness in (1.9, 2.1)
-    ]
-    slope = (forces[1] - forces[0]) / 0.2
-    assert found.derivatives["force"]["rib_thickness"] == pytest.approx(slope, rel=0.05)
 
 
 def test_figures_in_proportion_have_shares_of_one(mesh):
@@ -88,6 +80,7 @@ def test_figures_in_proportion_have_shares_of_one(mesh):
         found.relative("forse")
 
 
+@pytest.mark.slow
 def test_a_drawn_finger_has_its_walls(tmp_path):
     """They become thicker into the cavities; by how much the force changes is nearly that of the design."""
     design = pr.load_design("default")

@@ -74,6 +74,7 @@ def test_the_force_is_within_three_percent_on_the_way_up_and_down(drawn_path, tr
     np.testing.assert_allclose(column(found, "position")[large], POSITION, atol=1.0)
 
 
+@pytest.mark.slow
 def test_intervals_hold_for_walls_that_are_not_those_drawn(printed_path, tracker_of):
     places, forces = printed_path
     found = readings(tracker_of(), places)
@@ -169,14 +170,6 @@ def fails_below(tracker, law, largest):
 
 def laws_followed(problem, *laws):
     return fem_law_tracker(problem, problem.mesh.markers, RADIUS, laws, degree=1)
-
-
-def test_a_law_without_equilibrium_never_wins(problem, drawn_path):
-    tracker = laws_followed(problem, "neo-hookean", "st-venant-kirchhoff")
-    fails_below(tracker, "st-venant-kirchhoff", np.inf)
-    for reading in readings(tracker, drawn_path[0][:16]):
-        assert np.isfinite(reading.size)
-        assert tracker.laws[0] == "neo-hookean"
 
 
 def test_the_laws_are_compared_where_the_first_one_has_no_equilibrium(problem, drawn_path):

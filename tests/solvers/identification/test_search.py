@@ -14,7 +14,7 @@ from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.law_fits import MOST_LOST, LawFits
 from pinnray.solvers.identification.model import ResponseModel
 from pinnray.solvers.identification.result import Identified
-from pinnray.solvers.identification.search import WIDE, Identifier
+from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.identification.unknowns import LAW_ODDS, LAWS
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solver import NoSolutionError
@@ -50,18 +50,6 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     assert force.position.low < min(places) < max(places) < force.position.high
 
 
-@pytest.mark.slow
-def test_displacements_of_a_wrong_scale_are_noticed(fine_problem):
-    """No load and no walls move the markers in that pattern; below that, walls make up for a scale."""
-    observed, true = twin(fine_problem, "neo-hookean", TRUE, noise=3e-3)
-    scaled = observed_at(observed.points, 1.1 * observed.displacements, 3e-3)
-    solution = sought(fine_problem, scaled, law="given")
-    assert solution.stats["inflation"] > 1.5
-    assert any("TIMES AS FAR FROM ANY FINGER" in said for said in solution.status.warnings)
-    size = solution.identified.size
-    assert size.low < np.linalg.norm(true.hypothesis.force) < size.high
-
-
 def test_a_wrong_marker_is_found_and_not_used(identified, problem):
     observed, true, right = identified
     moved = observed.displacements.copy()
@@ -72,27 +60,6 @@ def test_a_wrong_marker_is_found_and_not_used(identified, problem):
     assert solution.stats["force"] == pytest.approx(right.stats["force"], rel=0.1)
     np.testing.assert_allclose(solution.left_out[5], right.left_out[5], atol=5 * NOISE)
     assert np.linalg.norm(true.hypothesis.force) < solution.stats["force_high"]
-
-
-def failing(monkeypatch, *laws):
-    """Let fits of some laws find no equilibrium."""
-    fit = LawFits.fit
-
-    def failed(self, law, *arguments, **options):
-        if law in laws:
-            raise NoSolutionError(f"no equilibrium of the {law} law")
-        return fit(self, law, *arguments, **options)
-
-    monkeypatch.setattr(LawFits, "fit", failed)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_a_law_without_an_equilibrium_is_left_out_and_said(identified, problem, monkeypatch, law):
-    failing(monkeypatch, law)
-    solution = sought(problem, identified[0])
-    assert [solution.problem.material.law] == [each for each in LAWS if each != law]
-    assert f"no equilibrium of the {law} law was found near the markers" in solution.status.message
-    assert f"probability {law}" not in solution.stats
 
 
 def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, problem, monkeypatch):
@@ -110,7 +77,10 @@ def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, prob
 
 
 def test_without_any_law_it_has_no_solution(identified, problem, monkeypatch):
-    failing(monkeypatch, *LAWS)
+    def failed(*_, **__):
+        raise NoSolutionError("no equilibrium of the law")
+
+    monkeypatch.setattr(LawFits, "fit", failed)
     with pytest.raises(NoSolutionError, match="no equilibrium of the"):
         sought(problem, identified[0])
 
@@ -147,27 +117,8 @@ def test_a_law_without_an_equilibrium_where_another_one_has_it_is_left_out_at_on
     solution = sought(problem, observed)
     assert solution.problem.material.law == LAWS[0]
     assert "no equilibrium of the st-venant-kirchhoff law" in solution.status.message
+    assert "probability st-venant-kirchhoff" not in solution.stats
     assert len(asked) <= 3
-
-
-@pytest.mark.slow
-def test_a_wide_contact_is_searched_with_its_width_held(identified, problem, monkeypatch):
-    """Everything else goes first to where the wide contact explains the markers, then all of it."""
-    asked, known = [], LawFits.fit
-
-    def fit(self, law, measurement, near, start=None, **options):
-        found = known(self, law, measurement, near, start, **options)
-        if options.get("held"):
-            width = list(self._names).index("width")
-            assert found.estimate.parameters[width].start == self.parameters[width].value(start[width])
-            assert abs(found.estimate.z[width]) < 5
-            asked.append(start[width])
-        return found
-
-    monkeypatch.setattr(LawFits, "fit", fit)
-    moved = identified[0].displacements + 0.1 * np.random.default_rng(1).normal(size=(9, 2))
-    sought(problem, replace(identified[0], displacements=moved), law="given")
-    assert tuple(asked[:2]) == WIDE
 
 
 def test_three_hidden_markers_open_the_intervals(identified, problem):
@@ -180,6 +131,7 @@ def test_three_hidden_markers_open_the_intervals(identified, problem):
     assert np.isnan(solution.left_out[[2, 5, 8]]).all()
 
 
+@pytest.mark.slow
 def test_no_load_is_no_force(problem):
     """Noise alone: the interval of the force holds zero, and nothing is said to be known of the place."""
     noise = NOISE * np.random.default_rng(3).normal(size=(9, 2))
@@ -193,7 +145,7 @@ def test_no_load_is_no_force(problem):
 def test_on_a_fine_mesh_the_unknowns_are_sought_on_a_coarse_one(monkeypatch):
     """The result is that of the fine mesh, of which few systems are solved."""
     design = Design()
-    mesh = finger_mesh(design, settings=MeshSettings(size=0.3))
+    mesh = finger_mesh(design, settings=MeshSettings(size=0.5))
     problem = Problem(mesh, Material(law="neo-hookean"), Load(displacement=(None, -6.0)), finger=design)
     observed, _ = twin(problem, "neo-hookean", TRUE)
     sizes, linearised = [], FemBody.linearised

@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 import torch
 
-from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.mesh.boundary import boundary_widths, singular_points
+from pinnray.geometry.mesh.boundary import singular_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
-from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
 from pinnray.solvers import stability
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
-from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.pinn.finite_basis import newton
 from pinnray.solvers.pinn.finite_basis.energy import NetworkEnergy
 from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
@@ -31,7 +28,7 @@ from pinnray.solvers.pinn.finite_basis.windows import ShepardWindows
 from pinnray.solvers.pinn.threading import PATCH, boxes_around, cut_into_patches
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import State
-from tests.solvers.conftest import SHORT, bar_mesh, distances
+from tests.solvers.conftest import bar_mesh, distances
 
 OTHERS = ("linear", "st-venant-kirchhoff")
 
@@ -60,22 +57,6 @@ def test_singular_points_are_the_cells_corners_and_the_bases_ends(coarse_mesh):
     assert len(found) == 5 * 4 + 2
     for corner in ([2.0, -2.0], [70.0, -2.0], [0.0, 0.0], [0.0, -30.0]):
         assert np.linalg.norm(found - corner, axis=1).min() < 1e-9
-
-
-def test_sides_that_meet_in_a_corner_are_no_narrow_cavity(coarse_mesh):
-    """Only edges that face each other count: at an acute corner the normals meet at a point."""
-    _, widths = boundary_widths(coarse_mesh)
-    assert widths.min() > 1.8, "the walls of 2 mm are the narrowest"
-
-
-@pytest.mark.slow
-def test_there_is_a_third_level_only_where_two_are_not_enough(coarse_mesh):
-    small = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3}
-    levels = [
-        len(PinnLocalSolver(**small, tolerance=tolerance).solve(Problem(coarse_mesh)).history["units"])
-        for tolerance in (1e-9, 1.0)
-    ]
-    assert levels == [3, 2]
 
 
 def test_cut_triangles_keep_the_area_and_meet_the_spacing(coarse_mesh, spacing):
@@ -230,27 +211,7 @@ FAST = PinnLocalSolver(wall_spacing=0.8, corner_spacing=0.05, neurons=4)
 """Within 0.2 % of finite elements where the default is within 0.03 %."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("plane", "load"),
-    [
-        ("strain", Load(kind="patch")),  # does not slide
-        ("strain", Load(kind="patch", displacement=(None, -10.0))),  # slides
-        ("stress", Load()),  # the constants that the paper prints
-    ],
-)
-def test_loads_and_plane_states_are_those_of_finite_elements(short_mesh, plane, load):
-    """Against elements of 0.5 mm, graded to 0.01 mm at the corners and the ends of the contact."""
-    material = Material(plane=plane)
-    settings = MeshSettings(size=0.5, corner_size=0.01, contact_size=0.01)
-    graded_mesh = finger_mesh(SHORT, settings=settings)
-    network = FAST.solve(Problem(short_mesh, material, load))
-    reference = FemSolver().solve(Problem(graded_mesh, material, load))
-    assert distances(network, reference)[0] < 0.004
-    np.testing.assert_allclose(network.reaction, reference.reaction, rtol=0.04, atol=1e-6)
-
-
-@pytest.mark.parametrize("law", ["neo-hookean", "st-venant-kirchhoff"])
+@pytest.mark.parametrize("law", ["neo-hookean", pytest.param("st-venant-kirchhoff", marks=pytest.mark.slow)])
 def test_finite_strain_of_a_bar_is_that_of_finite_elements(law):
     """A cantilever that is bent by half its length; the finer level starts from the coarser one's shape."""
     mesh = bar_mesh(40.0, 4.0, 80, 8, contact=(38.0, 40.0))
@@ -262,6 +223,7 @@ def test_finite_strain_of_a_bar_is_that_of_finite_elements(law):
     assert network.stats["newton_iterations"] < 10
 
 
+@pytest.mark.slow
 def test_where_newton_fails_the_energy_is_followed_down_to_the_same(monkeypatch):
     mesh = bar_mesh(40.0, 4.0, 40, 4, contact=(38.0, 40.0))
     problem = Problem(mesh, Material(law="neo-hookean"), Load(displacement=(None, -20.0)))
@@ -272,9 +234,4 @@ def test_where_newton_fails_the_energy_is_followed_down_to_the_same(monkeypatch)
     assert by_descent.energy == pytest.approx(by_newton.energy, rel=1e-6)
     monkeypatch.setattr(stability, "ITERATIONS", 0)
     solution = FAST.solve(problem)
-    assert not solution.status.converged
-
-
-def test_too_few_windows_are_reported_as_not_converged(usual_mesh):
-    solution = PinnLocalSolver(wall_spacing=1.2, corner_spacing=0.5, neurons=2).solve(Problem(usual_mesh))
     assert not solution.status.converged

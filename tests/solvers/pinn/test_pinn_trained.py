@@ -107,6 +107,7 @@ def test_the_reaction_is_the_slope_of_the_energy(trained):
     assert trained.energy == pytest.approx(work, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_finite_strain_is_trained_too(bent):
     """Measured: 0.08 % from finite elements; 1.1 % less energy than with the neurons as they are drawn."""
     drawn = PinnLocalSolver(**SMALL, growth=0.8).solve(bent)
@@ -132,6 +133,7 @@ def test_a_training_that_ends_beside_no_equilibrium_says_so(bent, monkeypatch):
         TrainedPinnSolver(**STEPS).solve(bent)
 
 
+@pytest.mark.slow
 def test_neurons_that_turn_a_point_inside_out_are_left_out(bent, monkeypatch):
     """The training ends with the best that it has."""
     step = ConstrainedNetwork.step_from

@@ -144,16 +144,6 @@ def test_a_step_where_the_curvature_is_negative_goes_downhill(coarse, local):
 
 
 @pytest.mark.slow
-def test_the_force_is_the_slope_of_the_energy(local, problem):
-    """The work of 2 % of the stroke is that of the mean force on the way, whatever the network."""
-    load = problem.load.model_copy(update={"displacement": (0.0, -0.98 * STROKE)})
-    before = LOCAL.solve(replace(problem, load=load))
-    force = -(before.reaction[1] + local.reaction[1]) / 2
-    slope = (local.energy - before.energy) / (0.02 * STROKE)
-    assert slope == pytest.approx(force, rel=0.01)  # the nodes that touch change in between
-
-
-@pytest.mark.slow
 def test_along_the_load_the_same_is_found(local, problem, monkeypatch):
     monkeypatch.setattr(pressed_network.PressedNetwork, "refined", lambda *_: None)
     found = LOCAL.solve(problem)

@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import lame_constants
 from pinnray.solvers.pinn.finite_basis.energy import energy_density, piola_stress_and_tangent
-
-
-@pytest.mark.parametrize("law", ["gent", "ogden"])  # one without a tangent here, and one that there is not
-def test_a_law_without_a_tangent_is_refused_and_not_taken_for_another(law):
-    said = f"the law '{law}' is not known here; take linear or neo-hookean or st-venant-kirchhoff"
-    with pytest.raises(UserError, match=f"^{said}$"):
-        piola_stress_and_tangent(torch.zeros(1, 2, 2), lame_constants(11.4, 0.45, "strain"), law)
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.problem import Problem
 from pinnray.solvers.statistics.gaussian_process import GaussianProcessSolver
 from pinnray.solvers.statistics.kernel_field import SMOOTHNESS
-from tests.solvers.conftest import check_gradient, hiding, observed_at
+from tests.solvers.conftest import hiding, observed_at
 from tests.solvers.statistics.kernels import matern
 
 
@@ -78,20 +78,6 @@ def test_the_constants_are_those_that_scikit_learn_finds(problem, kernel):
         assert [found.amplitudes[axis] ** 2, found.lengths[axis]] == pytest.approx(expected, rel=1e-6)
 
 
-def test_gradient_is_the_derivative(solution, coarse_mesh):
-    check_gradient(solution, coarse_mesh.at_centroids().points[::40], 1e-7)
-
-
-def test_it_goes_through_the_markers_and_knows_least_far_from_them(solution, coarse_mesh):
-    observations = solution.problem.observations
-    missed = (solution.displacement(observations.points) - observations.displacements)[observations.visible]
-    assert np.abs(missed).max() < 0.02
-    back = coarse_mesh.points[np.unique(coarse_mesh.boundary("back"))]
-    deviations = solution.field.standard_deviation(coarse_mesh.locate(back))
-    at_markers = solution.field.standard_deviation(coarse_mesh.locate(observations.points))
-    assert deviations.max() > 20 * at_markers[observations.visible].max()
-
-
 def test_a_marker_that_is_left_out_has_no_say_at_all(problem, solution):
     """Solving again without it, and with another value for it: neither constants nor data come from it."""
     observations = problem.observations
@@ -108,13 +94,6 @@ def test_it_knows_of_the_clamp_only_if_it_is_told(problem, coarse_mesh):
     for clamp in (False, True):
         moved = np.abs(GaussianProcessSolver(clamp=clamp).solve(shifted).displacement(base)).max()
         assert bool(moved < 0.1) is clamp
-
-
-def test_load_and_material_do_not_matter(problem, solution):
-    other = replace(problem, load=Load(kind="patch", displacement=(None, -3.0)))
-    again = GaussianProcessSolver().solve(other)
-    points = problem.observations.points
-    assert again.displacement(points).tolist() == solution.displacement(points).tolist()
 
 
 def test_three_markers_will_do_where_none_is_left_out(coarse_mesh):

@@ -14,7 +14,7 @@ from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import SHORT
 
 FINE = Problem(
-    finger_mesh(SHORT, settings=MeshSettings(size=0.35)),
+    finger_mesh(SHORT, settings=MeshSettings(size=0.45)),
     Material(law="neo-hookean"),
     Load(displacement=(0.0, -5.0)),
     finger=SHORT,

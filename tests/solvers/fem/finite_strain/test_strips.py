@@ -41,6 +41,7 @@ def test_a_cylinder_bends_a_strip_of_steel(strip):
     assert bent.stats["penetration_mm"] < 1e-5
 
 
+@pytest.mark.slow
 def test_a_contact_that_is_hardened_in_a_step_ends_as_the_hard_one(coarse_mesh, monkeypatch):
     problem = Problem(coarse_mesh, Material(law="neo-hookean"), Load("cylinder", stroke=3.0))
     hard = FemNonlinearSolver().solve(problem)

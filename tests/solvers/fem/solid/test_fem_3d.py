@@ -17,10 +17,10 @@ from pinnray.solvers.fem.solid import FaceField, Fem3dSolver, affordable
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import State
 from tests.solvers.bodies import body_mesh
-from tests.solvers.conftest import bar_mesh, beam_compliance
+from tests.solvers.conftest import bar_mesh
 from tests.solvers.fem.test_fem_ranks import reported
 
-SLIDING, FINITE = Load(kind="patch", displacement=(None, -4.0)), ("neo-hookean", "st-venant-kirchhoff")
+SLIDING = Load(kind="patch", displacement=(None, -4.0))
 
 
 @pytest.fixture(scope="module")
@@ -78,17 +78,7 @@ def test_pure_bending_is_exact():
         np.testing.assert_allclose(state.von_mises, np.abs(expected), atol=1e-12)
 
 
-@pytest.mark.slow
-def test_a_narrow_beam_bends_with_youngs_modulus():
-    """Tip force of Timoshenko's beam; the modulus of plane strain would be a tenth larger."""
-    mesh = replace(bar_mesh(40.0, 4.0, 40, 4, contact=(38.0, 40.0)), depth=2.0)
-    material = Material(young=10.0, poisson=0.3)
-    solution = Fem3dSolver(layers=1).solve(Problem(mesh, material, Load(displacement=(None, -0.1))))
-    force = -0.1 / beam_compliance(material, material.young, height=4.0, arm=39.0)
-    assert solution.reaction[1] == pytest.approx(force, rel=0.01)  # the clamp stiffens it a little
-
-
-@pytest.mark.parametrize("law", ["linear", *(pytest.param(law, marks=pytest.mark.slow) for law in FINITE)])
+@pytest.mark.parametrize("law", ["linear", pytest.param("neo-hookean", marks=pytest.mark.slow)])
 def test_held_side_faces_make_plane_strain(wedge, law):
     problem = Problem(wedge, Material(law=law), SLIDING)
     solid = Fem3dSolver(sides="held", layers=2).solve(problem)
@@ -98,20 +88,6 @@ def test_held_side_faces_make_plane_strain(wedge, law):
     assert 0.995 < solid.energy / plane.energy < 1
     gap = solid.displacement(wedge.markers) - plane.displacement(wedge.markers)
     assert np.abs(gap).max() < 0.005
-
-
-@pytest.mark.slow
-def test_a_cylinder_between_held_side_faces_presses_as_in_the_plane(wedge):
-    load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -2.0))
-    problem = Problem(wedge, Material(law="neo-hookean"), load)
-    solid, plane = Fem3dSolver(sides="held", layers=1).solve(problem), FemNonlinearSolver().solve(problem)
-    assert solid.status.converged
-    assert solid.energy == pytest.approx(plane.energy, rel=0.005)  # elements of 1 mm
-    assert solid.reaction[1] == pytest.approx(plane.reaction[1], rel=0.005)
-    for name in ("contact_start_mm", "contact_end_mm"):
-        assert solid.stats[name] == plane.stats[name]
-    assert solid.stats["contact_pressure_MPa"] == pytest.approx(plane.stats["contact_pressure_MPa"], rel=0.05)
-    assert solid.stats["penetration_mm"] < 1e-5
 
 
 def test_a_thin_finger_is_in_plane_stress(wedge):
@@ -124,32 +100,6 @@ def test_a_thin_finger_is_in_plane_stress(wedge):
     location = wedge.at_centroids()
     ours, theirs = (each.state(location).von_mises for each in (solid, plane))
     assert np.linalg.norm(ours - theirs) < 0.05 * np.linalg.norm(theirs)
-
-
-@pytest.mark.slow
-def test_the_side_face_carries_no_traction():
-    """Beside clamp and patch of a deep ring; 0.12 is the elements', and 0.09 with those of 1 mm."""
-    mesh = replace(body_mesh("ring", 1.5), depth=20.0)
-    location, problem = mesh.at_centroids(), Problem(mesh, load=SLIDING)
-    beside, across = np.abs(location.points[:, 0]) > 12, {}
-    for face in ("side", "middle"):
-        solution = Fem3dSolver(layers=3, face=face).solve(problem)
-        across[face] = np.linalg.norm(solution.state(location).stress_zz[beside])
-    assert across["side"] < 0.2 * across["middle"]
-
-
-@pytest.mark.slow
-def test_force_is_the_slope_of_the_energy(wedge):
-    """Of three equilibria at finite strain, by a central difference."""
-    energies = []
-    for stroke in (3.99, 4.0, 4.01):
-        load = Load(kind="patch", displacement=(None, -stroke))
-        solution = Fem3dSolver(layers=1).solve(Problem(wedge, Material(law="neo-hookean"), load))
-        energies.append(solution.energy)
-        if stroke == 4.0:
-            force = solution.reaction
-    assert (energies[2] - energies[0]) / 0.02 == pytest.approx(-force[1], rel=1e-4)
-    assert abs(force[0]) < 1e-8  # u is free
 
 
 def test_plane_strain_does_not_certify_it(wedge):
@@ -201,6 +151,7 @@ def test_multigrid_finds_what_factors_find(wedge, law, load):
     assert np.abs(gap).max() < 1e-5  # mm
 
 
+@pytest.mark.slow
 def test_an_indefinite_matrix_is_solved_by_minres(wedge):
     """The stiffness minus 4e-6 of its diagonal has a negative eigenvalue."""
     finite = Problem(wedge, Material(law="neo-hookean"))
