@@ -120,14 +120,3 @@ def test_a_sweep_is_a_data_frame_and_predicts(tmp_path: Path):
     assert found["force_N"].is_monotonic_increasing
     with pytest.raises(pr.UserError, match=r"finger 1: .*rib_thickness"):
         pr.predict(folder, [{**finger, **walls}, {**finger, **walls, "rib_thickness": 9.0}])
-
-
-def test_a_study_is_swept_into_a_data_frame(tmp_path: Path, in_line: None):
-    study = tmp_path / "walls.toml"
-    study.write_text(
-        'mesh_size = 2.0\nsampling = "grid"\n[fixed]\nmarker_diameter = 0.4\n'
-        "[varied]\nfront_thickness = {values = [1.2, 1.8]}\n"
-    )
-    found = pr.sweep(study, out=tmp_path / "out")
-    assert list(found["state"]) == ["done", "done"]
-    assert found["force_N"].is_monotonic_increasing

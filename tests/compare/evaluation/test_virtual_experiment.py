@@ -74,18 +74,6 @@ def test_a_sliding_patch_presses_on_a_neo_hookean_finger(problem, solutions):
     assert abs(solution.reaction[0]) < 1e-8 * abs(solution.reaction[1])  # without friction
 
 
-def test_the_markers_of_the_mesh_are_observed_and_said_to_be_simulated(problem, solutions):
-    observations, _ = virtual_experiment(problem, 0.8)
-    markers = problem.mesh.markers
-    np.testing.assert_array_equal(observations.points, markers)
-    np.testing.assert_array_equal(observations.displacements, solutions[0].displacement(markers))
-    assert observations.marker_radius == 0.8
-    assert observations.visible.all()
-    assert not observations.standard_deviations.any()
-    assert observations.simulated
-    assert f"pressed in by {-problem.load.displacement[1]:.4g} mm" in observations.source
-
-
 def test_the_truth_is_the_simulated_field_on_the_mesh_and_is_kept(problem, solutions):
     notes: list[str] = []
     (first, field), (second, kept) = (

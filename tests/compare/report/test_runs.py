@@ -62,15 +62,6 @@ def test_several_runs_are_one_page_and_one_table(save: Save, tmp_path: Path) -> 
     assert "simulated" in html
 
 
-def test_held_out_and_given_errors_are_in_tables_of_their_own(save: Save, tmp_path: Path) -> None:
-    main(["report", str(save("first")), str(save("second")), "--out", str(tmp_path / "both")])
-    html = (tmp_path / "both" / "runs.html").read_text(encoding="utf-8")
-    given = re.search(r"<caption>Errors at markers that the solver was given.*?</table>", html, re.DOTALL)
-    assert given is not None
-    assert "fem-asm" in given.group()
-    assert "pinn-std" not in given.group()
-
-
 def test_what_differs_between_runs_is_named(save: Save) -> None:
     runs = read_runs([save("first"), save("second", seed=7)])
     assert differing_settings(runs).rows == [["seed pinn-std", "0", "7"]]

@@ -73,15 +73,6 @@ def test_default_is_the_papers_finger() -> None:
     assert design.contact_abscissa == 35
 
 
-def test_symbols_are_aliases() -> None:
-    by_symbol = Design(H=100, L=32, W=18, L_angle=15, L_tip=22, N=5, t_rib=1.5, t_flex=2.2, t_back=2.1)  # type: ignore[call-arg]
-    by_parameter_name = Design(
-        height=100, base_width=32, depth=18, rib_angle=15, tip_length=22, rib_count=5,
-        rib_thickness=1.5, front_thickness=2.2, back_thickness=2.1,
-    )  # fmt: skip
-    assert by_symbol == by_parameter_name
-
-
 def test_digest_follows_the_geometry_and_not_the_name() -> None:
     assert Design(name="a").digest == Design(name="b").digest
     assert Design(contact_position=35).digest == Design().digest  # the same place, said explicitly

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 import shutil
 
 import cv2
@@ -116,15 +115,6 @@ def test_a_pipe_is_recorded_even_if_its_film_is_refused(film, tmp_path, monkeypa
     assert "the film must end while it is pressed" in capsys.readouterr().err
     with open_frames(tmp_path / "run.mkv") as kept:
         np.testing.assert_array_equal([frame.image for frame in kept], rest)
-
-
-def test_the_table_shows_deviations_below_a_micrometre(film, tmp_path, capsys):
-    """They are 0.0002 to 0.0005 mm in this film."""
-    options = ["--camera", str(film / "camera.json"), "--without-video"]
-    assert main(["track", str(film / "video.mkv"), *options, "--out", str(tmp_path / "out")]) == 0
-    shown = [float(number) for number in re.findall(r"±([\d.]+)", capsys.readouterr().out)]
-    assert len(shown) == 18
-    assert min(shown) > 0
 
 
 def test_its_files_are_whole(tracked):
