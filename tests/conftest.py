@@ -19,12 +19,15 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.processes import child_environment
+from pinnray.runtime.processes import Pool, child_environment
+from pinnray.runtime.worker import perform
 from pinnray.solvers.solver import silent
 
 os.environ["PETSC_OPTIONS"] = (
     "-no_signal_handler"  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
 )
+
+ANSWERS = Pool.answers
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 
@@ -122,8 +125,11 @@ def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.draw_all", lambda *_: [])
 
 
-def inline(_: object, work: Callable, tasks: Mapping[str, object], **__: object) -> Generator:
-    """Stands for `Pool.answers`: tasks run one after the other in this process."""
+def inline(pool: Pool, work: Callable, tasks: Mapping[str, object], **options: Any) -> Generator:
+    """Stands for `Pool.answers`: tasks run one after the other in this process, but not the worker's."""
+    if work is perform:  # which limits the memory of its process
+        yield from ANSWERS(pool, work, tasks, **options)
+        return
     for name, each in tasks.items():
         yield name, work(each, silent)
 

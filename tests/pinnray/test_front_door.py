@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import pinnray as pr
+from pinnray.comparison.figures.gallery import GALLERY
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.solvers.fem.linear import FemSolver
 
@@ -59,7 +60,9 @@ def test_a_solver_of_the_comparison_by_its_name(comparison: pr.Comparison):
     assert comparison["fem-asm"].in_sample
 
 
-def test_the_report_is_one_file(comparison: pr.Comparison, tmp_path: Path):
+def test_the_report_is_one_file(comparison: pr.Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    chosen = {name: GALLERY[name] for name in ("overlay", "mesh")}
+    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", chosen)
     text = comparison.report(tmp_path / "report.html").read_text(encoding="utf-8")
     assert "data:image/png;base64," in text
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
@@ -108,6 +111,7 @@ def test_what_looks_like_another_unit_is_warned_of_by_solve():
         pr.solve("default", material=pr.Material(young=1e6), **COARSE)
 
 
+@pytest.mark.slow
 def test_a_sweep_is_a_data_frame_and_predicts(tmp_path: Path):
     from tests.studies.emulator.sweeps import solved_sweep
 

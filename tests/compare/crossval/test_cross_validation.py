@@ -210,6 +210,8 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
     )
     result = cross_validate(study)
     assert capsys.readouterr() == ("", "")
+    assert len(repr(result)) < 250
+    assert "\n" not in repr(result)
     row = result.table().loc["measured", "measured", "gp", ONE]
     assert (
         row["held_out_mae_sum_mm"]

@@ -81,6 +81,7 @@ def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, co
     assert (found.contact.middle, found.contact.width) == pytest.approx((35.0, 2.0))  # as designed
 
 
+@pytest.mark.slow
 def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_mesh):
     """The finger with the same walls on a coarse mesh of its own is near; at fixed points it would not be."""
     truth = TRUTHS["base"]

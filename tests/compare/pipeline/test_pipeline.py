@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import pyvista
 
+from pinnray.comparison.figures.gallery import GALLERY
 from pinnray.comparison.pipeline.job import Job
 from pinnray.comparison.report.output_files import metrics
 from pinnray.geometry.cache import finger_mesh
@@ -183,8 +184,10 @@ def test_without_the_mark_they_count_as_measured(finished, tmp_path, job):
     assert "imulated" not in (again.out / "report.html").read_text(encoding="utf-8")
 
 
-def test_a_marker_that_was_not_seen(tmp_path):
-    """Its errors are null and empty; every picture is drawn; the markers are not those of the design."""
+def test_a_marker_that_was_not_seen(tmp_path, monkeypatch):
+    """Its errors are null and empty; pictures are drawn; the markers are not those of the design."""
+    chosen = {name: GALLERY[name] for name in ("overlay", "marker_errors")}
+    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", chosen)
     path = tmp_path / "measured.csv"
     path.write_text("x_mm,y_mm,u_mm,v_mm,visible\n20,-1,-0.5,-5,1\n50,-1,,,0\n85,-1,-2,-0.5,1\n")
     out = tmp_path / "run"

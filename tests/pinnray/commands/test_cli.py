@@ -72,6 +72,7 @@ def test_json_prints_the_metrics_and_nothing_else(folder, capsys, without_pictur
     assert output.err == ""
 
 
+@pytest.mark.slow
 def test_markers_that_no_finger_explains_are_said_first(folder, capsys, without_pictures):
     """They were in reverse order: the run had ended with 0, "converged" and no warning."""
     markers = Path(__file__).parents[2] / "data" / "second-renderer" / "reversed.csv"

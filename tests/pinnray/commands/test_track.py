@@ -166,9 +166,10 @@ def spoilt(kind, film, folder):
     return [str(video), *options.get(kind, [])]
 
 
-@pytest.mark.parametrize(
-    "kind", ["corrupt", "cut off", "black", "mirrored", "other design", "other workspace", "no camera"]
-)
+DEAR = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("mirrored", "other design")]
+
+
+@pytest.mark.parametrize("kind", ["corrupt", "cut off", "black", "other workspace", "no camera", *DEAR])
 def test_what_cannot_be_tracked_is_one_line_and_writes_nothing(kind, film, tmp_path, capfd):
     source, out = tmp_path / "source", tmp_path / "out"
     source.mkdir()

@@ -140,6 +140,7 @@ def test_a_second_start_goes_on_and_does_nothing_twice(swept, tmp_path, in_line)
     after = run_sweep(StudyJob(study, tmp_path, out, 1)).measurements
     assert after[:6] == before
     assert [each.number for each in after] == list(range(8))
+    assert "failed" not in {each.state for each in after}
 
 
 def test_another_name_or_marker_does_the_same_study(swept: Path, tmp_path: Path) -> None:
@@ -167,7 +168,9 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("ending", "limit", "state", "said"),
     [
-        (hang_at_one, 8.0, "not converged", "stopped at the time limit"),
+        pytest.param(
+            *(hang_at_one, 8.0, "not converged", "stopped at the time limit"), marks=pytest.mark.slow
+        ),
         (die_at_one, 500.0, "failed", "its worker process died"),
     ],
 )
