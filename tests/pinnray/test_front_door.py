@@ -106,11 +106,6 @@ def test_what_no_real_finger_does_is_said_of_a_solution():
     assert "THE BODY GOES THROUGH ITSELF" in solution.status.message
 
 
-def test_what_looks_like_another_unit_is_warned_of_by_solve():
-    with pytest.warns(UserWarning, match="looks like pascals"):
-        pr.solve("default", material=pr.Material(young=1e6), **COARSE)
-
-
 @pytest.mark.slow
 def test_a_sweep_is_a_data_frame_and_predicts(tmp_path: Path):
     from tests.studies.emulator.sweeps import solved_sweep

@@ -148,12 +148,3 @@ def test_a_run_that_lacks_a_number_is_one_line(save, capsys, solver, key, value)
     write_json(folder / "metrics.json", content)
     assert main(["report", str(folder)]) == 2
     assert "metrics.json is damaged: a number is missing" in capsys.readouterr().err
-
-
-def test_a_report_needs_a_run_and_a_free_name(save, tmp_path, capsys):
-    runs = [str(save("first")), str(save("second"))]
-    lone = [runs[0], "--out", str(tmp_path / "both")]
-    for arguments in ([], lone, [*runs, "--out", f"{runs[0]}/run.json"]):
-        assert main(["report", *arguments]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
-    assert not (tmp_path / "both").exists()

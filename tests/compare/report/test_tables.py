@@ -89,22 +89,6 @@ def test_the_held_out_error_of_a_single_marker_is_there(tmp_path, fem, observati
     assert first["fem_held_out_ae_u_mm"] == first["fem_ae_u_mm"]  # it was given none
 
 
-def test_a_solver_that_was_given_the_markers_is_marked_in_every_table(
-    fem, pinn, observations, compared, tmp_path
-):
-    told = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125)
-    write_summary(tmp_path / "t.csv", compared(fem, told))
-    row = rows_of(tmp_path / "t.csv")[1]
-    assert (float(row["held_out_mae_sum_mm"]), row["in_sample"]) == (0.25, "1")
-    given = [fem, replace(pinn, in_sample=True)]
-    write_summary(tmp_path / "s.csv", compared(*given))
-    write_markers(tmp_path / "m.csv", compared(*given))
-    assert [row["in_sample"] for row in rows_of(tmp_path / "s.csv")] == ["0", "1"]
-    assert {(row["fem_in_sample"], row["pinn-std_in_sample"]) for row in rows_of(tmp_path / "m.csv")} == {
-        ("0", "1")
-    }
-
-
 def test_the_distance_from_the_truth_is_there_if_the_markers_are_simulated(
     fem, pinn, summary, compared, tmp_path
 ):

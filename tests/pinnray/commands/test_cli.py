@@ -204,12 +204,6 @@ def test_an_interrupted_run_says_how_to_go_on(folder, capsys, monkeypatch, witho
     assert not Path("out/default.partial").exists()
 
 
-def test_an_interrupted_verb_says_so(folder, capsys, monkeypatch):
-    ends(monkeypatch, KeyboardInterrupt())
-    assert main(["solve", "fem", "--mesh-size", "1.0"]) == INTERRUPTED
-    assert capsys.readouterr().err.splitlines()[-1] == "interrupted"
-
-
 def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, monkeypatch, without_pictures):
     """The result is written all the same."""
     status = Status(False, "stopped at 40 % of the load;\n take smaller steps")

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import shutil
 
 import cv2
 import numpy as np
@@ -63,7 +62,7 @@ def pictures(film, tmp_path):
     return folder
 
 
-@pytest.mark.parametrize(("fps", "warned"), [(None, True), (10.0, False)])
+@pytest.mark.parametrize(("fps", "warned"), [(None, True), pytest.param(10.0, False, marks=pytest.mark.slow)])
 def test_the_times_of_pictures_are_those_that_are_given(film, pictures, tmp_path, capsys, fps, warned):
     given = [] if fps is None else ["--fps", str(fps)]
     line = ["track", str(pictures), "--camera", str(film / "camera.json"), *given]
@@ -134,14 +133,6 @@ def test_its_files_are_whole(tracked):
     assert np.shape(summary["displacement_covariance_mm2"]) == (18, 18)
     run = json.loads((tracked / "run.json").read_text(encoding="utf-8"))
     assert set(run["files_sha256"]) == names - {"run.json"}
-
-
-def test_a_result_is_replaced_by_another_and_the_video_may_be_left_out(film, tracked, tmp_path):
-    out = tmp_path / "track"
-    shutil.copytree(tracked, out)
-    options = ["--camera", str(film / "camera.json"), "--without-video", "--live"]
-    assert main(["track", str(film / "video.mkv"), *options, "--out", str(out)]) == 0
-    assert not (out / "annotated.mp4").exists()
 
 
 def spoilt(kind, film, folder):
