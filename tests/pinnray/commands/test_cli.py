@@ -193,7 +193,8 @@ def ends(monkeypatch: pytest.MonkeyPatch, end: BaseException | Callable[[Solutio
 
 
 def test_an_interrupted_run_says_how_to_go_on(folder, capsys, monkeypatch, without_pictures):
-    options = [*SMALL, "--measurements", "good.csv", "--quiet"]
+    options = ["compare", "--solvers", "fem-nonlinear,fem", "--mesh-size", "1.0", "--quiet"]
+    options += ["--measurements", "good.csv"]
     with monkeypatch.context() as patch:
         ends(patch, KeyboardInterrupt())
         assert main(options) == INTERRUPTED
