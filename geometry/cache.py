@@ -17,7 +17,7 @@ from pinnray.runtime.atomic import write_bytes
 from pinnray.runtime.cache import Result, cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.worker import Task, run_task
+from pinnray.runtime.processes.worker import Task, run_task
 
 TIMEOUT_S = 300.0
 

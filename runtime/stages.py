@@ -21,7 +21,8 @@ from rich.table import Column
 
 from pinnray.runtime.errors import InapplicableError
 from pinnray.runtime.machine import cores, machine
-from pinnray.runtime.processes import Input, Output, Pool, ProcessFailed
+from pinnray.runtime.processes.child import ProcessFailed
+from pinnray.runtime.processes.pool import Input, Output, Pool
 from pinnray.runtime.progress import Progress as Report
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)

@@ -19,15 +19,11 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.processes import Pool, child_environment
-from pinnray.runtime.worker import perform
-from pinnray.solvers.solver import silent
+from pinnray.runtime.processes.pool import child_environment
 
 os.environ["PETSC_OPTIONS"] = (
     "-no_signal_handler"  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
 )
-
-ANSWERS = Pool.answers
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 
@@ -125,19 +121,16 @@ def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.draw_all", lambda *_: [])
 
 
-def inline(pool: Pool, work: Callable, tasks: Mapping[str, object], **options: Any) -> Generator:
-    """Stands for `Pool.answers`: tasks run one after the other in this process, but not the worker's."""
-    if work is perform:  # which limits the memory of its process
-        yield from ANSWERS(pool, work, tasks, **options)
-        return
+def inline(_: object, work: Callable, tasks: Mapping[str, object], **__: object) -> Generator:
+    """Stands for `Pool.answers`: tasks run one after the other in this process."""
     for name, each in tasks.items():
-        yield name, work(each, silent)
+        yield name, work(each, lambda *_: None)
 
 
 @pytest.fixture
 def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """No other process is started, which would import for seconds."""
-    monkeypatch.setattr("pinnray.runtime.processes.Pool.answers", inline)
+    monkeypatch.setattr("pinnray.runtime.processes.pool.Pool.answers", inline)
 
 
 @pytest.fixture(scope="session")

@@ -55,6 +55,10 @@ def test_the_version_is_the_same_everywhere():
     assert citation["license"] == PROJECT["license"]
     dockerfile = (ROOT / "Dockerfile").read_text(encoding="utf-8")
     assert re.findall(r"^ARG VERSION=(.+)$", dockerfile, re.MULTILINE) == [PROJECT["version"]]
+    released = re.findall(
+        r"^## \[([\d.]+)\] - (.+)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE
+    )
+    assert released[0] == (PROJECT["version"], str(citation["date-released"]))
 
 
 def test_every_citation_of_the_paper_has_an_entry():

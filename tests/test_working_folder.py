@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pinnray.runtime.processes import Pool, child_environment
+from pinnray.runtime.processes.pool import Pool, child_environment
 
 
 def sum_of(number: int, progress: Callable[..., None]) -> int:

@@ -23,7 +23,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.output_folder import check_resumable_folder, locked
-from pinnray.runtime.processes import ProcessFailed
+from pinnray.runtime.processes.child import ProcessFailed
 from pinnray.runtime.stages import Stages, in_stages
 from pinnray.solvers.fem.assimilating import FemAsmSolver
 from pinnray.solvers.problem import Problem

@@ -21,7 +21,7 @@ from pinnray.geometry.observations import Observations
 from pinnray.runtime.atomic import write_bytes
 from pinnray.runtime.content_hash import has_source, sources_digest
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.processes import known_to_children
+from pinnray.runtime.processes.pool import known_to_children
 from pinnray.solvers.assimilation.marker_forces import root_mean_square
 from pinnray.solvers.assimilation.marker_weighting import FACTORS
 from pinnray.solvers.fem.assimilating import FemAsmSolver

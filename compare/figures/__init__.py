@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.processes import Pool, ProcessFailed, end_with_parent
+from pinnray.runtime.processes.child import ProcessFailed, end_with_parent
+from pinnray.runtime.processes.pool import Pool
 from pinnray.solvers.shared_work import SharedWork
 
 if TYPE_CHECKING:

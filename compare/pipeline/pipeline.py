@@ -29,7 +29,7 @@ from pinnray.runtime.content_hash import file_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
 from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
-from pinnray.runtime.processes import Pool
+from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.shared_work import SharedWork

@@ -24,7 +24,8 @@ from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores, package_versions
 from pinnray.runtime.output_folder import SOLUTIONS, TRAINING, take_training
-from pinnray.runtime.processes import Pool, ProcessFailed, end_with_parent
+from pinnray.runtime.processes.child import ProcessFailed, end_with_parent
+from pinnray.runtime.processes.pool import Pool, known_to_children
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import solver_modules
@@ -99,8 +100,7 @@ def solve_all(
         UserError: If a solver refuses, the reference fails, or all fail.
     """
     here, there = shares(solvers, job.material, len(problem.mesh.triangles))
-    # A class of the calling script is unknown to other processes.
-    elsewhere = all(type(each).__module__ != "__main__" for each in solvers)
+    elsewhere = all(map(known_to_children, solvers))
     work, whole = SharedWork(), _Part(job, solvers, problem, observations, folder)
     if pool and elsewhere and here and there and len(problem.mesh.points) >= LARGE:
         outcome = _in_two_processes(whole.of(here), whole.of(there), work, stages, pool)
@@ -251,6 +251,7 @@ class _Part:
         own = replace(self.problem, material=with_law(job.material, solver), observations=given)
         depends_on = [
             solver.name,
+            type(solver).__qualname__,
             solver.settings(),
             package_versions(),
             sources_digest(__name__, type(solver).__module__),

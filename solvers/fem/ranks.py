@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 import pinnray.solvers.petsc  # noqa: F401 (on all ranks together: one alone would wait for the others when it solves)
-from pinnray.runtime.processes import child_environment
+from pinnray.runtime.processes.pool import child_environment
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Progress, silent
 

@@ -19,7 +19,8 @@ from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.processes import Pool, ProcessFailed
+from pinnray.runtime.processes.child import ProcessFailed
+from pinnray.runtime.processes.pool import Pool
 from pinnray.studies.fields.emulator import FieldEmulator, grip_force
 from pinnray.studies.fields.explorer import write_explorer
 from pinnray.studies.fields.reader import FIGURES

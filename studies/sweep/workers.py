@@ -13,7 +13,8 @@ from math import inf
 from typing import TYPE_CHECKING, Self
 
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.processes import Pool, ProcessFailed
+from pinnray.runtime.processes.child import ProcessFailed
+from pinnray.runtime.processes.pool import Pool
 from pinnray.studies.sweep.job import Task
 from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, measured
 

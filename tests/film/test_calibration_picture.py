@@ -32,8 +32,6 @@ def test_the_picture_tells_the_errors_and_leaves_nothing_outside():
     found = Calibration(CAMERA, Board(5, 4, 30.0), views, residuals, held_out_rms=0.2345, coverage=0.5)
     drawn = draw_calibration(found, "photos/a.png", np.full((240, 320), 128, np.uint8))
     page = page_of(drawn)
-    assert "Calibration from 2 photographs" in page.text
     assert "held out 0.234 px" in page.text
-    assert "a.png undistorted" in page.text
     assert page.cut_off() == page.overlaps() == []
     assert len(drawn._repr_png_()) > 10_000

@@ -24,9 +24,9 @@ pytestmark = pytest.mark.usefixtures("few_elements")
 FILM = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 0 --tilt 8 --turn 15 --seed 1"
 
 
-@pytest.fixture
-def drawn(tmp_path, monkeypatch, without_pictures):
-    """The picture of a film that was solved by the solver that moved the finger in it, and the film."""
+@pytest.mark.slow
+def test_the_outline_of_the_right_solver_is_the_edge_of_the_finger(tmp_path, monkeypatch, without_pictures):
+    """Where the finger ends the image is half as light as beside; a body off by two pixels fails."""
     figures = []
     draw = predicted_frame.draw_predictions
 
@@ -40,14 +40,7 @@ def drawn(tmp_path, monkeypatch, without_pictures):
     options = ["--camera", str(film / "camera.json"), "--workspace", str(film / "workspace.json"), "--quiet"]
     options += ["--solvers", "fem", "--mesh-size", "1", "--measurements", str(film / "video.mkv")]
     assert main(["compare", *options, "--out", str(tmp_path / "out")]) == 0
-    return figures[0], film
-
-
-@pytest.mark.slow
-def test_the_outline_of_the_right_solver_is_the_edge_of_the_finger(drawn):
-    """Where the finger ends the image is half as light as beside; a body off by two pixels fails."""
-    figure, film = drawn
-    (axes,) = figure.axes
+    (axes,) = figures[0].axes
     (outline,) = (each for each in axes.collections if isinstance(each, LineCollection))
     edges = np.array(outline.get_segments())
     with open_frames(film / "video.mkv") as frames:

@@ -15,7 +15,7 @@ from pinnray.vision.frames.sources import open_frames
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
-DATA = Path(__file__).parents[2] / "data" / "second-renderer"
+DATA = Path(__file__).parents[1] / "data" / "second-renderer"
 FORCE, PLACE = 0.2535, 36.49
 FINGER = pr.load_design("default").model_copy(update={"contact_position": 36.5})
 

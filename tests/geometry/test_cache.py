@@ -13,8 +13,8 @@ from pinnray.geometry.cache import cache_key, drawn_finger
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.cache import cache_folder
-from pinnray.runtime.processes import Pool, child_environment
-from pinnray.runtime.worker import Task, perform
+from pinnray.runtime.processes.pool import Pool, child_environment
+from pinnray.runtime.processes.worker import Task, perform
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
 

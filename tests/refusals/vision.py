@@ -3,6 +3,7 @@
 # ruff: noqa: F401 (the expressions use the names)
 
 import json
+import zlib
 from dataclasses import replace
 from math import inf, nan
 from pathlib import Path
@@ -44,8 +45,8 @@ from tests.vision.films import tracked
 from tests.vision.fingers import MARKERS, PRESSED
 from tests.vision.plane.test_plane_fit import NOISE, POINTS, fitted, seen
 from tests.vision.test_clicked_points import found, picture
+from tests.vision.tracking.listed_discs import discs_at
 from tests.vision.tracking.test_camera_motion import SCENE, START
-from tests.vision.tracking.test_camera_motion import discs as fiducials
 from tests.vision.tracking.test_trajectories import discs, tracking
 
 GREY = np.full((36, 64), 128, np.uint8)
@@ -67,6 +68,12 @@ PHOTOGRAPH = drawn(Board(5, 4, 10.0), np.linalg.inv(TO_PIXELS), (360, 260), samp
 def encoded(level: int = 1, suffix: str = ".png", dtype: type = np.uint8, side: int = 8) -> bytes:
     """A picture of 8 x `side` pixels of one grey level."""
     return cv2.imencode(suffix, np.full((side, 8), level, dtype))[1].tobytes()
+
+
+def enlarged(content: bytes, side: int) -> bytes:
+    """A PNG whose header says that it is a square of so many pixels."""
+    header = content[12:16] + 2 * side.to_bytes(4, "big") + content[24:29]
+    return content[:12] + header + zlib.crc32(header).to_bytes(4, "big") + content[PNG_HEADER:]
 
 
 FILES = {

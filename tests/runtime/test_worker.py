@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from pinnray.runtime import worker
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.processes import Pool
-from pinnray.runtime.worker import Task, perform, run_task
+from pinnray.runtime.processes import worker
+from pinnray.runtime.processes.pool import Pool
+from pinnray.runtime.processes.worker import Task, perform, run_task
 
 limited = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is limited on Linux only")
 

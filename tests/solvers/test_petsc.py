@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 
-from pinnray.runtime.processes import child_environment
+from pinnray.runtime.processes.pool import child_environment
 from pinnray.solvers.petsc import wheels_mpi
 
 

@@ -15,7 +15,6 @@ from pinnray.vision.frames.frame import CapturedImage, Frames, Image
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
-from pinnray.vision.rig.occluders import cable
 from pinnray.vision.rig.recording import Recording
 from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
 from pinnray.vision.tracking.scene import FilmedScene
@@ -35,26 +34,23 @@ def bent(points: FloatArray) -> FloatArray:
 
 
 @cache
-def recording(*, design: Design = DESIGN, hidden: int | None = None, tilt: float = 5.0) -> Recording:
-    """Three frames at rest and three bent, with a jump between; a cable before one marker, if asked for."""
+def recording(*, design: Design = DESIGN) -> Recording:
+    """Three frames at rest and three bent, with a jump between."""
     mesh = finger_mesh(design, settings=MeshSettings(size=1.0), across=3)
-    where = None if hidden is None else (mesh.markers + bent(mesh.markers))[hidden]
-    cover = [] if where is None else [cable(where, DESIGN.marker_radius, 1.2)]
     return Recording(
         bench=Bench(mesh, design, WORKSPACE),
         displacement=bent(mesh.points),
         camera=CAMERA,
-        pose=viewing_pose(CAMERA, WORKSPACE, tilt=tilt),
+        pose=viewing_pose(CAMERA, WORKSPACE, tilt=5.0),
         exposure=Exposure(noise=2),
         motion=Motion(rest=3, moving=0, held=3),
-        occluders=lambda frame: cover if frame >= 3 else [],
     )
 
 
 @cache
-def images(*, design: Design = DESIGN, hidden: int | None = None, tilt: float = 5.0) -> tuple[Image, ...]:
+def images(*, design: Design = DESIGN) -> tuple[Image, ...]:
     """The frames of `recording`."""
-    return tuple(image for image, _ in recording(design=design, hidden=hidden, tilt=tilt).frames())
+    return tuple(image for image, _ in recording(design=design).frames())
 
 
 def frames_of(pictures: Sequence[Image], *, live: bool = False) -> Frames:
@@ -77,8 +73,3 @@ def error_of(observations: Observations, true: FloatArray | None = None) -> floa
     """Mean over the markers of the sum of the absolute errors, mm; by default `DESIGN` is true."""
     true = bent(DESIGN.markers) if true is None else true
     return float(np.abs(observations.displacements - true)[observations.visible].sum(axis=1).mean())
-
-
-def shifted(image: Image, x: int, y: int) -> Image:
-    """What a camera sees that was turned a little."""
-    return np.roll(image, (y, x), axis=(0, 1))

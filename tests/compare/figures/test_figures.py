@@ -19,7 +19,8 @@ from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
 from pinnray.comparison.figures.overlay import overlay_extent
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.figure import DPI, WIDTH
-from pinnray.runtime.processes import Pool, ProcessFailed
+from pinnray.runtime.processes.child import ProcessFailed
+from pinnray.runtime.processes.pool import Pool
 from pinnray.solvers.problem import Problem
 from tests.compare.figures.drawn_pages import Page, page_of
 

@@ -20,7 +20,7 @@ from pinnray.comparison.pipeline import solving
 from pinnray.comparison.pipeline.job import Job
 from pinnray.comparison.pipeline.solving import Outcome, solve_all
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.processes import Pool
+from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver

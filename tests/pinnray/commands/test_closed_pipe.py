@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from pinnray.runtime.processes import child_environment
+from pinnray.runtime.processes.pool import child_environment
 from tests.pinnray.commands.programs import COMMAND, WITHOUT_PICTURES
 
 LONG = """

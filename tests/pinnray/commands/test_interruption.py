@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from pinnray.runtime.exits import INTERRUPTED
-from pinnray.runtime.processes import child_environment
+from pinnray.runtime.processes.pool import child_environment
 
 ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 

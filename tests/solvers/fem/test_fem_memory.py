@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from pinnray.runtime.processes import child_environment
+from pinnray.runtime.processes.pool import child_environment
 
 PROGRAM = """
 import numpy as np

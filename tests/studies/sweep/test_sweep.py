@@ -104,7 +104,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a sweep of six samples."""
     folder = tmp_path_factory.mktemp("sweep")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pinnray.runtime.processes.Pool.answers", inline)
+        patch.setattr("pinnray.runtime.processes.pool.Pool.answers", inline)
         assert main(["sweep", str(study_file(folder, 6)), "--out", str(folder / "out")]) == 0
     return folder
 

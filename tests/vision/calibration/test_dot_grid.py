@@ -14,7 +14,7 @@ from pinnray.vision.frames.frame import GreyImage
 
 SIZE, FOCAL, SAMPLES = (640, 480), 700.0, 2
 CIRCLES, SHIFTED = DotGrid(7, 6, 10.0), DotGrid(4, 11, 7.5, asymmetric=True)
-TILTS = [(30, 10, 20), (-20, 35, 100), (10, -40, 185)]
+TILTS = [(30, 10, 20), (10, -40, 185)]
 pytestmark = pytest.mark.filterwarnings("ignore:the boards cover")
 
 
@@ -40,8 +40,7 @@ def photographed(
     return 255 - image if negative else image, seen[:, :2] / seen[:, 2:]
 
 
-@pytest.mark.parametrize("board", [CIRCLES, SHIFTED])
-@pytest.mark.parametrize("negative", [False, True])
+@pytest.mark.parametrize(("board", "negative"), [(CIRCLES, False), (SHIFTED, True)])
 def test_centres_are_those_of_the_dots_not_of_their_images(board, negative):
     for angles in TILTS:
         image, exact = photographed(board, angles, negative=negative)
@@ -51,13 +50,12 @@ def test_centres_are_those_of_the_dots_not_of_their_images(board, negative):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("board", [CIRCLES, SHIFTED])
-def test_a_grid_of_dots_calibrates(board):
+def test_a_grid_of_dots_calibrates():
     rng, views = np.random.default_rng(1), {}
     for number in range(8):
         angles = (*rng.uniform(-35, 35, 2), rng.uniform(-180, 180))
-        views[str(number)] = board.find(photographed(board, angles)[0])
-    found = calibrate_views(views, board, SIZE)
+        views[str(number)] = SHIFTED.find(photographed(SHIFTED, angles)[0])
+    found = calibrate_views(views, SHIFTED, SIZE)
     assert found.camera.fx == pytest.approx(FOCAL, rel=0.003)
     assert found.held_out_rms < 0.05
 

@@ -51,7 +51,7 @@ def test_a_grey_image_is_judged_by_its_lightness_alone():
 
 @pytest.mark.parametrize("grey", [False, True])
 def test_dark_is_what_is_darker_than_around_it_whatever_the_light(grey):
-    image, discs = dots(7.6, shading=0.9)
+    image, discs = dots(7.6, shading=0.9, size=(960, 540))
     mask = DARK.mask(image[:, :, 0] if grey else image, radius=19)
     rows, columns = np.indices(mask.shape)
     nearest = np.min([np.hypot(columns - x, rows - y) - r for x, y, r in discs], axis=0)

@@ -116,7 +116,6 @@ WALL = tuple(Edge(angle, 20 * np.cos(angle) + 20 * np.sin(angle) + 9.9, 20.0) fo
         DiscImage(edges=WALL, blur=1.5),  # disc and wall run into each other
         DiscImage(edges=tuple(replace(edge, level=240.0) for edge in WALL)),  # a light ground
         DiscImage(edges=(Edge(0.0, 29.9, 30.0), Edge(np.pi, -10.1, 220.0))),  # light and dark
-        DiscImage(edges=WALL[:1]),
     ],
 )
 def test_the_wall_beside_the_disc_does_not_move_it(image):
@@ -153,15 +152,6 @@ def test_a_disc_that_is_partly_hidden_is_found_by_its_arc(image):
 
 
 @pytest.mark.slow
-def test_a_disc_of_which_a_quarter_is_hidden_is_not_taken_for_a_printed_dot():
-    """Two of 300 were, half a pixel astray, when a glare stood for the light beyond the occluder."""
-    picture, centres = sheet(scattered(DiscImage(edges=(Edge(0.0, 24.0, 120.0, occludes=True),)), 300))
-    discs = fit_discs(picture, guessed(centres, 8.0), radii=8.0)
-    assert discs.found.all()
-    assert np.abs(discs.centres - centres).max() < 0.2  # five of their standard deviations, 0.04
-
-
-@pytest.mark.slow
 def test_noise_that_a_codec_correlates_is_accounted_for():
     picture, centres = sheet(scattered(DiscImage(), 240))
     _, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 60])
@@ -171,24 +161,13 @@ def test_noise_that_a_codec_correlates_is_accounted_for():
     assert 0.8 < np.sqrt((scores**2).mean()) < 1.3  # 1.48 if the noise were taken for white
 
 
-@pytest.mark.parametrize("radii", [pytest.param(None, marks=pytest.mark.slow), 6.0])
+@pytest.mark.parametrize("radii", [None, 6.0])
 def test_no_picture_is_too_odd(radii):
     rng = np.random.default_rng(2)
     squares = np.kron(rng.integers(0, 2, (20, 20)) * 255, np.ones((11, 11)))
     noise = rng.integers(0, 256, (220, 220))
     for picture in (squares, noise, np.zeros((220, 220)), np.full((220, 220), 255), squares[:3], noise[:1]):
-        guesses = np.column_stack([rng.uniform(-30, 250, (30, 2)), rng.uniform(1, 12, 30)])
+        guesses = np.column_stack([rng.uniform(-30, 250, (9, 2)), rng.uniform(1, 12, 9)])
         discs = fit_discs(picture.astype(np.uint8), guesses, radii=radii)
         assert np.isfinite(discs.centres[discs.found]).all()
         assert discs.found.mean() < 0.05  # of white noise, chance makes a disc
-
-
-@pytest.mark.slow
-def test_guesses_where_little_agrees_are_not_found_and_stop_no_other():
-    """On the edges of walls and between them, where a marker was before it jumped."""
-    image = np.full((240, 320), 150, dtype=np.uint8)
-    for row in range(20, 240, 40):
-        image[row : row + 19] = 210
-    image = np.asarray(np.clip(image + np.random.default_rng(0).normal(0, 3, image.shape), 0, 255), np.uint8)
-    guesses = [(x, y, 7.6) for x in range(66, 310, 138) for y in range(12, 235, 5)]
-    assert not fit_discs(image, guesses, radii=7.6).found.any()

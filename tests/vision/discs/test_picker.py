@@ -26,8 +26,7 @@ def shares(scene: Dots, image: np.ndarray, colour: ColourRange) -> tuple[float, 
     return min(mask[distance < -2].mean() for distance in away[:9]), mask[away.min(axis=0) > 3].mean()
 
 
-@pytest.mark.parametrize("name", [*COLOURS, "grey"])
-@pytest.mark.parametrize("radius", [5.0, 12.0])
+@pytest.mark.parametrize(("name", "radius"), zip([*COLOURS, "grey"], 3 * [5.0, 12.0], strict=True))
 def test_a_click_into_one_marker_selects_all_and_nothing_else(name, radius):
     scene = dots(radius, colour=COLOURS.get(name, COLOURS["black"]), size=(640, 360))
     image = scene.image[:, :, 1] if name == "grey" else scene.image

@@ -63,7 +63,7 @@ def rms(errors: np.ndarray) -> float:
     return float(np.sqrt((errors**2).sum(axis=1).mean()))
 
 
-@pytest.mark.parametrize(("radius", "irregular"), [(4.0, 0.03), (4.0, 0.08), (12.0, 0.03), (12.0, 0.08)])
+@pytest.mark.parametrize(("radius", "irregular"), [(4.0, 0.08), (12.0, 0.03)])
 def test_irregular_dots_are_as_accurate_as_round_ones(radius, irregular):
     discs, errors, _ = measured(PrintedDots(radius, irregular, count=COUNTED, seed=3))
     assert discs.found.sum() >= COUNTED - 1  # one of 48 may be so uneven that it could be hidden in part
@@ -71,17 +71,14 @@ def test_irregular_dots_are_as_accurate_as_round_ones(radius, irregular):
     blur = np.hypot(0.8, 12**-0.5)
     bound = 2 / (235 * (PAPER - INK)) * np.sqrt(blur / (radius * np.sqrt(np.pi)))  # of a round one
     assert rms(wrong) < 1.7 * bound  # 1.1 on the average; 8 % at 4 pixels: 1.5
-    deviations = np.sqrt(np.diagonal(discs.covariances[discs.found], axis1=1, axis2=2))
-    assert (np.abs(wrong) < 1.96 * deviations).mean() > 0.88  # 0.95 less four deviations of 96 coordinates
+    assert covered(discs, errors) > 0.88  # 0.95 less four deviations of 96 coordinates
 
 
 @pytest.mark.parametrize(
     ("radius", "changes"),
     [
         (7.3, {"mottle": 0.1}),
-        (12.0, {"mottle": 0.1, "irregular": 0.03}),
-        (12.0, {"exposure": exposure(sharpen=1.5)}),
-        (7.3, {"exposure": exposure(sharpen=1.5), "irregular": 0.03}),
+        (3.0, {"exposure": exposure(sharpen=1.5), "irregular": 0.03}),  # the halo draws an ellipse away
         (7.3, {"exposure": exposure(blur=2.0), "irregular": 0.03}),  # out of focus
         (12.0, {"exposure": exposure(glare=60.0), "irregular": 0.03}),
         (7.3, {"exposure": exposure(noise=6.0), "irregular": 0.05}),
@@ -100,7 +97,6 @@ def test_no_plain_centroid_is_more_accurate(radius, changes):
 @pytest.mark.parametrize(
     ("radius", "period"),
     [
-        pytest.param(4.0, 2.4, marks=pytest.mark.slow),
         pytest.param(12.0, 3.2, marks=pytest.mark.slow),
         (4.0, 8.0),
     ],
@@ -128,17 +124,6 @@ def test_walls_that_join_beside_a_marker_are_no_layers(frame, monkeypatch):
     assert (found.centres == without.centres).all()
 
 
-@pytest.mark.parametrize("radius", [4.0, pytest.param(12.0, marks=pytest.mark.slow)])
-def test_a_glare_does_not_move_the_dots_that_it_falls_on(radius):
-    """1.1 times the error in even light; 2.5 to 6 times where glare is taken for light that dots swallow."""
-    dots = PrintedDots(radius, 0.03, count=96, seed=5, exposure=exposure(glare=60.0))
-    discs, errors, _ = measured(dots)
-    assert discs.found.all()
-    _, even, _ = measured(replace(dots, exposure=exposure()))
-    assert rms(errors) < 1.8 * rms(even)
-    assert covered(discs, errors) > 0.9
-
-
 @pytest.mark.parametrize(
     ("radius", "changes"),
     [
@@ -155,15 +140,6 @@ def test_the_intervals_of_dots_hold(radius, changes):
     assert 0.89 < covered(discs, errors) < 0.99  # 192 coordinates, each deviation of 0.95 is 0.016
 
 
-@pytest.mark.slow
-def test_specks_far_from_the_edge_do_not_make_a_dot_uncertain():
-    """1.5 times the error; 3.2 times if all pixels within two of the edge count alike."""
-    discs, errors, _ = measured(PrintedDots(12.0, 0.03, mottle=0.1, count=96, seed=5))
-    assert discs.found.all()
-    stated = np.sqrt(np.diagonal(discs.covariances, axis1=1, axis2=2))
-    assert rms(errors) < rms(stated) < 2 * rms(errors)
-
-
 @pytest.mark.parametrize(("value", "sign"), [(255, 1), (0, -1)])
 def test_clipped_pixels_are_expected_where_a_truncated_normal_distribution_is(value, sign):
     limit, deviation = (LIGHTEST, 3.0) if sign > 0 else (DARKEST, 3.0)
@@ -177,16 +153,6 @@ def test_clipped_pixels_are_expected_where_a_truncated_normal_distribution_is(va
     clipped = truncnorm(low, high, loc=levels, scale=deviation)
     np.testing.assert_allclose(expected[0], clipped.mean(), atol=0.01)
     np.testing.assert_allclose(known[0], 1 - clipped.var() / deviation**2, atol=0.002)
-
-
-@pytest.mark.parametrize(("radius", "irregular"), [(3.0, 0.0), (3.0, 0.03)])
-def test_small_dots_in_sharpened_pictures_are_found(radius, irregular):
-    """The halo drew the fit of an ellipse away, to contrasts of the other sign."""
-    discs, errors, plain = measured(
-        PrintedDots(radius, irregular, count=COUNTED, exposure=exposure(sharpen=1.5), seed=5)
-    )
-    assert discs.found.all()
-    assert rms(errors) < rms(plain)
 
 
 def test_derivatives_of_an_irregular_disc_are_differences():

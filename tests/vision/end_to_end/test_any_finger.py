@@ -67,7 +67,7 @@ def recording(name: str) -> Recording:
         camera=camera,
         pose=viewing_pose(camera, workspace, tilt=3.0),
         exposure=Exposure(noise=2),
-        motion=Motion(rest=3, moving=3, held=3),
+        motion=Motion(rest=3, moving=1, held=3),
     )
 
 
@@ -84,10 +84,9 @@ def error(name: str) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["csiro", "ring"])
-def test_any_finger_is_tracked_as_accurately_as_the_default_one(name: str) -> None:
+def test_a_ring_is_tracked_as_accurately_as_the_default_finger() -> None:
     """In proportion to the size of a pixel, about 0.1 mm: hundredths of it."""
-    assert error(name) < max(2 * error("default"), 0.003)
+    assert error("ring") < max(2 * error("default"), 0.003)
 
 
 @pytest.mark.parametrize("name", FINGERS)

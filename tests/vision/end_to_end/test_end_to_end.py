@@ -73,7 +73,6 @@ def test_their_standard_deviations_are_those_of_the_errors(scores):
 @pytest.mark.parametrize(
     ("case", "error", "missed"),
     [
-        (("size", "640x360"), 0.005, 0),
         (("hidden", "half of 2 markers"), 0.01, 0),
         (("hidden", "3 markers"), 0.003, 3),
         (("corner", "640x360, noise 6, mp4v, jump"), 0.03, 0),

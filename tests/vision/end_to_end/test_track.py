@@ -39,12 +39,13 @@ def picture(
     pose: Pose = POSE,
     lost: Sequence[int] = (),
     hidden: Sequence[int] = (),
+    height: float = 0.0,
 ) -> Image:
-    """Markers at places but for the lost ones, and fiducials but for the hidden ones."""
+    """Markers at places, nearer by `height`, but for the lost ones; fiducials but for the hidden ones."""
     markers, corners = np.delete(places, lost, axis=0), np.delete(SPACE.points, hidden, axis=0)
-    scale = CAMERA.fx / POSE.translation[2]
+    scale, nearer = CAMERA.fx / POSE.translation[2], 1 / (1 - height / POSE.translation[2])
     return listed.picture(
-        (RED, middles(markers, 0.8, CAMERA, pose), 0.8 * scale, 100.0),
+        (RED, middles(markers, 0.8, CAMERA, pose, height), 0.8 * scale * nearer, 100.0),
         (DARK, middles(corners, 2.0, CAMERA, pose), 2 * scale, 100.0),
     )
 

@@ -6,43 +6,27 @@ import numpy as np
 import pytest
 
 from pinnray.runtime.errors import UserError
-from pinnray.vision.discs.colour import DARK
 from pinnray.vision.tracking.scene import FilmedScene
 from pinnray.vision.tracking.tracker import track
 from tests.vision.end_to_end.test_track import (
     CAMERA,
     MARKERS,
-    POSE,
     PRESSED,
     RED,
     SCENE,
     SHARES,
     SPACE,
     film,
+    picture,
 )
-from tests.vision.tracking.listed_discs import ListedDiscs, middles, seen
+from tests.vision.tracking.listed_discs import ListedDiscs
 
 COVARIANCE = tuple(map(tuple, (1e-8 * np.eye(9)).tolist()))
 
 
 def at_height(listed: ListedDiscs, height: float, *, moved: float = 0.0):
     """A film of markers that are so much nearer to the camera than the fiducials, mm."""
-    scale = CAMERA.fx / POSE.translation[2]
-    nearer = POSE.translation[2] / (POSE.translation[2] - height)
-    return film(
-        [
-            listed.picture(
-                (
-                    RED,
-                    seen(MARKERS + share * PRESSED + moved, CAMERA, POSE, height),
-                    0.8 * scale * nearer,
-                    100.0,
-                ),
-                (DARK, middles(SPACE.points, 2.0, CAMERA, POSE), 2 * scale, 100.0),
-            )
-            for share in SHARES
-        ]
-    )
+    return film([picture(listed, MARKERS + share * PRESSED + moved, height=height) for share in SHARES])
 
 
 def sheet(height: float) -> FilmedScene:
@@ -54,10 +38,8 @@ def sheet(height: float) -> FilmedScene:
     [
         # the workspace has the sheet below the markers, and no camera is known
         (12.0, 0.0, replace(sheet(12.0), camera=None), "12 mm nearer to the camera"),
-        (20.0, 0.0, replace(sheet(20.0), camera=None, method="hough"), "20 mm nearer to the camera"),
         # the sheet was forgotten
         (12.0, 0.0, SCENE, "nearer to the camera than the fiducials by about 12 mm"),
-        (20.0, 0.0, SCENE, "nearer to the camera than the fiducials by about 20 mm"),
         (-15.0, 0.0, SCENE, "farther from the camera than the fiducials by about -15 mm"),
         (20.0, 0.0, replace(SCENE, camera=None), "times as far apart"),
         (25.0, 0.0, sheet(5.0), "by about 25 mm, not 5 mm above them"),

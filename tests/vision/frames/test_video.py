@@ -164,12 +164,12 @@ def test_a_video_that_cannot_be_written_leaves_the_old_one(frames, tmp_path):
 
 @pytest.mark.parametrize("suffix", [".mkv", ".avi", ".mp4"])
 def test_a_full_disk_is_noticed_and_leaves_nothing(suffix, tmp_path):
-    """For a process that may write 100 kB, less than the frames need."""
+    """For a process that may write 20 kB, less than the frames need."""
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limit[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limit[1]))
     try:
         with pytest.raises(UserError, match=r"cannot write 640x480 pixels .*: File too large"):
-            written(tmp_path / f"a{suffix}", smooth(40, (640, 480)))
+            written(tmp_path / f"a{suffix}", smooth(8, (640, 480)))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limit)
     assert not list(tmp_path.iterdir())

@@ -11,7 +11,6 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.discs.colour import DARK, ColourRange
-from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.rig.virtual_camera import viewing_pose
 from pinnray.vision.tracking.fiducial_matching import UnseenError
@@ -20,7 +19,7 @@ from pinnray.vision.tracking.plane_fit import camera_plane
 from pinnray.vision.tracking.scene import FilmedScene
 from pinnray.vision.tracking.workspace import Workspace
 from tests.fingers import beam
-from tests.vision.tracking.listed_discs import NOISE, ListedDiscs, middles, seen
+from tests.vision.tracking.listed_discs import NOISE, ListedDiscs, discs_at, middles, seen
 
 FINGER = beam()
 FIDUCIALS = (
@@ -44,13 +43,6 @@ def scale_at(points: FloatArray) -> FloatArray:
     )
 
 
-def discs(centres: FloatArray, hidden: tuple[int, ...] = ()) -> DiscDetections:
-    count = len(centres)
-    places, radii = centres.copy(), np.full(count, 16.0)
-    places[list(hidden)] = radii[list(hidden)] = np.nan
-    return DiscDetections(places, np.tile(0.0025 * np.eye(2), (count, 1, 1)), radii, np.full(count, 100.0))
-
-
 def filmed(listed: ListedDiscs, moved: FloatArray | None = None, camera: Camera = PINHOLE) -> Image:
     """The fiducials, moved by mm, and the markers."""
     places = SPACE.points + (0 if moved is None else moved)
@@ -66,7 +58,7 @@ def filmed(listed: ListedDiscs, moved: FloatArray | None = None, camera: Camera 
 def test_the_plane_is_that_of_the_markers_height_by_the_fiducials_that_are_seen(height: float) -> None:
     """Discs are where the middles of their images are, not the images of their middles."""
     scene = FilmedScene(FINGER, Workspace(fiducials=FIDUCIALS, marker_plane=height), BENT)
-    plane = scene.plane(discs(middles(SPACE.points, 2.0, BENT, POSE), hidden=(1, 4)))
+    plane = scene.plane(discs_at(middles(SPACE.points, 2.0, BENT, POSE), hidden=(1, 4)))
     assert plane.residual < 2e-4
     np.testing.assert_allclose(
         plane.pixels(FINGER.markers), seen(FINGER.markers, BENT, POSE, height), atol=5e-3
@@ -76,7 +68,7 @@ def test_the_plane_is_that_of_the_markers_height_by_the_fiducials_that_are_seen(
 
 
 def test_without_a_camera_the_plane_is_a_homography_and_by_hough_a_similarity() -> None:
-    found = discs(middles(SPACE.points, 2.0, PINHOLE, POSE))
+    found = discs_at(middles(SPACE.points, 2.0, PINHOLE, POSE))
     plane = FilmedScene(FINGER, SPACE).plane(found)
     np.testing.assert_allclose(plane.pixels(FINGER.markers), seen(FINGER.markers, PINHOLE, POSE), atol=5e-3)
     assert len(plane.parameters) == 8

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from pinnray.geometry.finger.design import Design
-from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera_file import load_camera
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.measurements import read_measurements
@@ -132,13 +131,12 @@ def test_a_cable_hides_the_share_of_a_marker_that_it_is_told_to(bench):
 
 @pytest.mark.parametrize("codec", list(FILES))
 def test_a_recording_is_read_back(codec, bench, tmp_path):
-    recording = film(bench)
+    recording = film(bench, motion=Motion(rest=1, moving=0, held=1))
     record(recording, tmp_path, source="a test", codec=codec)
     with open_frames(tmp_path / FILES[codec]) as frames:
         assert frames.simulated
         images = [frame.image for frame in frames]
     expected = [image for image, _ in recording.frames()]
-    assert len(images) == 6
     for image, exact in zip(images, expected, strict=True):
         if codec in ("ffv1", "png"):
             np.testing.assert_array_equal(image, exact)
@@ -151,12 +149,6 @@ def test_a_recording_is_read_back(codec, bench, tmp_path):
     np.testing.assert_array_equal(truth.displacements, recording.observations("").displacements)
     with (tmp_path / "truth.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 6 * 9
-    assert float(rows[-1]["x_px"]) == recording.frame(5)[1].pixels[-1, 0]
+    assert len(rows) == 2 * 9
+    assert float(rows[-1]["x_px"]) == recording.frame(1)[1].pixels[-1, 0]
     assert json.loads((tmp_path / "truth.json").read_text(encoding="utf-8"))["exposure"]["noise"] == 2
-
-
-def test_an_unknown_codec_is_refused_before_anything_is_rendered(bench, tmp_path):
-    with pytest.raises(UserError, match="there are ffv1, mjpg, mp4v, png"):
-        record(film(bench), tmp_path, source="a test", codec="h264")
-    assert not list(tmp_path.iterdir())

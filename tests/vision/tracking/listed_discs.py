@@ -1,6 +1,6 @@
 """Pictures that are lists of discs, and a detector that reads the list: what happens after the detection."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -32,6 +32,22 @@ def middles(points: FloatArray, radius: float, camera: Camera, pose: Pose, heigh
     return np.column_stack(parts) / (3 * turns.sum(axis=1))[:, None]
 
 
+def discs_at(
+    centres: FloatArray,
+    *,
+    hidden: Sequence[int] = (),
+    variance: FloatArray | float = NOISE**2,
+    radius: FloatArray | float = 16.0,
+    contrast: float = 100.0,
+) -> DiscDetections:
+    """Discs at centres, shape (n, 2), pixels, but for the hidden ones; `variance` may differ in x and y."""
+    numbers = np.arange(len(centres))
+    covariances = np.tile(variance * np.eye(2), (len(centres), 1, 1))
+    radii, contrasts = (np.broadcast_to(np.asarray(of, float), len(centres)) for of in (radius, contrast))
+    every = DiscDetections(centres.copy(), covariances, radii.copy(), contrasts.copy())
+    return every.numbered(np.where(np.isin(numbers, hidden), -1, numbers))
+
+
 class Request(NamedTuple):
     """What was asked of the detector: all discs of a colour and size in a window, or those near guesses."""
 
@@ -54,10 +70,7 @@ class ListedDiscs:
         """An image of discs of some colours: their centres (n, 2), radii and contrast."""
         parts = []
         for colour, centres, radii, contrast in discs:
-            count = len(centres)
-            covariances = np.tile(NOISE**2 * np.eye(2), (count, 1, 1))
-            sizes = np.broadcast_to(np.asarray(radii, dtype=np.float64), count).copy()
-            found = DiscDetections(centres.copy(), covariances, sizes, np.full(count, contrast))
+            found = discs_at(centres, radius=radii, contrast=contrast)
             parts.append((colour, found.where(np.isfinite(centres).all(axis=1))))
         self.pictures.append(parts)
         width, height = self.size

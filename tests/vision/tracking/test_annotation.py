@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 import pytest
 
@@ -11,6 +10,7 @@ from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.tracking.annotation import annotated
 from pinnray.vision.tracking.frame_tracker import FrameDetections
+from tests.vision.tracking.listed_discs import discs_at
 
 GREEN, RED, BLUE, VIOLET, DARK = (40, 150, 0), (0, 60, 230), (200, 110, 0), (190, 0, 190), (30, 30, 30)
 """Markers, lost markers, fiducials, trajectories and text; written again here, in blue, green, red."""
@@ -24,8 +24,7 @@ def blank(width: int = 1280, height: int = 300) -> Image:
 def discs(places: Sequence[tuple[float, float, float]]) -> DiscDetections:
     """Discs at x, y with a radius; nan for those not seen."""
     table = np.array(places, dtype=np.float64).reshape(-1, 3)
-    count = len(table)
-    return DiscDetections(table[:, :2], np.zeros((count, 2, 2)), table[:, 2], np.full(count, 100.0))
+    return discs_at(table[:, :2], radius=table[:, 2])
 
 
 def drawn(
@@ -109,30 +108,3 @@ def test_a_lost_marker_is_crossed_where_it_is_expected() -> None:
     assert not has(image, GREEN)
     reach = np.nonzero(painted(image[150:], RED).any(axis=0))[0]  # below the number
     assert (reach.min(), reach.max()) == (632, 648)
-
-
-def changed(image: Image) -> list[int]:
-    """Box of what was drawn into a blank image."""
-    rows, columns = np.nonzero((image != GREY).any(axis=2))
-    return [int(columns.min()), int(rows.min()), int(columns.max()), int(rows.max())]
-
-
-def test_markers_are_numbered_from_one_above_their_places() -> None:
-    """Up and left of the place: the letters start 5 pixels to its left, on a line 14 pixels above it."""
-    image = drawn(blank(), [(60.0, 150.0, 1.0), (200.0, 150.0, 1.0)], [(60.0, 150.0), (200.0, 150.0)])[:147]
-    for place, number in ((60, "1"), (200, "2")):
-        alone = blank(1280)[:147]
-        cv2.putText(
-            alone, number, (place - 5, 136), cv2.FONT_HERSHEY_SIMPLEX, 0.55, (255, 255, 255), 4, cv2.LINE_AA
-        )
-        near = np.s_[:, place - 30 : place + 70]
-        assert changed(image[near]) == changed(alone[near])
-
-
-def test_letters_are_dark_in_a_white_rim_and_lines_stand_below_each_other() -> None:
-    """As OpenCV writes white letters 4 pixels wide, and dark ones over them."""
-    expected = blank()
-    for line, text in ((26, "Frame 7"), (50, "E")):
-        for width, paint in ((4, (255, 255, 255)), (1, DARK)):
-            cv2.putText(expected, text, (14, line), cv2.FONT_HERSHEY_SIMPLEX, 0.6, paint, width, cv2.LINE_AA)
-    np.testing.assert_array_equal(drawn(blank(), text=["Frame 7", "E"]), expected)

@@ -179,21 +179,20 @@ def following(correlation: float):
 @pytest.mark.parametrize(
     ("errors", "counts", "low", "high"),
     [
-        (independent, (1, 3, 5, 30), 0.7, 1.1),  # chance looks like a common part now and then
-        (copies, (3, 5, 30), 0.9, 1.1),
+        (independent, (1, 3, 30), 0.7, 1.1),  # chance looks like a common part now and then
+        (copies, (3, 30), 0.9, 1.1),
         (sharing(0.3), (5, 30), 0.65, 2),  # as independent frames at least 2.2 and 9.7
         (sharing(0.7), (5, 30), 0.65, 2),
-        (seen_but_every(2), (30,), 0.6, 1.1),
         (seen_but_every(3), (30,), 0.6, 1.1),
         (following(0.5), (30,), 0.65, 1.3),  # as independent frames 3
         (following(0.9), (30,), 0.65, 1.3),  # and 11
     ],
 )
 def test_means_are_as_far_from_the_truth_as_their_variances_say(errors, counts, low, high) -> None:
-    """Mean square of the errors of 200 means of nine discs over their variances."""
+    """Mean square of the errors of 100 means of nine discs over their variances."""
     for count in counts:
         rng, squares = np.random.default_rng(5), []
-        for _ in range(200):
+        for _ in range(100):
             mean = mean_detections(frames_of(errors(rng, count)), "precise")
             variances = np.diagonal(mean.covariances, axis1=1, axis2=2)
             squares.append(((mean.centres - 100) ** 2 / variances).mean())

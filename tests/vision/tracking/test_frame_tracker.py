@@ -16,7 +16,7 @@ from pinnray.vision.tracking.marker_plane import SIMILARITY, MarkerPlane
 from pinnray.vision.tracking.scene import FilmedScene
 from pinnray.vision.tracking.workspace import Workspace
 from tests.fingers import beam
-from tests.vision.tracking.listed_discs import ListedDiscs
+from tests.vision.tracking.listed_discs import ListedDiscs, discs_at
 
 FINGER, RED = beam(), ColourRange((20.0, 40.0, 20.0), (80.0, 90.0, 80.0))
 MARKERS, RADIUS, COUNT = FINGER.markers, FINGER.marker_radius, 7
@@ -34,9 +34,7 @@ class KnownPlane(FilmedScene):
 
     def first_plane(self, image: Image) -> tuple[MarkerPlane, DiscDetections]:
         """The plane, and the fiducials."""
-        centres, radii = PLANE.pixels(CORNERS), np.full(5, SIZE)
-        centres[2] = radii[2] = np.nan
-        return PLANE, DiscDetections(centres, np.zeros((5, 2, 2)), radii, np.full(5, 100.0))
+        return PLANE, discs_at(PLANE.pixels(CORNERS), hidden=[2], radius=SIZE)
 
 
 SCENE = KnownPlane(FINGER, Workspace(fiducials=tuple(map(tuple, CORNERS.tolist()))), colour=RED)
@@ -158,17 +156,6 @@ def test_a_hidden_marker_is_expected_where_the_others_predict(listed: ListedDisc
     np.testing.assert_allclose(seen.places[3], (MARKERS + BENT)[3], atol=0.1)
     again = tracker.see(shown(listed, MARKERS + 2 * BENT))
     assert found(again.markers) == list(range(7))
-
-
-def test_a_jump_is_followed_by_a_search(listed: ListedDiscs) -> None:
-    """A step of 8 mm at the tip leaves what is looked for nearby."""
-    tracker = FrameTracker(SCENE, shown(listed))
-    listed.requests.clear()
-    jump = 6 * BENT
-    seen = tracker.see(shown(listed, MARKERS + jump))
-    assert searches(listed) == 1
-    assert found(seen.markers) == list(range(7))
-    np.testing.assert_allclose(seen.places, MARKERS + jump, atol=1e-9)
 
 
 def test_markers_that_a_search_leaves_out_are_looked_for_where_the_others_predict(listed):

@@ -37,7 +37,7 @@ def a_jump(generator, layout):
 def test_no_jump_swaps_or_invents_markers(layout, least):
     generator = np.random.default_rng(1)
     named = shown = 0
-    for case in range(300):
+    for case in range(150):
         start, step = a_jump(generator, layout)
         hidden = generator.choice(9, generator.integers(0, 4), replace=False)
         false = generator.uniform((-5, -40), (100, 15), (generator.integers(0, 4), 2))

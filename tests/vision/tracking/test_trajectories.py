@@ -10,6 +10,7 @@ from pinnray.vision.tracking.marker_plane import SIMILARITY, MarkerPlane
 from pinnray.vision.tracking.rest_detection import RestIntervals
 from pinnray.vision.tracking.trajectories import Tracking
 from tests.fingers import beam
+from tests.vision.tracking.listed_discs import discs_at
 
 DESIGN = beam()
 MARKERS = DESIGN.markers
@@ -27,10 +28,7 @@ def pixels(places: FloatArray) -> FloatArray:
 
 
 def discs(places: FloatArray, hidden: int, variance: float) -> DiscDetections:
-    centres, radii = pixels(places), np.full(COUNT, SCALE * DESIGN.marker_radius)
-    covariances = np.tile(np.diag([variance, 4 * variance]), (COUNT, 1, 1))
-    centres[hidden] = radii[hidden] = covariances[hidden] = np.nan
-    return DiscDetections(centres, covariances, radii, np.full(COUNT, 100.0))
+    return discs_at(pixels(places), hidden=[hidden], variance=variance * np.array([1.0, 4.0]))
 
 
 def tracking(**changes: Any) -> Tracking:

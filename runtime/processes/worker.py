@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import free_memory_gb, limit_memory, peak_memory_gb
-from pinnray.runtime.processes import Pool, ProcessFailed
+from pinnray.runtime.processes.child import ProcessFailed
+from pinnray.runtime.processes.pool import Pool
 
 
 class Task(NamedTuple):
