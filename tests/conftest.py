@@ -121,14 +121,15 @@ def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.draw_all", lambda *_: [])
 
 
+def inline(_: object, work: Callable, tasks: Mapping[str, object], **__: object) -> Generator:
+    """Stands for `Pool.answers`: tasks run one after the other in this process."""
+    for name, each in tasks.items():
+        yield name, work(each, lambda *_: None)
+
+
 @pytest.fixture
 def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tasks run one after the other in this process: a new one imports for seconds."""
-
-    def inline(_: object, work: object, tasks: Mapping[str, object], **__: object) -> Generator:
-        for name, each in tasks.items():
-            yield name, work(each, lambda *_: None)
-
+    """No other process is started, which would import for seconds."""
     monkeypatch.setattr("pinnray.runtime.processes.pool.Pool.answers", inline)
 
 

@@ -45,7 +45,3 @@ def test_notebooks_run(page, tmp_path, monkeypatch, without_pictures, in_line):
     for block in blocks(page):
         if block.language == CELL:
             exec(compile("\n" * block.line + block.text, str(page), "exec"), names)
-
-
-def test_there_are_four_notebooks():
-    assert len(NOTEBOOKS) == 4

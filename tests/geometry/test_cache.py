@@ -1,7 +1,6 @@
 """Cache and worker: quick hits, damaged entries, time limits, one-line failures."""
 
 import os
-import shutil
 import subprocess
 import sys
 import zipfile
@@ -85,6 +84,7 @@ def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPa
     assert key(Design(name="x")) in keys
 
 
+@pytest.mark.slow
 def test_time_limit_ends_the_worker_with_advice(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"meshing design 'default' was ended after 0\.5 s; use larger"):
         finger_mesh(Design(), settings=MeshSettings(size=0.02), cache_dir=tmp_path, timeout_s=0.5)
@@ -145,31 +145,6 @@ def test_cache_folder(variables: dict[str, str], expected: str, monkeypatch: pyt
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     assert cache_folder() == Path(expected)
-
-
-@pytest.mark.mpi
-@pytest.mark.slow
-def test_meshing_works_under_mpirun(tmp_path: Path) -> None:
-    mpirun = shutil.which("mpirun")
-    assert mpirun, "mpirun comes with DOLFINx"
-    code = (
-        "from pathlib import Path; from pinnray.geometry import *; import os\n"
-        "m = finger_mesh(Design(), settings=MeshSettings(size=2), "
-        "cache_dir=Path(os.environ['CACHE']) / os.environ.get('OMPI_COMM_WORLD_RANK', '0'))\n"
-        "print(m.digest)"
-    )
-    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "CACHE": str(tmp_path)}
-    done = subprocess.run(
-        [mpirun, "-n", "2", sys.executable, "-c", code],
-        env=child_environment(os.environ) | allowed,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    first, second = done.stdout.split()
-    assert first == second
 
 
 def test_cad_files_come_from_the_cache_the_second_time(tmp_path, monkeypatch):

@@ -1,6 +1,5 @@
 """First lines of a user: keywords, defaults, one-line reprs, messages that suggest the right word."""
 
-import subprocess
 import sys
 import typing
 import warnings
@@ -56,24 +55,6 @@ def test_typed_keywords_are_the_parameters_with_their_types(words: Any, model: A
     assert [name for name in names if hints[name] != model.model_fields[name].annotation] == []
     known = {*names, "E", "nu"} | (set(Parameters.model_fields) if words is MeshKeywords else set())
     assert hints.keys() <= known
-
-
-@pytest.mark.slow
-def test_a_type_checker_knows_the_keywords(tmp_path: Path):
-    script = tmp_path / "script.py"
-    script.write_text(
-        "import pinnray as pr\n"
-        "pr.solve('default', rib_count=6, young=5, stroke=8)\n"
-        "pr.Material(E=3, nu=0.4)\n"
-        "pr.Load('cylinder', stroke=5)\n"
-        "pr.Observations([[1, 2]], [[3, 4]])\n"
-        "pr.Design(rib_cuont=6)  # wrong\n"
-        "pr.solve('default', rib_cuont=6)  # wrong\n"
-        "pr.Load('cilinder')  # wrong\n"
-    )
-    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", "pyproject.toml", str(script)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
-    assert [line.split(":")[1] for line in done.stdout.splitlines() if ": error:" in line] == ["6", "7", "8"]
 
 
 # --- the words are understood ---
@@ -213,12 +194,11 @@ def test_every_quantity_of_the_viewer_is_plotted(solved: pr.Solution, quantity: 
     assert high > 0
 
 
-def test_every_object_is_one_short_line(solved: pr.Solution, compared: pr.Comparison, tmp_path: Path):
+def test_every_object_is_one_short_line(solved: pr.Solution, compared: pr.Comparison):
     shown = [
         *(solved, solved.problem, solved.problem.mesh, solved.state([[35, 0]]), solved.error, solved.status),
         *(compared, compared["fem"], compared.observations, compared.mesh.locate([[35, 0]])),
         *(pr.Design(), pr.Design().section, pr.Material(), pr.Load(), pr.solver("pinn-std"), MeshSettings()),
-        pr.crossval("default", "fem", out=tmp_path / "cv", schemes="one-out", seeds=1, **COARSE),
     ]
     lines = {type(each).__name__: repr(each) for each in shown}
     long = {name: line for name, line in lines.items() if "\n" in line or len(line) > 250}

@@ -8,6 +8,8 @@ from PIL import Image
 
 from tests.test_docs import DOCS, blocks
 
+pytestmark = pytest.mark.slow
+
 PAGE = DOCS / "notebook.md"
 
 

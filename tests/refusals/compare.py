@@ -5,20 +5,24 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pinnray.comparison.crossval.folds import load_cases_of
+from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks
 from pinnray.comparison.evaluation.truths import TRUTHS, Truth, virtual_experiment
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.mesher import build_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import HAND_HELD
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.problem import Load, Problem
+from pinnray.solvers.problem import Load, Material, Problem
+from tests.fingers import beam
 
 FILES = {
     "empty/notes.txt": "mine",
@@ -30,6 +34,12 @@ FILES = {
 truth = partial(Truth, name="mine", description="pressed in by {:.4g} mm")
 MESH = build_mesh(Design(), MeshSettings(size=2.0), across=1)
 PROBLEM = Problem(MESH)
+
+
+def crossval(**changes: Any) -> None:
+    CrossvalStudy(
+        design=Design(), variants=solver_variants([FemSolver()], Material()), out=Path("out"), **changes
+    ).check()
 
 
 @cache

@@ -119,14 +119,6 @@ def test_two_runs_do_not_write_the_same_folder(out):
         assert tree(folder) == {"report.html": "new report"}
 
 
-def test_a_folder_left_between_two_renames_does_no_harm(out):
-    out.with_name(".run.previous").mkdir()
-    (out.with_name(".run.previous") / "half.txt").write_text("removed")
-    (out.with_name(".run.previous") / MARK).touch()
-    attempt(out)
-    assert tree(out.parent) == {"run/report.html": "new report"}
-
-
 def test_a_result_that_cannot_take_its_place_is_complete_beside_it(out, monkeypatch):
     def busy(self: Path, target: Path) -> None:
         raise OSError(16, "Device or resource busy")  # `out` is a mounted volume

@@ -166,6 +166,7 @@ def test_a_task_that_takes_too_long_is_ended():
     assert time.monotonic() - before < 20
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_written_is_told_in_one_line(tmp_path, capfd):
     answers = answers_of(unwritten, {"a": tmp_path})
     assert answers["a"].message == f"{tmp_path}/absent/file: No such file or directory"
@@ -215,7 +216,9 @@ def test_processes_end_with_the_program_that_started_them(tmp_path):
     assert (tmp_path / child).read_text() == "saved"
 
 
-@pytest.mark.parametrize(("chosen", "expected"), [(None, "2"), ("3", "3")], ids=["share", "chosen"])
+@pytest.mark.parametrize(
+    ("chosen", "expected"), [(None, "2"), pytest.param("3", "3", marks=pytest.mark.slow, id="chosen")]
+)
 def test_processes_have_their_share_of_the_cores(monkeypatch, chosen, expected):
     """This process keeps its own threads."""
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
@@ -257,6 +260,7 @@ def imported(module: str, progress: Progress) -> bool:
     return module in sys.modules
 
 
+@pytest.mark.slow
 def test_a_process_that_is_started_early_imports_what_it_is_told_as_far_as_there_is():
     with Pool(1, modules=["no_such_module", "tests.geometry.broken_module", "fractions"]) as pool:
         pool.start()
@@ -270,6 +274,7 @@ def test_a_process_that_was_never_asked_is_not_waited_for():
     assert time.monotonic() - started < PATIENCE_S
 
 
+@pytest.mark.slow
 def test_a_task_beside_a_block_that_raises_saves_its_state(tmp_path):
     said: list[str] = []
 

@@ -57,10 +57,3 @@ def test_quiet_shows_nothing(terminal):
     quiet = console(terminal=terminal)
     two_stages(Stages(quiet, quiet=True))
     assert shown(quiet) == ""
-
-
-def test_the_time_of_every_stage_is_kept():
-    stages = Stages(console(terminal=False))
-    two_stages(stages)
-    assert list(stages.seconds) == ["mesh", "fem"]
-    assert all(0 <= seconds < 1 for seconds in stages.seconds.values())

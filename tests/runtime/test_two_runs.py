@@ -51,21 +51,3 @@ def test_of_two_runs_on_one_folder_one_is_refused_and_the_other_is_whole(tmp_pat
     listed = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))["files_sha256"]
     assert files(tmp_path / "out") == sorted([*listed, "run.json"])
     assert {name: file_digest(tmp_path / "out" / name) for name in listed} == listed
-
-
-def test_two_runs_that_fill_one_cache_give_the_same_and_leave_it_whole(
-    tmp_path, monkeypatch, without_pictures
-):
-    def numbers(name: str) -> dict[str, object]:
-        found = json.loads((tmp_path / name / "metrics.json").read_text(encoding="utf-8"))
-        del found["solvers"]["fem"]["seconds"], found["solvers"]["fem"]["stats"]
-        return found
-
-    runs = [start(tmp_path / "cache", tmp_path / name) for name in ("one", "other")]
-    assert [(run.communicate(timeout=200)[1], run.returncode) for run in runs] == [("", 0)] * 2
-    assert numbers("one") == numbers("other")
-    kept = files(tmp_path / "cache")
-    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
-    assert main([*OPTIONS, "--out", str(tmp_path / "third")]) == 0
-    assert numbers("third") == numbers("one")
-    assert kept == files(tmp_path / "cache")

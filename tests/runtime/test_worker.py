@@ -74,7 +74,11 @@ def test_a_task_that_needs_more_memory_than_is_free_is_one_line() -> None:
 
 @limited
 @pytest.mark.parametrize(
-    ("crowded", "end"), [(False, r"failed \(exit code -11\)"), (True, r"needs more than 0\.45 GB")]
+    ("crowded", "end"),
+    [
+        (False, r"failed \(exit code -11\)"),
+        pytest.param(True, r"needs more than 0\.45 GB", marks=pytest.mark.slow),
+    ],
 )
 def test_a_crash_counts_as_lack_of_memory_only_if_that_task_took_it(crowded, end, monkeypatch):
     """After another child that took more than is free, from a process that has taken as much itself."""

@@ -20,9 +20,8 @@ from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.registration import HAND_HELD
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import BUILT_IN, make_solver
 from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import Progress, silent
@@ -211,19 +210,14 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
     )
     result = cross_validate(study)
     assert capsys.readouterr() == ("", "")
+    assert len(repr(result)) < 250
+    assert "\n" not in repr(result)
     row = result.table().loc["measured", "measured", "gp", ONE]
     assert (
         row["held_out_mae_sum_mm"]
         == result.cases["measured", "measured"].scores["gp"][ONE].held_out["mae_sum"].mean
     )
     assert np.isnan(row["from_fem_mean_mm"])  # fem is not in the study
-    with pytest.raises(UserError, match="there is no scheme 'two-out'"):
-        cross_validate(replace(study, schemes=["two-out"]))
-    with pytest.raises(UserError, match="a truth is for a simulated experiment"):
-        cross_validate(replace(study, truths=["stvk"]))
-    pulled = replace(study, measurements=None, truths=["mixed"], load=Load(displacement=(1.0, 0.0)))
-    with pytest.raises(UserError, match="truth mixed: a cylinder presses on the finger: prescribe a v"):
-        cross_validate(pulled)
 
 
 OWN_SCRIPT = """
@@ -231,8 +225,6 @@ import pinnray as pr
 from pinnray.solvers.fem.linear import FemSolver
 
 class Own(FemSolver):
-    name = {name!r}
-
     def solve(self, problem, progress=print):
         print("solved by the own class")
         return super().solve(problem)
@@ -242,16 +234,16 @@ pr.crossval("default", solvers, out="out", measurements="markers.csv", size=2, s
 """
 
 
-@pytest.mark.parametrize("name", ["fem", "own"])
-def test_a_class_of_the_calling_script_is_judged_beside_solvers_in_processes(tmp_path, observations, name):
-    """Also one that has the name of a built-in solver."""
+@pytest.mark.slow
+def test_a_class_of_the_calling_script_is_judged_beside_solvers_in_processes(tmp_path, observations):
+    """It has the name of a built-in solver."""
     write_measurements(tmp_path / "markers.csv", replace(observations, simulated=False))
-    (tmp_path / "script.py").write_text(OWN_SCRIPT.format(name=name))
+    (tmp_path / "script.py").write_text(OWN_SCRIPT)
     command = [sys.executable, "-W", "ignore", "script.py"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.stderr == ""
     assert "solved by the own class" in done.stdout
-    assert list(layouts_of(tmp_path / "out", "measured")["measured"]["solvers"]) == ["gp", name]
+    assert list(layouts_of(tmp_path / "out", "measured")["measured"]["solvers"]) == ["gp", "fem"]
 
 
 def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
@@ -283,15 +275,7 @@ def test_turned_pictures_are_told_and_cost_statfem_little(tmp_path, in_line):
     assert errors["turned"]["fem"] > errors["straight"]["fem"] + 0.1
 
 
-def test_a_frame_is_for_simulated_pictures(tmp_path, observations):
-    with pytest.raises(UserError, match="frame: the file of the measurements says how well"):
-        CrossvalStudy(
-            design=Design(),
-            variants=solver_variants([make_solver("gp")], Material()),
-            out=tmp_path,
-            frame=HAND_HELD,
-            measurements=replace(observations, simulated=False),
-        ).check()
+def test_every_seed_has_its_own_frame_of_the_pictures(tmp_path, observations):
     study = CrossvalStudy(design=Design(), variants=[], out=tmp_path, frame=HAND_HELD)
     turned = study.pressed_picture(observations.points, 0)
     np.testing.assert_allclose(np.abs(turned.values), [5.0, 1.0, 1.0, 0.02, 0.01, 0.01])

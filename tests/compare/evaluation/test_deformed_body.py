@@ -1,18 +1,15 @@
 """Bodies that are not finite, turned inside out, or go through themselves."""
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pinnray.cli import main
 from pinnray.comparison.evaluation.deformed_body import DeformedBody, with_body_checks
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.report.html_report import report_html
 from pinnray.comparison.report.output_files import metrics
-from pinnray.geometry import MeshSettings, finger_mesh, load_design
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 
@@ -114,14 +111,3 @@ def test_the_warning_names_all_and_the_simulated_finger(fem, pinn, mesh, compare
     assert f"<li>{named};" in report_html(comparison, [], {})
     small = moved(fem, mesh, lambda points: 0.01 * points)
     assert with_body_checks([small], mesh, truth=small) == ([small], [])
-
-
-def test_a_stroke_through_the_back_is_said_everywhere(tmp_path, capsys, without_pictures):
-    design, out = load_design(), tmp_path / "run"
-    markers = finger_mesh(design, settings=MeshSettings(size=2.0)).markers
-    rows = "".join(f"{x},{y},0,0\n" for x, y in markers)
-    (tmp_path / "still.csv").write_text(f"x_mm,y_mm,u_mm,v_mm\n{rows}")
-    options = ["--solvers", "fem", "--mesh-size", "2", "--measurements", str(tmp_path / "still.csv")]
-    assert main(["compare", *options, "--stroke", "60", "--out", str(out)]) == 0
-    assert f"warning: fem: {SELF}" in " ".join(capsys.readouterr().err.split())
-    assert SELF in json.loads((out / "metrics.json").read_text())["solvers"]["fem"]["message"]

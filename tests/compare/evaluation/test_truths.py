@@ -23,10 +23,8 @@ from pinnray.geometry.finger.section import rib_axes
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.wall_motion import WallMotion
-from pinnray.runtime.errors import UserError
-from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.registry import make_solver
-from tests.fingers import beam
 
 FULL = LoadCase("full", Load(), 1.0, 35.0)
 
@@ -58,32 +56,6 @@ def test_walls_are_redrawn_around_the_axes_of_the_ribs():
     assert TRUTHS["cylinder"].finger(drawn) is drawn
 
 
-def test_laws_and_loads_are_those_of_the_names():
-    problems = {
-        name: (truth.material(Material()), truth.load(10.0).model_dump(exclude_defaults=True))
-        for name, truth in TRUTHS.items()
-    }
-    laws = {name: (material.law, material.poisson) for name, (material, _) in problems.items()}
-    expected = {
-        "stvk": ("st-venant-kirchhoff", 0.45),
-        "gent": ("gent", 0.45),
-        "mixed": ("st-venant-kirchhoff", 0.42),
-    }
-    assert {name: laws[name] for name in expected} == expected
-    sliding = {"kind": "patch", "displacement": (None, -10.0)}
-    cylinder = {"kind": "cylinder", "radius": 10.0}
-    loads = {
-        **dict.fromkeys(("sliding", "stvk", "gent", "print", "base", "3d"), sliding),
-        "cylinder": cylinder,
-        "oblique": {"kind": "cylinder", "displacement": (3.0, -10.0), "radius": 20.0},
-        "mixed": cylinder,
-        "friction": {"kind": "patch", "displacement": (pytest.approx(-0.7), -10.0)},
-        "rubbing": {**cylinder, "friction": 0.5},
-        "sticking": {"kind": "patch"},
-    }
-    assert {name: problems[name][1] for name in loads} == loads
-
-
 def test_permitted_laws_and_walls_are_those_of_the_solvers_and_the_mesh(coarse_mesh):
     for name, laws in LAWS.items():
         assert {*laws} == {*make_solver(name).laws} - {"linear"}
@@ -97,25 +69,11 @@ def test_the_source_names_law_and_load(mesh):
     assert said.endswith("pressed in by 0.5 mm); no camera was involved")
 
 
-def test_a_drawing_has_the_truths_that_keep_its_walls():
-    drawn = beam()
-    possible = ", ".join(name for name, truth in TRUTHS.items() if truth.keeps_walls)
-    with pytest.raises(UserError, match=f"it can have {possible}$"):
-        TRUTHS["print"].finger(drawn)
-    assert TRUTHS["oblique"].finger(drawn) is drawn
-
-
-def test_walls_that_a_design_cannot_have_are_refused_with_the_name_of_the_truth():
-    tight = Design(rib_count=0, marker_layout="front", tip_length=87.0)
-    with pytest.raises(UserError, match=r"^truth base: no room for a cavity"):
-        TRUTHS["base"].finger(tight)
-
-
 @pytest.mark.usefixtures("few_elements")
 def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, coarse_mesh):
     """By hand, as before there were other truths; force and contact are those of the solution."""
-    found = true_field(study, SLIDING)
-    problem = Problem(finger_mesh(Design(), settings=MeshSettings(size=0.5)))
+    found = true_field(replace(study, mesh=MeshSettings(size=2.0)), SLIDING)
+    problem = Problem(finger_mesh(Design(), settings=MeshSettings(size=1.0)))
     solution = simulate(problem)
     points = body_quadrature(coarse_mesh).location.points
     np.testing.assert_allclose(found.sampled.displacement, solution.displacement(points), atol=1e-12)
@@ -123,6 +81,7 @@ def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, co
     assert (found.contact.middle, found.contact.width) == pytest.approx((35.0, 2.0))  # as designed
 
 
+@pytest.mark.slow
 def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_mesh):
     """The finger with the same walls on a coarse mesh of its own is near; at fixed points it would not be."""
     truth = TRUTHS["base"]

@@ -9,7 +9,6 @@ from matplotlib.collections import LineCollection
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.metrics import evaluated
 from pinnray.comparison.figures.gallery import draw
-from pinnray.comparison.report.html_report import report_html
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.mesh.mesher import build_mesh
@@ -91,14 +90,6 @@ def test_the_base_is_hatched_along_each_of_its_parts(comparison, pages):
         away = [np.linalg.norm(strokes[:, :1] - piece, axis=2).min(axis=1).max() for piece in pieces]
         assert min(away) < 0.3
         assert section.clearance(strokes[:, 1]).max() < 0
-
-
-def test_the_report_of_a_finger_without_parameters_has_its_facts_and_no_symbols() -> None:
-    text = report_html(compared(ring()), [], {})
-    facts = ("60 mm by 60 mm", "1 cavity", ring().section.digest, "The base is clamped (31.42 mm)")
-    assert [fact for fact in facts if fact not in text] == []
-    assert "<sub>tip</sub>" not in text
-    assert "<sub>tip</sub>" in report_html(compared(load_design("csiro")), [], {})
 
 
 def test_a_cylinder_stands_on_a_curved_front() -> None:

@@ -25,7 +25,7 @@ def job(tmp_path: Path, measured: Path, without_pictures: None, few_elements: No
     """`job(solver, ...)`: a small job with those solvers, changed by keyword."""
 
     def make(*solvers: Any, **changes: Any) -> Job:
-        mesh = MeshSettings(size=1.0)
+        mesh = MeshSettings(size=2.0)
         made = Job(Design(), solvers, mesh=mesh, measurements=measured, out=tmp_path / "out" / "run")
         return replace(made, **changes)
 

@@ -192,8 +192,8 @@ def test_any_history_ends_with_the_numbers_of_a_fresh_folder(
     run_state_machine_as_test(
         Histories,
         settings=settings(
-            max_examples=4,
-            stateful_step_count=10,
+            max_examples=3,
+            stateful_step_count=9,
             deadline=None,
             derandomize=True,
             database=None,

@@ -83,15 +83,6 @@ def test_it_asks_for_nothing_from_outside(content: Results, tmp_path: Path) -> N
     assert {link[0] for link in Page(html).values("href")} == {"#"}
 
 
-@pytest.mark.parametrize(
-    ("preset", "words"),
-    [("fast", "random hidden weights"), ("paper", "training"), ("trained", "all weights")],
-)
-def test_a_network_is_called_what_it_is(content: Results, preset: str, words: str) -> None:
-    text = page_of(content, settings={"fem": {}, "pinn-std": {"preset": preset}}).text
-    assert re.search(f"pinn-std: [^.]*{words}[^.]*\\(preset {preset}\\)", text)
-
-
 def test_measured_displacements_are_not_called_simulated(content, observe, fem):
     assert "simulated" in page_of(content).values("id")
     page = page_of(content, observations=observe(fem.marker_displacement, simulated=False, hidden=(0,)))
@@ -161,10 +152,6 @@ def test_refinement_is_told_round_by_round(content, mesh, tolerance, warned):
     assert {"adapt"} <= set(page.values("id"))
     assert ("not-adapted" in page.values("id")) is warned
     assert "1 250 160 0.00045 10.0 %" in page.text
-
-
-def test_a_single_solver_is_compared_with_nothing(content: Results, fem: Evaluation) -> None:
-    assert "nothing to compare it with" in page_of(content, evaluations=[fem]).text
 
 
 def test_what_a_solver_found_is_told_apart_from_its_other_numbers() -> None:

@@ -13,7 +13,6 @@ from pinnray.comparison.report.output_files import metrics
 from pinnray.comparison.report.summary import RunAnswer, answers
 from pinnray.comparison.report.text import truth_sentences
 from pinnray.geometry.observations import Observations
-from pinnray.solvers.solution import Estimated, IdentifiedForce
 
 TRUST, MARKERS = "May the network be trusted here?", "Did the markers help?"
 CONVERGED = "What is not converged?"
@@ -73,33 +72,6 @@ def test_stress_and_force_are_answered_where_they_are_known(compared, fem, given
     assert "simulated body" in answer.verdict
 
 
-@pytest.mark.parametrize(("low", "word"), [(0.4, "inside"), (0.6, "outside")])
-def test_a_found_force_has_its_interval(compared, fem, given, evaluate, low, word):
-    found = replace(given, identified=IdentifiedForce(Estimated(0.5, low, 0.8), Estimated(36.0, 35.0, 37.5)))
-    sentences = asked(compared(fem, found, truth=evaluate("fem-nonlinear", 1.0)))[MARKERS].sentences
-    said = sentences[-1].replace("\N{NO-BREAK SPACE}", " ")
-    assert f"0.500 N/mm (95 % interval {low:.3f} to 0.800), 10.0 N over the depth of 20 mm" in said
-    assert "at x = 36.0 mm (35.0 to 37.5 mm)" in said
-    assert f"that of the simulated finger is 0.500, {word} it." in sentences[-1]
-
-
-def test_what_raised_an_exception_or_was_left_out_is_named(compared, fem):
-    answer = asked(compared(fem), failed={"mine": "it broke"}, unsupported={"gp": "no markers"})[CONVERGED]
-    assert answer.verdict == "1 of 2 solvers: mine."
-    assert {"mine failed: it broke.", "gp was left out: no markers."} <= set(answer.sentences)
-
-
-@pytest.mark.parametrize(("converged", "twin"), [(True, True), (False, True), (True, False)])
-def test_a_network_stands_beside_its_twin_whether_both_converged_or_not(
-    compared, fem, given, evaluate, converged, twin
-):
-    network = evaluate("pinn-asm", 1.02, converged=converged)
-    network = replace(network, in_sample=True, left_out=given.left_out, twin="fem-asm")
-    sentences = asked(compared(fem, replace(given, converged=twin), network))[TRUST].sentences
-    name = "fem-asm" if twin else "fem-asm (not converged)"
-    assert any(f"{name}, its twin by finite elements, 0.100 mm" in said for said in sentences)
-
-
 def test_what_the_markers_change_is_told_of_displacement_stress_and_force(fem, pinn, compared):
     """The truth is the reference times 1.1; the stress of the solver that was given markers is tripled."""
     given = replace(pinn, in_sample=True, von_mises=3 * pinn.von_mises)
@@ -108,22 +80,6 @@ def test_what_the_markers_change_is_told_of_displacement_stress_and_force(fem, p
     told = [("0", "nearer"), ("200", "farther"), ("0", "nearer")]
     assert re.findall(r"([\d.]+)\xa0% \((\w+)\)", changed) == told
     assert re.findall(r": ([^.]+)\.", answer) == ["pinn-std", "none", "pinn-std"]
-
-
-def test_a_solver_without_a_force_is_neither_nearer_nor_farther_in_it(compared, fem, given, pinn, evaluate):
-    """In words and in the table; one with a force is still judged."""
-    without = replace(given, reaction=np.full(2, np.nan))
-    truth = evaluate("fem-nonlinear", 1.5)
-    alone = asked(compared(fem, without, truth=truth))[MARKERS]
-    assert alone.verdict.endswith(
-        "over the simulated body in displacement fem-asm, in von Mises stress fem-asm."
-    )
-    assert alone.table.rows[1][-1] == "–"
-    both = asked(compared(fem, without, replace(pinn, in_sample=True), truth=truth))[MARKERS]
-    assert both.verdict.endswith("in force only pinn-std.")
-    *_, changed, answer = truth_sentences(compared(fem, without, truth=truth))
-    assert changed.endswith("(nearer), force –.")
-    assert answer.endswith("Nearer in the indenter's force: unknown.")
 
 
 def test_there_is_nothing_to_say_without_a_truth_or_a_solver_with_markers(fem, pinn, compared):

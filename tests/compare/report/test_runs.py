@@ -62,15 +62,6 @@ def test_several_runs_are_one_page_and_one_table(save: Save, tmp_path: Path) -> 
     assert "simulated" in html
 
 
-def test_held_out_and_given_errors_are_in_tables_of_their_own(save: Save, tmp_path: Path) -> None:
-    main(["report", str(save("first")), str(save("second")), "--out", str(tmp_path / "both")])
-    html = (tmp_path / "both" / "runs.html").read_text(encoding="utf-8")
-    given = re.search(r"<caption>Errors at markers that the solver was given.*?</table>", html, re.DOTALL)
-    assert given is not None
-    assert "fem-asm" in given.group()
-    assert "pinn-std" not in given.group()
-
-
 def test_what_differs_between_runs_is_named(save: Save) -> None:
     runs = read_runs([save("first"), save("second", seed=7)])
     assert differing_settings(runs).rows == [["seed pinn-std", "0", "7"]]
@@ -157,12 +148,3 @@ def test_a_run_that_lacks_a_number_is_one_line(save, capsys, solver, key, value)
     write_json(folder / "metrics.json", content)
     assert main(["report", str(folder)]) == 2
     assert "metrics.json is damaged: a number is missing" in capsys.readouterr().err
-
-
-def test_a_report_needs_a_run_and_a_free_name(save, tmp_path, capsys):
-    runs = [str(save("first")), str(save("second"))]
-    lone = [runs[0], "--out", str(tmp_path / "both")]
-    for arguments in ([], lone, [*runs, "--out", f"{runs[0]}/run.json"]):
-        assert main(["report", *arguments]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
-    assert not (tmp_path / "both").exists()

@@ -8,7 +8,7 @@ import pytest
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import RIGID, marker_errors, reference_differences
+from pinnray.comparison.evaluation.metrics import RIGID
 from pinnray.comparison.report.output_files import metrics
 from pinnray.comparison.report.tables import (
     PRINTED,
@@ -87,35 +87,6 @@ def test_the_held_out_error_of_a_single_marker_is_there(tmp_path, fem, observati
     assert float(last["fem-asm_held_out_ae_u_mm"]) == pytest.approx(0.3)
     assert first["silent_held_out_ae_u_mm"] == ""
     assert first["fem_held_out_ae_u_mm"] == first["fem_ae_u_mm"]  # it was given none
-
-
-def test_the_summary_holds_the_metrics(summary, fem, failed, observations):
-    row, errors = summary[1], marker_errors(failed, observations)
-    differences = reference_differences(failed, fem)
-    assert float(row["mae_sum_mm"]) == errors.mae_sum
-    assert float(row["mae_rss_mm"]) == errors.mae_rss
-    assert float(row["to_reference_displacement_rel_l2"]) == differences.displacement.rel_l2
-    assert float(row["to_reference_von_mises_p95_MPa"]) == differences.von_mises.p95
-    assert float(row["to_reference_stress_xy_mean_MPa"]) == differences.stress["xy"].mean
-    assert float(row["to_reference_strain_xy_rel_l2"]) == differences.strain["xy"].rel_l2
-    assert float(row["reaction_v_N_per_mm"]) == -1.5
-    assert (row["converged"], row["status"]) == ("0", failed.message)
-
-
-def test_a_solver_that_was_given_the_markers_is_marked_in_every_table(
-    fem, pinn, observations, compared, tmp_path
-):
-    told = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125)
-    write_summary(tmp_path / "t.csv", compared(fem, told))
-    row = rows_of(tmp_path / "t.csv")[1]
-    assert (float(row["held_out_mae_sum_mm"]), row["in_sample"]) == (0.25, "1")
-    given = [fem, replace(pinn, in_sample=True)]
-    write_summary(tmp_path / "s.csv", compared(*given))
-    write_markers(tmp_path / "m.csv", compared(*given))
-    assert [row["in_sample"] for row in rows_of(tmp_path / "s.csv")] == ["0", "1"]
-    assert {(row["fem_in_sample"], row["pinn-std_in_sample"]) for row in rows_of(tmp_path / "m.csv")} == {
-        ("0", "1")
-    }
 
 
 def test_the_distance_from_the_truth_is_there_if_the_markers_are_simulated(

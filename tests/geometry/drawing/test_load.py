@@ -227,13 +227,6 @@ def test_drawn_fingers_are_meshed(path):
     np.testing.assert_allclose(mesh.markers, finger.markers, atol=1e-9)
 
 
-def test_lines_of_a_command_beat_those_of_a_file(tmp_path):
-    path = tmp_path / "a.toml"
-    path.write_text("contact = [1, 2]\nclamp = [[0, 0], [0, 1]]")
-    found = load_description(path, ["contact = [3, 4]", "markers = 4"])
-    assert (found.contact, found.markers, found.clamp) == ((3, 4), 4, (((0, 0), (0, 1)),))
-
-
 def test_a_drawing_of_which_all_is_called_front_is_read(tmp_path):
     """What is named may lie on the boundary, but here it is the boundary."""
     path = write_svg(tmp_path / "a.svg", '<g id="front"><rect width="60" height="9"/></g>')

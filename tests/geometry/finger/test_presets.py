@@ -7,12 +7,6 @@ import pytest
 from pinnray.geometry import Design, load_design, parse_overrides, preset_names
 
 
-def test_default_comes_first_of_at_least_four_presets() -> None:
-    names = preset_names()
-    assert names[0] == "default"
-    assert {"slender", "stiff", "many-ribs"} <= set(names)
-
-
 @pytest.mark.parametrize("name", preset_names())
 def test_preset_is_admissible_and_has_its_file_name(name: str) -> None:
     assert load_design(name).name == name

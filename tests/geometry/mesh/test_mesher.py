@@ -151,7 +151,7 @@ def random_design(seed: int) -> Design:
             continue
 
 
-@pytest.mark.parametrize("seed", [1, 4, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 2, 3))])
+@pytest.mark.parametrize("seed", [4, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 1))])
 def test_random_admissible_design_meshes(seed: int) -> None:
     design = random_design(seed)
     mesh = build_mesh(design, MeshSettings(size=2, coarsening=2))

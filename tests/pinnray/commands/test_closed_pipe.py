@@ -44,7 +44,7 @@ def unread(code: str, words: str, *streams: str) -> subprocess.CompletedProcess[
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        (COMMAND, "solvers"),  # a table by Rich
+        pytest.param(COMMAND, "solvers", marks=pytest.mark.slow),  # a table by Rich
         pytest.param(COMMAND, "--help", marks=pytest.mark.slow),  # by Cyclopts
         pytest.param(COMMAND, "mesh --mesh-size 3 --out {out}", marks=pytest.mark.slow),  # by print
         (LONG, ""),

@@ -27,9 +27,12 @@ def is_number(cell):
     return True
 
 
-def test_one_and_two_ranks_give_the_same_tables(start_ranks, tmp_path, few_elements, without_pictures):
+def test_one_and_two_ranks_give_the_same_tables(
+    start_ranks, tmp_path, monkeypatch, few_elements, without_pictures
+):
     """To 1e-8 mm: the order of sums differs."""
     assert main([*SMALL.split(), "--out", str(tmp_path / "1")]) == 0
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))  # empty, so that the ranks mesh, too
     program = FEW_ELEMENTS + WITHOUT_PICTURES
     process = start_ranks(2, "-c", program, *SMALL.split(), "--out", str(tmp_path / "2"))
     output, errors = process.communicate()

@@ -48,11 +48,6 @@ def test_a_picture_comes_through_a_pipe(monkeypatch, capsys):
     assert "3 circles" in capsys.readouterr().out
 
 
-def test_a_colour_that_much_else_has_is_warned_of(capsys):
-    assert main(["pick", "shots", "--at", "10,10"]) == 0
-    assert "warning: 100% of the image has this colour" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("options", "warned"),
     [

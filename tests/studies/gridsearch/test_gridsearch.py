@@ -204,20 +204,12 @@ def test_an_interrupted_search_goes_on_where_it_was(wanted, scripted):
     assert trained == [third, GridPoint(1e-2, 10.0)]
 
 
-@pytest.mark.parametrize(
-    ("changes", "names"),
-    [
-        ({"study": study({**TINY, "epochs": 3})}, "study.settings"),
-        ({"mesh": MeshSettings(size=1.5)}, "mesh.size"),
-        ({"finger": Design(height=80.0)}, "finger.height"),
-    ],
-)
-def test_another_search_in_the_same_folder_is_refused(wanted, scripted, changes, names):
+def test_another_search_in_the_same_folder_is_refused(wanted, scripted):
     scripted(distance)
     search_grid(wanted)
     before = (wanted.out / "gridsearch.json").read_text()
-    with pytest.raises(UserError, match=rf"holds a grid search with other settings \({names}"):
-        search_grid(replace(wanted, **changes))
+    with pytest.raises(UserError, match=r"holds a grid search with other settings \(mesh.size"):
+        search_grid(replace(wanted, mesh=MeshSettings(size=1.5)))
     assert (wanted.out / "gridsearch.json").read_text() == before
 
 

@@ -1,13 +1,9 @@
 """A sweep as a whole: nothing lost, nothing twice, failures told, and the command."""
 
-import os
 import shutil
-import signal
 import sqlite3
 import subprocess
 import sys
-import time
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -35,7 +31,7 @@ from pinnray.studies.sweep.study import load_study
 from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
 from pinnray.studies.sweep.tables import failure_grid, sample_table
 from pinnray.studies.sweep.workers import Workers
-from tests.pinnray.commands.programs import COMMAND
+from tests.conftest import inline
 from tests.studies.sweep.workers import answered, die_at_one, hang_at_one
 
 STUDY = """
@@ -105,37 +101,15 @@ def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: 
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a sweep of six samples, one of whose workers was killed."""
+    """The folder of a sweep of six samples."""
     folder = tmp_path_factory.mktemp("sweep")
-    study = study_file(folder, 6)
-    out = folder / "out"
-    process = subprocess.Popen(
-        [sys.executable, "-c", COMMAND, "sweep", str(study), "--out", str(out), "--processes", "2"],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    killed: set[int] = set()
-    while process.poll() is None:  # at its start
-        if not killed and (workers := children(process.pid)):
-            with suppress(ProcessLookupError):
-                os.kill(min(workers), signal.SIGKILL)
-            killed.add(min(workers))
-        time.sleep(0.1)
-    assert process.stderr is not None
-    assert process.returncode == 0, process.stderr.read()
-    assert killed
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pinnray.runtime.processes.pool.Pool.answers", inline)
+        assert main(["sweep", str(study_file(folder, 6)), "--out", str(folder / "out")]) == 0
     return folder
 
 
-def children(parent: int) -> set[int]:
-    """Worker processes of a sweep."""
-    listed = subprocess.run(
-        ["pgrep", "-P", str(parent), "-f", "pinnray.runtime.processes"], capture_output=True, text=True
-    )
-    return {int(word) for word in listed.stdout.split()}
-
-
-def test_the_death_of_a_worker_loses_no_sample(swept: Path) -> None:
+def test_every_sample_is_kept(swept: Path) -> None:
     sweep = load_sweep(swept / "out")
     assert [each.number for each in sweep.measurements] == list(range(6))
     assert {each.state for each in sweep.measurements} == {"done"}
@@ -166,6 +140,7 @@ def test_a_second_start_goes_on_and_does_nothing_twice(swept, tmp_path, in_line)
     after = run_sweep(StudyJob(study, tmp_path, out, 1)).measurements
     assert after[:6] == before
     assert [each.number for each in after] == list(range(8))
+    assert "failed" not in {each.state for each in after}
 
 
 def test_another_name_or_marker_does_the_same_study(swept: Path, tmp_path: Path) -> None:
@@ -193,7 +168,9 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("ending", "limit", "state", "said"),
     [
-        (hang_at_one, 8.0, "not converged", "stopped at the time limit"),
+        pytest.param(
+            *(hang_at_one, 8.0, "not converged", "stopped at the time limit"), marks=pytest.mark.slow
+        ),
         (die_at_one, 500.0, "failed", "its worker process died"),
     ],
 )

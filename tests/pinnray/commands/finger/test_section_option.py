@@ -55,12 +55,6 @@ def test_design_says_that_a_size_is_a_guess(tmp_path: Path, capsys: pytest.Captu
     assert "(assumed" in (tmp_path / "out" / "beam.toml").read_text()
 
 
-def test_solve_works_on_a_drawing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--solver", "fem", "--mesh-size", "1", "--out", str(tmp_path / "u.vtu")]
-    assert main(["solve", "--section", str(drawing(tmp_path)), *options]) == 0
-    assert "energy" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("line", "own"),
     [
