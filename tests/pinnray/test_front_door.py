@@ -64,7 +64,7 @@ def test_the_report_is_one_file(comparison: pr.Comparison, tmp_path: Path, monke
     chosen = {name: GALLERY[name] for name in ("overlay", "mesh")}
     monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", chosen)
     text = comparison.report(tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "data:image/png;base64," in text
+    assert "data:image/webp;base64," in text  # the large ones
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
