@@ -5,6 +5,7 @@ import pytest
 from benchmarks.reliability import drawings, inputs
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_elements")
 def test_random_input_gives_a_result_or_one_line() -> None:
     found = inputs.tried(24)

@@ -79,6 +79,7 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     assert "holds a cross-validation with other settings (noise_mm)" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_layouts_sample_one_truth_and_stay_apart(tmp_path, in_line):
     """`fem` has one field, so its distance from the truth is the same; its errors at markers are not."""
     line = "--solvers fem,gp --schemes one-out --seeds 1"
@@ -100,6 +101,7 @@ def test_layouts_sample_one_truth_and_stay_apart(tmp_path, in_line):
     assert layouts_of(tmp_path) == {"front": layouts["front"]}
 
 
+@pytest.mark.slow
 def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
     """`fem` has one field: the same error in all truths would mean that there is one."""
     line = "--truth cylinder,base --solvers fem,gp --schemes one-out --seeds 1"

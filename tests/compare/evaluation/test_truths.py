@@ -101,6 +101,7 @@ def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_me
     assert fixed["von_mises"] > 2 * moved["von_mises"]  # 0.14 and 0.036, which is the coarse mesh's error
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_elements")
 def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkeypatch):
     truth = TRUTHS["cylinder"]

@@ -143,6 +143,7 @@ def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache
     assert not cache.exists()
 
 
+@pytest.mark.slow
 def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, monkeypatch):
     """It is sampled on the shared mesh, and differs from plane strain as the depth makes it differ."""
     monkeypatch.setattr("pinnray.comparison.evaluation.truths.SOLID_SIZE", 2.5)

@@ -51,6 +51,7 @@ def pages(comparison: Results) -> dict[str, Page]:
     return {name: page_of(draw(comparison, name).figure) for name in names}
 
 
+@pytest.mark.slow
 def test_no_type_runs_into_other_type_or_leaves_the_page(pages):
     for name, page in pages.items():
         assert (name, page.cut_off(), page.overlaps()) == (name, [], [])

@@ -57,6 +57,7 @@ def pages(drawings: dict[str, Illustration]) -> dict[str, Page]:
     return {name: page_of(drawing.figure) for name, drawing in drawings.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
     """In letters, not in pixels; and the same file every time."""

@@ -28,6 +28,7 @@ def filmed(folder):
         return [frame.image for frame in frames]
 
 
+@pytest.mark.slow
 def test_it_films_the_virtual_experiment_that_compare_takes_for_measurements(folder):
     truth = read_measurements(folder / "observations_true.csv", marker_radius=0.8)
     assert truth.simulated

@@ -34,6 +34,7 @@ def tracked(film, tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_a_video_becomes_measurements_within_hundredths_of_a_millimetre(film, tracked):
     found, true = (
         read_measurements(path, marker_radius=0.8)

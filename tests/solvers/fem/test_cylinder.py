@@ -86,6 +86,7 @@ def rough(coarse_mesh):
     return FemNonlinearSolver().solve(Problem(coarse_mesh, Material(law="neo-hookean"), load))
 
 
+@pytest.mark.slow
 def test_friction_takes_the_finger_along(pressed, rough):
     """The finger bends and slides toward its base: friction holds it back, and the work done is more."""
     assert rough.status.converged

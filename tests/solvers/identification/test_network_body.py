@@ -158,6 +158,7 @@ def test_walls_that_overlap_are_inside_out(body, state, changes):
     assert body.linearised(-1e3 * state, LAME, changes) is None
 
 
+@pytest.mark.slow
 def test_a_state_is_carried_to_a_finer_network(mesh, motion, state):
     """The finer network's functions include nothing of the coarser's; both are within 2 % of each other."""
     coarse, fine = body_of(mesh, motion), body_of(mesh, motion, scale=0.8)

@@ -27,6 +27,7 @@ def test_the_command_writes_table_and_picture(tmp_path, capsys):
     assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_force_on_the_way_is_refused_where_it_is_not_in_proportion_to_the_load(tmp_path, capsys):
     law = ["--law", "neo-hookean", "--out", str(tmp_path / "found.csv")]
     assert main([*COARSE, *law, "--figure", "force_25"]) == 2
