@@ -4,7 +4,7 @@ BIN := .venv/bin
 # Without compiled modules each of the tests' many processes would compile what it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup setup-tests compare test test-all coverage docs verification lint format bench sbom clean
+.PHONY: help setup setup-tests compare test test-all test-release coverage docs verification lint format bench sbom clean
 .DEFAULT_GOAL := help
 
 help: ## list these targets
@@ -23,11 +23,14 @@ compare: setup ## the main job: compare all solvers on the default finger
 # names the last files are many and quick, so that no worker waits long for the other one's last.
 PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -n $(or $(WORKERS),$(shell nproc)) --dist loadfile --no-loadscope-reorder
 
-test: setup-tests ## run the quick tests, some six minutes on two cores
-	$(PYTEST) -m "not slow" $(ARGS)
+test: setup-tests ## run the quick tests, some four minutes on two cores
+	$(PYTEST) -m "not slow and not release" $(ARGS)
 
 test-all: setup-tests ## run all tests, as CI does
-	$(PYTEST) $(ARGS)
+	$(PYTEST) -m "not release" $(ARGS)
+
+test-release: setup-tests ## run what judges a release: notebooks, licences and advisories of all packages
+	$(PYTEST) -m release $(ARGS)
 
 # ARGS=linkcheck asks the network whether the links to other sites are alive.
 docs: setup ## build the documentation site, build/docs/html
@@ -49,7 +52,7 @@ format: setup ## mend style and format as far as ruff can
 
 coverage: setup-tests ## run all tests and report the branches that none takes: build/coverage
 	rm -rf build/coverage
-	OMP_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n $(or $(WORKERS),$(shell nproc)) --dist loadfile $(ARGS)
+	OMP_NUM_THREADS=1 $(BIN)/coverage run -m pytest -m "not release" -n $(or $(WORKERS),$(shell nproc)) --dist loadfile $(ARGS)
 	$(BIN)/coverage combine -q
 	$(BIN)/coverage html -q -d build/coverage/html
 	$(BIN)/coverage report --skip-covered | tail -40

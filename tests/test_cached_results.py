@@ -28,6 +28,7 @@ def keyed_modules() -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_every_kind_of_cached_result_has_a_key():
     assert {module.rpartition(".")[0] for module in keyed_modules()} == {
         "pinnray.geometry",  # meshes, CAD, drawings

@@ -460,11 +460,13 @@ def test_the_docs_have_every_cad_file(tmp_path):
     assert_same(documented, [path.name for path in tmp_path.iterdir()])
 
 
+@pytest.mark.slow
 def test_the_docs_have_every_output_file(run_folder):
     actual = [path.relative_to(run_folder).as_posix() for path in run_folder.rglob("*") if path.is_file()]
     assert_same(names(table(FILES, "file")), actual)
 
 
+@pytest.mark.slow
 def test_the_docs_have_every_key_of_metrics(run_folder):
     def paths(value: object, prefix: str = "") -> list[str]:
         if not isinstance(value, dict):
@@ -476,6 +478,7 @@ def test_the_docs_have_every_key_of_metrics(run_folder):
     assert_same(names(table(REFERENCE / "metrics.md", "key")), actual)
 
 
+@pytest.mark.slow
 def test_the_docs_have_every_field(run_folder):
     import pyvista
 
@@ -484,6 +487,7 @@ def test_the_docs_have_every_field(run_folder):
     assert set(re.findall(r"`(\w+)`", text)) == {*grid.point_data.keys(), *grid.cell_data.keys()}
 
 
+@pytest.mark.slow
 def test_observations_of_a_run_are_measurements(run_folder):
     with (run_folder / "observations.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))

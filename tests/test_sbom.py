@@ -31,7 +31,7 @@ print(json.dumps({canonical(name): version(name) for name in names}))
 """Prints what a fresh process can import, of two versions the one that it does."""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_list_has_every_installed_package_and_no_licence_that_forbids_its_use(tmp_path):
     recipe = re.search(r"cyclonedx-bom==\S+", MAKEFILE.read_text(encoding="utf-8"))
     assert recipe
@@ -56,7 +56,7 @@ JUDGED: set[str] = set()
 """Advisories that do not concern what this project does with the package, each with a reason here."""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_no_locked_release_has_an_advisory_or_was_withdrawn():
     locks = [path.read_text(encoding="utf-8") for path in (ROOT / "requirements").glob("debian*.txt")]
     locked = {pair for text in locks for pair in re.findall(r"^([\w.-]+)==([^\s;+]+)", text, re.MULTILINE)}

@@ -37,7 +37,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
             compile(cell["source"], str(file), "exec")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=id_of)
 def test_notebooks_run(page, tmp_path, monkeypatch, without_pictures, in_line):
     monkeypatch.chdir(tmp_path)

@@ -65,6 +65,7 @@ def test_a_linear_solver_goes_straight(coarse_mesh, finger):
     assert rows[0]["position_mm"] == ""
 
 
+@pytest.mark.slow
 def test_the_rig_writes_the_force_beside_the_film(tmp_path):
     options = "--mesh-size 1 --size 480x270 --rest 2 --moving 2 --held 2"
     assert main(["rig", *options.split(), "--out", str(tmp_path / "film")]) == 0

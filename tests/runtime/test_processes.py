@@ -135,6 +135,7 @@ def test_every_task_is_answered_and_reports_under_its_name():
     assert sorted(said) == [(f"task {number}", 0.5, f"halving {number}") for number in range(3)]
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_without_an_answer_does_not_stop_the_others(capfd):
     answers = answers_of(ended, {"a": 1, "b": 2, "c": 3})
     assert answers == {"a": ProcessFailed(-signal.SIGKILL), "b": ProcessFailed(1), "c": 1.0}

@@ -62,6 +62,7 @@ def test_a_result_is_made_once_and_is_gone_outside():
         assert shared("c", lambda: 1) == 1
 
 
+@pytest.mark.slow
 def test_markers_cost_no_factorisation_where_the_network_without_them_was_solved(observed, factorisations):
     plain = replace(observed, observations=None)
     with SharedWork().used():
@@ -78,6 +79,7 @@ def test_markers_cost_no_factorisation_where_the_network_without_them_was_solved
     assert np.abs(found.displacement(points) - without.displacement(points)).max() > 0.1
 
 
+@pytest.mark.slow
 def test_solvers_of_the_linear_law_share_one_factorisation_of_the_body(observed, monkeypatch):
     """The solution, the figures at rest, unit displacements and the certificate: with the numbers of each."""
     made: list[object] = []
@@ -103,6 +105,7 @@ def test_solvers_of_the_linear_law_share_one_factorisation_of_the_body(observed,
     assert len(made) > 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("solver", "load"),
     [

@@ -42,6 +42,7 @@ def bent_force(problem):
     return np.pi**2 * modulus * WIDTH**3 / 12 / (2 * HEIGHT) ** 2 * (1 + STROKE / (2 * HEIGHT))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "solver", [FemNonlinearSolver(), pytest.param(LOCAL, marks=pytest.mark.slow)], ids=["fem", "network"]
 )

@@ -83,6 +83,7 @@ def test_fem_itself_has_no_excess_and_nothing_out_of_balance(finger, load):
     assert np.nanmax([certificate.base, *certificate.load]) < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
 def test_energies_of_any_displacement_against_another_program(finger, load):
     """Pythagoras: excess and violation are the energy of the difference from `fem`, which scikit-fem has too.

@@ -89,6 +89,7 @@ def test_the_truth_is_the_simulated_field_on_the_mesh_and_is_kept(problem, solut
     assert (second.source, second.simulated) == (first.source, first.simulated)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "simulations"),
     [

@@ -17,6 +17,7 @@ DESIGNS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
 def test_a_drawing_has_every_dimension_and_none_overlaps(design: Design) -> None:
     page = page_of(draw_design(design))

@@ -135,6 +135,7 @@ def test_fields_are_drawn_here_where_a_second_process_would_not_help(comparison,
             assert beside is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_no_text_leaves_the_page_or_runs_into_another(name, drawings, pages):
     assert drawings[name].caption.endswith(".")
@@ -160,6 +161,7 @@ def test_a_solver_that_failed_is_marked(name: str, pages: dict[str, Page]) -> No
     assert "fem-nonlinear (not converged)" in pages[name].text
 
 
+@pytest.mark.slow
 def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(fem, pinn, observations, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     untold = replace(told, solver="pinn-x", left_out=None)

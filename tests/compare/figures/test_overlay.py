@@ -18,6 +18,7 @@ from tests.compare.conftest import BendingField, closed_form
 from tests.compare.figures.drawn_pages import page_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True], ids=["fixed", "the picture's frame was found"])
 def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_markers(
     mesh, compared, monkeypatch, turned

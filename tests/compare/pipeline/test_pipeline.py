@@ -275,6 +275,7 @@ def test_a_run_without_the_solver_that_it_needs_ends_in_one_line(job, reference)
         compare(job(*solvers, reference=reference))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [

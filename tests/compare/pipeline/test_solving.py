@@ -109,6 +109,7 @@ def test_the_fault_of_a_solver_in_the_second_process_is_kept_for_the_reader(solv
     assert "raise ZeroDivisionError" in (tmp_path / "2" / "errors" / "faulty.txt").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "changes", "message"),
     [

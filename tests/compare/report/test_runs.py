@@ -118,6 +118,7 @@ def test_a_number_that_is_null_is_no_number(truthful, capsys, solvers):
     assert {row["force_N_per_mm"] for row in rows} == {""}
 
 
+@pytest.mark.slow
 def test_each_number_alone_may_be_null(truthful):
     content = json.loads((truthful / "metrics.json").read_text(encoding="utf-8"))
 

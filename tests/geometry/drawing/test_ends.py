@@ -33,6 +33,7 @@ def shoelace(corners: np.ndarray) -> float:
     return float(0.5 * abs((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [1e-2, 1.1e-3, 9e-4, 3e-4])
 def test_lines_shorter_than_the_tolerance_stay(tmp_path, step):
     corners = fine_beam(step)

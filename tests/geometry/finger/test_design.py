@@ -48,6 +48,7 @@ def printed_ranges(message: str) -> dict[str, tuple[float | None, float | None]]
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("values", "name"), BAD_DESIGNS)
 def test_the_ranges_that_the_refusal_of_a_design_gives_are_true(values: dict[str, object], name: str) -> None:
     message = message_of(values)

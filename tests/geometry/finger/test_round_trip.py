@@ -22,6 +22,7 @@ def design_of(options: list[str]) -> Design:
     return load_design("csiro" if "csiro" in options else "default", changes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", FINGERS.values(), ids=FINGERS)
 def test_every_export_is_read_back_as_the_same_finger(options: list[str], tmp_path: Path) -> None:
     design = design_of(options)

@@ -37,6 +37,7 @@ def test_saved_mesh_is_read_back_the_same(default_mesh: TriangleMesh, tmp_path: 
     assert TriangleMesh.load(tmp_path / "mesh.npz").digest == default_mesh.digest
 
 
+@pytest.mark.slow
 def test_random_points_in_triangles_are_found(mesh: TriangleMesh) -> None:
     rng = np.random.default_rng(5)
     cells = rng.integers(len(mesh.triangles), size=2000)

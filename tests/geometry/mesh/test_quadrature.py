@@ -28,6 +28,7 @@ def test_rule_is_not_exact_above_its_degree(degree: int, rule: int) -> None:
     assert abs(weights @ points[:, 1] ** degree - exact) > 1e-6
 
 
+@pytest.mark.slow
 def test_weights_over_the_body_sum_to_its_area(mesh: TriangleMesh) -> None:
     for degree in DEGREES:
         assert body_quadrature(mesh, degree).weights.sum() == pytest.approx(mesh.areas.sum(), rel=1e-13)

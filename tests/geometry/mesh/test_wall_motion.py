@@ -21,6 +21,7 @@ def distance_from_boundary(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray
     return np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["front_thickness", "back_thickness", "rib_thickness", "base_thickness"])
 @pytest.mark.parametrize("fillet", [0.0, 0.8])
 def test_the_moved_boundary_is_that_of_the_thicker_wall(name, fillet):

@@ -330,6 +330,7 @@ def test_a_home_that_cannot_be_written_is_not_needed(folder, tmp_path_factory):
 # A solver of another package
 
 
+@pytest.mark.slow
 def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder, monkeypatch, capsys, without_pictures):
     monkeypatch.syspath_prepend(str(plugin_folder))
     options = "--solvers fem,skfem-p2 --mesh-size 1.0 --measurements good.csv --json"

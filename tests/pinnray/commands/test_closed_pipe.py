@@ -56,6 +56,7 @@ def test_a_closed_pipe_ends_a_command_quietly(code, words, tmp_path):
     assert re.sub(r"mesh: .* s\n", "", done.stderr) == ""  # a line of progress
 
 
+@pytest.mark.slow
 def test_so_does_a_closed_pipe_of_messages():
     assert unread(COMMAND, "mesh --set height=1", "stdout", "stderr").returncode == 141
 

@@ -21,6 +21,7 @@ def test_every_command_can_be_quiet(name):
     assert "--quiet" in [each.name for each in pinnray[name].assemble_argument_collection()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "files"),
     [

@@ -170,6 +170,7 @@ def test_what_cannot_be_tracked_is_one_line_and_writes_nothing(kind, film, tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["source"]
 
 
+@pytest.mark.slow
 def test_compare_goes_from_pixels_to_the_table(film, tmp_path, without_pictures):
     out = tmp_path / "out"
     options = ["--solvers", "fem", "--mesh-size", "1", "--camera", str(film / "camera.json")]

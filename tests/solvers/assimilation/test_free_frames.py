@@ -73,6 +73,7 @@ def test_frames_are_those_of_the_joint_normal_distribution(problem):
     np.testing.assert_allclose(covariance, expected, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["statfem", "gp"])
 def test_a_turned_picture_is_found(problem, solver):
     """`gp` knows of it only by the base at rest."""
@@ -116,6 +117,7 @@ def test_a_marker_left_out_is_predicted_in_its_picture(problem, solver):
     assert fixed.uncertainty.shown is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weights", ["paper", "precision"])
 def test_the_frames_of_fem_asm_are_those_of_the_least_energy_plus_misfit(problem, weights):
     """Half the squared standardised values times the scale is the frames' part of it."""

@@ -130,6 +130,7 @@ def test_reaction_does_the_work(solution):
     assert solution.reaction[1] < 0
 
 
+@pytest.mark.slow
 def test_twice_the_travel_is_twice_the_displacement(solver, solution, short_mesh):
     linear = solution.problem.material.law == "linear"
     travels = (2.0, 4.0) if linear else (0.01, 0.02)

@@ -29,6 +29,7 @@ def relative(difference, reference):
     return np.linalg.norm(difference) / np.linalg.norm(reference)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("loads", "factorisations"),
     [

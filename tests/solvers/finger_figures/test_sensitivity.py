@@ -33,6 +33,7 @@ def solved(problem: Problem) -> dict[str, float]:
     return figures_of(solver.solve(problem)).values()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "load", "names"),
     [

@@ -125,6 +125,7 @@ def unregistered(problem):
     return model, MarkerModel(model, MarkerData.of(problem.mesh, observed, None, None))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*PICTURES, "normal_force", "base_compliance", "rib_thickness"])
 def test_derivatives_by_the_frames_pass_the_taylor_test(unregistered, name):
     check_taylor(*unregistered, name, VALUES | PICTURES)  # type: ignore[call-arg]
@@ -149,6 +150,7 @@ def test_a_finger_beside_its_drawing_shows_what_lies_where_the_markers_are(probl
     assert np.abs(start - shown).max() > 3e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_derivatives_pass_the_taylor_test(model, markers, name):
     check_taylor(model, markers, name, VALUES)

@@ -69,6 +69,7 @@ def direction_at(body, state, seed=0):
     return np.random.default_rng(seed).normal(size=body.shape) * np.abs(state).mean()
 
 
+@pytest.mark.slow
 def test_the_force_is_the_slope_of_the_energy(body, state, changes):
     """In a direction as large as the state, to four digits more than its curvature would change it."""
     direction = direction_at(body, state)
@@ -103,6 +104,7 @@ def test_old_factors_lead_to_the_solution_for_a_new_tangent(body, mesh, state, c
     assert (found * right).sum() == pytest.approx((expected * right).sum(), rel=TOLERANCE**2)
 
 
+@pytest.mark.slow
 def test_factors_from_far_away_are_replaced(body, mesh, state, changes):
     right = pressed(body, mesh)[None]
     body.linearised(0 * state, LAME, changes).solve(right)

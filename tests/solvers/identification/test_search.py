@@ -50,6 +50,7 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     assert force.position.low < min(places) < max(places) < force.position.high
 
 
+@pytest.mark.slow
 def test_a_wrong_marker_is_found_and_not_used(identified, problem):
     observed, true, right = identified
     moved = observed.displacements.copy()

@@ -73,6 +73,7 @@ def functional(solver: PinnAsmSolver, problem: Problem):
     return level, misfit, lambda output: shares @ level.field(output).displacement(where), direction
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weights", ["paper", "precision"])
 def test_it_has_the_least_energy_plus_misfit(problem, weights):
     """By Taylor's formula: in any direction that keeps the load J rises by its quadratic part, exactly."""

@@ -121,6 +121,7 @@ def test_patches_hold_every_point_once(coarse_mesh):
     assert max(len(patch) for patch in patches) <= PATCH
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law", ["neo-hookean", *(pytest.param(law, marks=pytest.mark.slow) for law in OTHERS)]
 )

@@ -43,6 +43,7 @@ def with_markers(problem: Problem, factor: float) -> Problem:
     return replace(problem, observations=observed_at(markers, seen, 0.01))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [Load(), Load(kind="patch"), Load(displacement=(0.5, -2.0))])
 @pytest.mark.parametrize("markers", [False, True])
 def test_slopes_are_those_of_the_least_energy(problem, load, markers):
@@ -53,6 +54,7 @@ def test_slopes_are_those_of_the_least_energy(problem, load, markers):
     differences(level, level.step(level.zero_output))
 
 
+@pytest.mark.slow
 def test_slopes_at_finite_strain_are_those_of_the_least_energy(bent):
     level = TrainedPinnSolver(**SMALL).level(bent, 1.0)
     guess = level.step(level.zero_output, 0.1).output
@@ -89,6 +91,7 @@ def test_training_lowers_the_energy_and_the_distance_from_finite_elements(proble
     assert distances(trained, fem)[0] < 0.8 * distances(drawn, fem)[0]
 
 
+@pytest.mark.slow
 def test_training_repeats_to_the_bit_and_seeds_differ(problem):
     short = {**SMALL, "steps": 1}
     first, again, other = (TrainedPinnSolver(**short, seed=seed).solve(problem).energy for seed in (0, 0, 1))
@@ -117,6 +120,7 @@ def test_finite_strain_is_trained_too(bent):
     assert distances(found, FemNonlinearSolver().solve(bent))[0] < 0.002
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
 def test_a_step_from_a_displacement_of_the_network_is_newtons(bent, law):
     level = TrainedPinnSolver(**SMALL).level(replace(bent, material=Material(law=law)), 1.0)

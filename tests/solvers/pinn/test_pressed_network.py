@@ -42,6 +42,7 @@ def local(problem):
     return LOCAL.solve(problem)
 
 
+@pytest.mark.slow
 def test_displacement_and_force_are_those_of_finite_elements(local, fem):
     """Measured: 0.3, 0.7 and 0.8 %, with a network whose own estimate of its error is 0.5 %."""
     assert local.status.converged, local.status.message
@@ -158,6 +159,7 @@ def test_a_cylinder_that_moves_away_does_not_touch(problem):
     np.testing.assert_array_equal(found.reaction, 0.0)
 
 
+@pytest.mark.slow
 def test_a_small_stroke_is_that_of_the_linear_law(problem):
     """Laws agree at rest: the force of 0.3 mm by the linear one is that of neo-Hookean finite elements.
 

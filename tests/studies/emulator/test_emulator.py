@@ -167,6 +167,7 @@ def test_what_it_cannot_predict_is_told(emulator: Emulator, change: dict[str, Va
     assert words in str(emulator.inputs.fault({**FINGER, **change}))
 
 
+@pytest.mark.slow
 def test_more_samples_fit_it_again(tmp_path: Path) -> None:
     folder = solved_sweep(tmp_path / "s", count=30, left_out=("wrap", "tip_v", "von_mises"))
     before = emulator_of(folder)

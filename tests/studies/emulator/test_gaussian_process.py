@@ -33,6 +33,7 @@ def test_intervals_hold_for_95_percent(noise: float) -> None:
     assert len(process.factor) == 100
 
 
+@pytest.mark.slow
 def test_intervals_of_few_samples_hold_though_many_lengths_fit_them() -> None:
     random = np.random.default_rng(3)
     held = []

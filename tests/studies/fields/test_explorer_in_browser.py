@@ -60,6 +60,7 @@ def give(page: Page, **values: float) -> None:
     page.evaluate("pinnrayExplorer.draw()")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1400, 390])
 def test_moved_values_change_the_picture_and_give_the_emulators_numbers(browser, written, emulator, width):
     found = opened(browser, written, width=width)

@@ -107,6 +107,7 @@ def test_an_emulator_is_kept_for_what_it_was_fitted_to(what, emulator, tmp_path,
     assert len(fitted) == (1 if what == "nothing" else 2)
 
 
+@pytest.mark.slow
 def test_the_reader_reads_what_the_figures_of_a_solution_say():
     finger = load_design("default")
     meshes = MovedMesh(finger, MeshSettings(size=5.0))
@@ -123,6 +124,7 @@ def test_the_reader_reads_what_the_figures_of_a_solution_say():
     assert largest == pytest.approx(figures.von_mises, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_sweep_keeps_the_path_of_each_sample_on_the_moved_mesh(tmp_path, in_line, few_elements):
     given = Study(
         name="kept",

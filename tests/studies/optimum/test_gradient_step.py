@@ -41,6 +41,7 @@ def job(asked: Question) -> StudyJob[Question]:
     return StudyJob(asked, Path(), Path("out"))
 
 
+@pytest.mark.slow
 def test_a_step_is_better_in_every_objective_by_what_the_derivatives_say():
     asked = job(question(mesh_size=1.0, objectives={"von_mises": "least", "force": "largest"}))
     before = measured(asked.task(0, FINGER))
@@ -55,6 +56,7 @@ def test_a_step_is_better_in_every_objective_by_what_the_derivatives_say():
         assert abs(moved[name] - FINGER[name]) <= TRUST * (high - low) * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_a_step_obeys_a_constraint_that_is_met_exactly():
     objectives = {"force": "largest", "compliance_across": "least"}
     free = job(question(objectives=objectives))

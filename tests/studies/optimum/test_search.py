@@ -89,6 +89,7 @@ def test_the_hypervolume_grows_past_that_of_the_samples(found: Optimum) -> None:
     assert found.volumes[-1] > 1.05 * found.volumes[13]
 
 
+@pytest.mark.slow
 def test_a_search_that_was_stopped_goes_on_to_the_same_runs(found, tmp_path, monkeypatch):
     def interrupted(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
         if len(tasks) > 30:
@@ -103,6 +104,7 @@ def test_a_search_that_was_stopped_goes_on_to_the_same_runs(found, tmp_path, mon
     assert search_front(job).fingers == found.fingers
 
 
+@pytest.mark.slow
 def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, monkeypatch):
     best = found.fingers[found.front[0]]["rib_count"]
 
@@ -120,6 +122,7 @@ def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, 
     assert f"{len(crossed)} runs do not count: the finger goes" in " ".join(front_sentences(other))
 
 
+@pytest.mark.slow
 def test_constraints_that_nothing_obeys_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pinnray.studies.optimum.search.finish", judge)
     asked = QUESTION.model_copy(update={"constraints": {"von_mises": Limit(at_most=0.1)}, "runs": 16})
@@ -127,6 +130,7 @@ def test_constraints_that_nothing_obeys_are_told(tmp_path: Path, monkeypatch: py
         search_front(StudyJob(asked, Path(), tmp_path / "out", 1))
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_front(tmp_path, capsys, monkeypatch):
     """The tutorial of the page for designers has the same on fingers that are solved."""
     monkeypatch.setattr("pinnray.studies.optimum.search.finish", judge)

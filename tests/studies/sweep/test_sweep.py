@@ -165,6 +165,7 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
     assert failure_grid(sweep).rows == [("not converged", "1", "stopped at the time limit", "0")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ending", "limit", "state", "said"),
     [

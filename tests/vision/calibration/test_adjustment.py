@@ -77,6 +77,7 @@ def scores(*, bend: float, fits: int = 20, count: int = 15) -> np.ndarray:
     return np.sqrt(np.mean(np.square(found), axis=0))
 
 
+@pytest.mark.slow
 def test_errors_that_the_corners_of_a_photograph_share_are_in_the_standard_deviations():
     """Without the jackknife the scores of bent boards are 4 to 6."""
     assert scores(bend=1.0).max() < 1.6  # 20 fits tell a deviation within a sixth

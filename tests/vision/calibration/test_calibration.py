@@ -180,6 +180,7 @@ def test_a_view_that_determines_no_pose_is_left_out_with_the_reason(kept, count)
     assert found.camera.fx == pytest.approx(CAMERA.fx, rel=0.003)
 
 
+@pytest.mark.slow
 def test_boards_that_are_never_tilted_do_not_determine_the_camera():
     rng = np.random.default_rng(6)
     flat = {}
@@ -221,6 +222,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_command_goes_from_photographs_to_a_camera(folder, tmp_path, capsys):
     out = tmp_path / "camera.json"
     photographs = map(str, sorted(folder.iterdir()))

@@ -27,6 +27,7 @@ def picture(
     return photographed(CHARUCO, pose)
 
 
+@pytest.mark.slow
 def test_corners_are_found_to_hundredths_of_a_pixel():
     pictures = [picture(angles) for angles in TILTS]
     errors = np.concatenate([CHARUCO.find(image) - exact for image, exact in pictures])

@@ -109,6 +109,7 @@ WALL = tuple(Edge(angle, 20 * np.cos(angle) + 20 * np.sin(angle) + 9.9, 20.0) fo
 """Of a wall that ends 1.9 pixels from the disc on either side, before a dark ground."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "image",
     [
@@ -133,6 +134,7 @@ def test_a_wall_that_is_bent_does_not_move_the_disc(blur):
     assert np.abs(errors.mean(axis=0)).max() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "image",
     [
@@ -161,6 +163,7 @@ def test_noise_that_a_codec_correlates_is_accounted_for():
     assert 0.8 < np.sqrt((scores**2).mean()) < 1.3  # 1.48 if the noise were taken for white
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radii", [None, 6.0])
 def test_no_picture_is_too_odd(radii):
     rng = np.random.default_rng(2)

@@ -74,6 +74,7 @@ def test_irregular_dots_are_as_accurate_as_round_ones(radius, irregular):
     assert covered(discs, errors) > 0.88  # 0.95 less four deviations of 96 coordinates
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("radius", "changes"),
     [
@@ -124,6 +125,7 @@ def test_walls_that_join_beside_a_marker_are_no_layers(frame, monkeypatch):
     assert (found.centres == without.centres).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("radius", "changes"),
     [

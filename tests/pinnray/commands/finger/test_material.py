@@ -27,6 +27,7 @@ def test_without_a_test_the_materials_are_listed_with_their_sources(capsys):
     assert [line.split()[0] for line in lines] == list(MATERIALS)
 
 
+@pytest.mark.slow
 def test_a_known_material_gives_modulus_and_ratio_unless_they_are_given(tmp_path, capsys):
     """Force is in proportion to the modulus, for one ratio."""
     forces = {}

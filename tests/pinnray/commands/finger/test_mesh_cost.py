@@ -28,6 +28,7 @@ def test_the_number_of_triangles_is_known_before_the_mesh_is_made(name, size):
     assert estimated_triangles(finger, settings) == pytest.approx(made, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["compare", "crossval", "solve fem-nonlinear", "rig", "gridsearch"])
 def test_a_fine_mesh_asks_for_consent_before_anything_is_done(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

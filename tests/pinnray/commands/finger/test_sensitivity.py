@@ -11,6 +11,7 @@ pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 COARSE = ["sensitivity", "--mesh-size", "2", "--stroke", "4"]
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_and_picture(tmp_path, capsys):
     out = tmp_path / "found.csv"
     assert main([*COARSE, "--figure", "wrap", "--out", str(out)]) == 0

@@ -33,6 +33,7 @@ def plainly(problem):
         return SOLVER.solve(problem)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mean", *(pytest.param(kind, marks=pytest.mark.slow) for kind in TOUCHED)])
 def test_the_end_is_the_equilibrium_of_the_path_on_fine_elements(kind):
     """Newton's tolerance leaves 1e-8 mm, the settling of a contact 1e-5 mm of penetration."""
