@@ -23,7 +23,7 @@ compare: setup ## the main job: compare all solvers on the default finger
 # names the last files are many and quick, so that no worker waits long for the other one's last.
 PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -n $(or $(WORKERS),$(shell nproc)) --dist loadfile --no-loadscope-reorder
 
-test: setup-tests ## run the quick tests, some four minutes on two cores
+test: setup ## run the quick tests, some four minutes on two cores
 	$(PYTEST) -m "not slow and not release" $(ARGS)
 
 test-all: setup-tests ## run all tests, as CI does

@@ -227,10 +227,10 @@ def test_relative_links_lead_somewhere(page):
 @pytest.mark.parametrize("page", [page for page in PAGES if page.name != "CHANGELOG.md"], ids=id_of)
 def test_files_and_modules_that_a_page_names_exist(page):
     text = page.read_text(encoding="utf-8")
-    packages = "geometry|solvers|vision|compare|studies|pinnray|benchmarks"
-    paths = re.findall(rf"(?<![\w/.-])(?:{packages}|tests|docs|tools)/[\w/-]+(?:\.\w+)?", text)
+    folders = "runtime|geometry|solvers|vision|compare|robots|studies|pinnray|benchmarks"
+    paths = re.findall(rf"(?<![\w/.-])(?:{folders}|tests|docs|tools)/[\w/-]+(?:\.\w+)?", text)
     assert [path for path in paths if not (ROOT / path).exists()] == []
-    for name in re.findall(rf"`((?:{packages})(?:\.\w+)+)[`(]", without_blocks(text)):
+    for name in re.findall(r"`((?:pinnray|benchmarks)(?:\.\w+)+)[`(]", without_blocks(text)):
         if not set(name.split(".")) & {*PLACEHOLDERS}:
             pkgutil.resolve_name(name)
 

@@ -182,6 +182,7 @@ def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Results:
     return compare(Job(Design(), solvers, spare, MeshSettings(size=1.0), out=out))
 
 
+@pytest.mark.slow
 def test_a_comparison_goes_on_without_a_truth(tmp_path, unfinished, monkeypatch):
     chosen = {name: GALLERY[name] for name in ("overlay", "marker_errors")}
     monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", chosen)

@@ -18,6 +18,8 @@ from tests.compare.conftest import BendingField, closed_form
 from tests.compare.figures.drawn_pages import Page, page_of
 from tests.fingers import beam, ring
 
+pytestmark = pytest.mark.slow
+
 FINGERS: dict[str, Finger] = {"ring": ring(), "beam": beam(), "csiro": load_design("csiro")}
 
 
@@ -51,7 +53,6 @@ def pages(comparison: Results) -> dict[str, Page]:
     return {name: page_of(draw(comparison, name).figure) for name in names}
 
 
-@pytest.mark.slow
 def test_no_type_runs_into_other_type_or_leaves_the_page(pages):
     for name, page in pages.items():
         assert (name, page.cut_off(), page.overlaps()) == (name, [], [])

@@ -24,6 +24,8 @@ from pinnray.runtime.processes.pool import Pool
 from pinnray.solvers.problem import Problem
 from tests.compare.figures.drawn_pages import Page, page_of
 
+pytestmark = pytest.mark.slow
+
 
 def certificate_of(evaluation: Evaluation, mesh: TriangleMesh) -> Evaluation:
     """The evaluation with its certificate, but not with the verdict."""
@@ -57,7 +59,6 @@ def pages(drawings: dict[str, Illustration]) -> dict[str, Page]:
     return {name: page_of(drawing.figure) for name, drawing in drawings.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
     """In letters, not in pixels; and the same file every time."""
@@ -106,7 +107,6 @@ def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawing
         assert (picture.path.stem, low < 60, high) == (picture.path.stem, True, 255)
 
 
-@pytest.mark.slow
 def test_a_second_process_draws_half_as_this_one_and_its_end_does_not_lose_them(
     comparison, tmp_path, monkeypatch
 ):
@@ -135,7 +135,6 @@ def test_fields_are_drawn_here_where_a_second_process_would_not_help(comparison,
             assert beside is None
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_no_text_leaves_the_page_or_runs_into_another(name, drawings, pages):
     assert drawings[name].caption.endswith(".")
@@ -144,7 +143,6 @@ def test_no_text_leaves_the_page_or_runs_into_another(name, drawings, pages):
     assert pages[name].smallest * 3.4 / WIDTH >= 5.0  # points in a column of 3.4 inches, journals' least
 
 
-@pytest.mark.slow
 def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
     pinn, failed = (certificate_of(evaluation, mesh) for evaluation in (pinn, failed))
     more = [replace(pinn, solver=f"pinn-{name}", converged=name != "asm") for name in ("local", "asm", "x")]
@@ -161,7 +159,6 @@ def test_a_solver_that_failed_is_marked(name: str, pages: dict[str, Page]) -> No
     assert "fem-nonlinear (not converged)" in pages[name].text
 
 
-@pytest.mark.slow
 def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(fem, pinn, observations, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     untold = replace(told, solver="pinn-x", left_out=None)

@@ -29,6 +29,8 @@ from pinnray.solvers.solver import Progress, silent
 from tests.compare.pipeline.runs import compare as run_quietly
 from tests.solvers.conftest import SHORT
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("first", "second", "third")
 ENDINGS: dict[str, Callable[[], BaseException]] = {
     "interrupted": KeyboardInterrupt,

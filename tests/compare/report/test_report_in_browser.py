@@ -15,6 +15,8 @@ from pinnray.runtime.html import write_html
 from pinnray.runtime.tables import TextTable
 from tests.compare.report.browser import TIMEOUT, Opened, opened
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def desk(browser: Browser, written: Path) -> Opened:
@@ -172,7 +174,6 @@ def test_a_table_that_goes_on_says_so_and_no_name_breaks(desk: Opened) -> None:
     page.wait_for_function("!document.querySelector('#table-one').parentElement.matches('.cut')")
 
 
-@pytest.mark.slow
 def test_a_whole_report_is_short_and_prints_on_few_pages(browser: Browser, finished: Path) -> None:
     page = opened(browser, finished / "report.html").page
     assert height(page) < 12_000

@@ -13,6 +13,8 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from tests.compare.report.browser import opened
 
+pytestmark = pytest.mark.slow
+
 CANVAS = "document.getElementById('viewer-canvas')"
 ZOOM = f"{CANVAS}.layout.scene.aspectratio.x"
 SOLVER = "pinnrayFields.manifest.solvers[%d]"

@@ -6,7 +6,7 @@ import pytest
 
 from pinnray.cli import compare_main
 
-pytestmark = pytest.mark.usefixtures("few_elements_throughout", "without_pictures")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("few_elements_throughout", "without_pictures")]
 
 SMALL = ["--solvers", "fem", "--mesh-size", "1.5", "--set", "rib_count=3", "--quiet"]
 
@@ -28,7 +28,6 @@ def read(path):
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.slow
 def test_a_run_has_the_options_that_were_given(first):
     expected = {"solvers": "fem", "mesh-size": 1.5, "set": ["rib_count=3"]}
     assert read(first / "run.json")["options"] == expected

@@ -14,7 +14,7 @@ from pinnray.vision.frames.pictures import write_picture
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.measurements import read_measurements
 
-pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")]
 
 QUICK = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 2 --tilt 4 --seed 1"
 
@@ -34,7 +34,6 @@ def tracked(film, tmp_path_factory):
     return out
 
 
-@pytest.mark.slow
 def test_a_video_becomes_measurements_within_hundredths_of_a_millimetre(film, tracked):
     found, true = (
         read_measurements(path, marker_radius=0.8)
@@ -63,7 +62,7 @@ def pictures(film, tmp_path):
     return folder
 
 
-@pytest.mark.parametrize(("fps", "warned"), [(None, True), pytest.param(10.0, False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("fps", "warned"), [(None, True), pytest.param(10.0, False)])
 def test_the_times_of_pictures_are_those_that_are_given(film, pictures, tmp_path, capsys, fps, warned):
     given = [] if fps is None else ["--fps", str(fps)]
     line = ["track", str(pictures), "--camera", str(film / "camera.json"), *given]
@@ -158,7 +157,7 @@ def spoilt(kind, film, folder):
     return [str(video), *options.get(kind, [])]
 
 
-DEAR = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("mirrored", "other design")]
+DEAR = [pytest.param(kind) for kind in ("mirrored", "other design")]
 
 
 @pytest.mark.parametrize("kind", ["corrupt", "cut off", "black", "other workspace", "no camera", *DEAR])
@@ -170,7 +169,6 @@ def test_what_cannot_be_tracked_is_one_line_and_writes_nothing(kind, film, tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["source"]
 
 
-@pytest.mark.slow
 def test_compare_goes_from_pixels_to_the_table(film, tmp_path, without_pictures):
     out = tmp_path / "out"
     options = ["--solvers", "fem", "--mesh-size", "1", "--camera", str(film / "camera.json")]

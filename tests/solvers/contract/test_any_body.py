@@ -160,6 +160,7 @@ def test_sections_by_x_are_taken_where_they_separate_base_and_contact():
         assert (np.abs(slope[:, 1]).max() == 0) == linear, body
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ["ring", "arch"])
 def test_a_rigid_patch_moves_a_curved_front_as_a_whole(body):
     problem = Problem(body_mesh(body, COARSE), load=Load(kind="patch", displacement=(0.0, -0.2)))
@@ -169,6 +170,7 @@ def test_a_rigid_patch_moves_a_curved_front_as_a_whole(body):
         assert np.abs(moved - [0.0, -0.2]).max() < 0.002, name
 
 
+@pytest.mark.slow
 def test_a_cylinder_starts_where_it_touches_a_curved_front_from_outside():
     """At R + r from the centre of a ring of radius R, on its top and beside it."""
     from pinnray.solvers.cylinder_contact import CylinderContact

@@ -113,6 +113,7 @@ def test_a_jump_to_the_full_load_is_followed(drawn_path, tracker_of):
     assert found.evaluations > 2
 
 
+@pytest.mark.slow
 def test_hidden_markers_widen_the_interval_and_are_named(drawn_path, tracker_of):
     places, forces = drawn_path
     visible = np.ones((len(places), 9), dtype=bool)

@@ -78,6 +78,7 @@ def test_the_force_is_the_slope_of_the_energy(body, state, changes):
     assert (force * direction).sum() == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_solve_inverts_the_slope_of_the_force(body, mesh, state, changes):
     """The works of what is left are below those of the forces by about the tolerance of a solve."""
     right = np.stack([pressed(body, mesh), body.force_slopes(state, LAME, changes)[1][0]])

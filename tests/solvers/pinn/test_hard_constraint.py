@@ -68,6 +68,7 @@ def test_near_the_base_it_is_the_distance_with_the_normal_for_its_gradient(name)
         np.testing.assert_allclose(np.column_stack(slopes), normal, atol=5e-3)
 
 
+@pytest.mark.slow
 def test_the_slopes_are_those_of_differences():
     mesh = body_mesh("ring", 1.0)
     distance = base_distance(mesh)

@@ -186,6 +186,7 @@ def test_neither_order_nor_unseen_markers_matter(problem, solution):
     np.testing.assert_allclose(found.displacement(points), solution.displacement(points), atol=1e-7)
 
 
+@pytest.mark.slow
 def test_the_first_epochs_of_the_paper_are_those_of_the_plain_implementation(problem):
     tiny = {"width": 8, "layers": 2, "base_points": 20, "precision": "double"}
     solver = PaperPinnAsmSolver(**tiny, epochs=5, asm_weight=100.0)

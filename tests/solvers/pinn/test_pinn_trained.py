@@ -15,6 +15,8 @@ from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solver import NoSolutionError
 from tests.solvers.conftest import bar_mesh, distances, observed_at
 
+pytestmark = pytest.mark.slow
+
 SMALL = {"wall_spacing": 1.6, "corner_spacing": 0.4, "neurons": 3, "tolerance": 0.2}
 STEPS = {**SMALL, "steps": 20}
 
@@ -43,7 +45,6 @@ def with_markers(problem: Problem, factor: float) -> Problem:
     return replace(problem, observations=observed_at(markers, seen, 0.01))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("load", [Load(), Load(kind="patch"), Load(displacement=(0.5, -2.0))])
 @pytest.mark.parametrize("markers", [False, True])
 def test_slopes_are_those_of_the_least_energy(problem, load, markers):
@@ -54,7 +55,6 @@ def test_slopes_are_those_of_the_least_energy(problem, load, markers):
     differences(level, level.step(level.zero_output))
 
 
-@pytest.mark.slow
 def test_slopes_at_finite_strain_are_those_of_the_least_energy(bent):
     level = TrainedPinnSolver(**SMALL).level(bent, 1.0)
     guess = level.step(level.zero_output, 0.1).output
@@ -91,7 +91,6 @@ def test_training_lowers_the_energy_and_the_distance_from_finite_elements(proble
     assert distances(trained, fem)[0] < 0.8 * distances(drawn, fem)[0]
 
 
-@pytest.mark.slow
 def test_training_repeats_to_the_bit_and_seeds_differ(problem):
     short = {**SMALL, "steps": 1}
     first, again, other = (TrainedPinnSolver(**short, seed=seed).solve(problem).energy for seed in (0, 0, 1))
@@ -110,7 +109,6 @@ def test_the_reaction_is_the_slope_of_the_energy(trained):
     assert trained.energy == pytest.approx(work, rel=1e-4)
 
 
-@pytest.mark.slow
 def test_finite_strain_is_trained_too(bent):
     """Measured: 0.08 % from finite elements; 1.1 % less energy than with the neurons as they are drawn."""
     drawn = PinnLocalSolver(**SMALL, growth=0.8).solve(bent)
@@ -120,7 +118,6 @@ def test_finite_strain_is_trained_too(bent):
     assert distances(found, FemNonlinearSolver().solve(bent))[0] < 0.002
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
 def test_a_step_from_a_displacement_of_the_network_is_newtons(bent, law):
     level = TrainedPinnSolver(**SMALL).level(replace(bent, material=Material(law=law)), 1.0)
@@ -137,7 +134,6 @@ def test_a_training_that_ends_beside_no_equilibrium_says_so(bent, monkeypatch):
         TrainedPinnSolver(**STEPS).solve(bent)
 
 
-@pytest.mark.slow
 def test_neurons_that_turn_a_point_inside_out_are_left_out(bent, monkeypatch):
     """The training ends with the best that it has."""
     step = ConstrainedNetwork.step_from

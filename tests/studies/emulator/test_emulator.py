@@ -25,6 +25,8 @@ from pinnray.studies.sweep.study import Study, Value
 from pinnray.studies.sweep.sweep import JOURNAL, load_sweep
 from tests.studies.emulator.sweeps import DATA, solved_sweep, synthetic_sweep
 
+pytestmark = pytest.mark.slow
+
 TRAINED = 200
 """Fingers of the kept table that the emulator learns from; the other 100 are unseen."""
 
@@ -101,7 +103,6 @@ def test_quantities_of_the_section_are_exact(emulator: Emulator) -> None:
     assert found.column("narrowest_gap") == narrowest_gap(design.section)
 
 
-@pytest.mark.slow
 def test_a_quantity_of_which_the_frame_says_nothing_is_learnt_too(tmp_path, monkeypatch):
     """So that a new one is added in one file, the quantities'."""
     monkeypatch.setitem(QUANTITIES, "new", Quantity("mm", "of the test"))
@@ -127,7 +128,6 @@ def test_a_function_in_closed_form_is_learnt(tmp_path: Path) -> None:
     assert np.median(np.abs(found.values / truth - 1), axis=0) == pytest.approx(0, abs=5e-3)
 
 
-@pytest.mark.slow
 def test_youngs_modulus_is_a_factor(tmp_path: Path) -> None:
     study = small_study(young={"from": 5.0, "to": 20.0})
     emulator = emulator_of(synthetic_sweep(tmp_path / "s", study, smooth))
@@ -167,7 +167,6 @@ def test_what_it_cannot_predict_is_told(emulator: Emulator, change: dict[str, Va
     assert words in str(emulator.inputs.fault({**FINGER, **change}))
 
 
-@pytest.mark.slow
 def test_more_samples_fit_it_again(tmp_path: Path) -> None:
     folder = solved_sweep(tmp_path / "s", count=30, left_out=("wrap", "tip_v", "von_mises"))
     before = emulator_of(folder)

@@ -18,6 +18,8 @@ from pinnray.studies.fields.live import HOST, handler
 from tests.compare.report.browser import chromium, opened
 from tests.studies.fields.synthetic import known, snapshots, study
 
+pytestmark = pytest.mark.slow
+
 VARIED = {
     "contact_position": {"from": 30, "to": 60},
     "radius": {"from": 4, "to": 16},
@@ -60,7 +62,6 @@ def give(page: Page, **values: float) -> None:
     page.evaluate("pinnrayExplorer.draw()")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("width", [1400, 390])
 def test_moved_values_change_the_picture_and_give_the_emulators_numbers(browser, written, emulator, width):
     found = opened(browser, written, width=width)

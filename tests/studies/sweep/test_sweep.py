@@ -214,6 +214,7 @@ def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
     assert "holds a sweep with other settings (study.mesh_size)" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(monkeypatch):
     from distributed import KilledWorker, LocalCluster
 

@@ -35,6 +35,7 @@ def test_corners_are_found_to_hundredths_of_a_pixel():
     assert (np.abs(errors.mean(axis=0)) < 0.003).all()
 
 
+@pytest.mark.slow
 def test_a_part_of_the_board_is_enough():
     image, exact = picture(TILTS[0], shift=90.0)
     found = CHARUCO.find(image)

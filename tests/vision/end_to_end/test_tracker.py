@@ -17,7 +17,7 @@ from tests.vision.films import (
     tracked,
 )
 
-pytestmark = pytest.mark.usefixtures("discs_fitted_once")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("discs_fitted_once")]
 
 MARKERS = DESIGN.markers
 
@@ -65,7 +65,6 @@ def test_the_papers_pipeline_is_an_order_of_magnitude_worse():
     np.testing.assert_array_equal(observations.points, MARKERS)
 
 
-@pytest.mark.slow
 def test_grey_images_do_as_well():
     observations = tracked([cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images()]).observations(
         "rig"
