@@ -230,6 +230,10 @@ def test_files_and_modules_that_a_page_names_exist(page):
     folders = "runtime|geometry|solvers|vision|compare|robots|studies|pinnray|benchmarks"
     paths = re.findall(rf"(?<![\w/.-])(?:{folders}|tests|docs|tools)/[\w/-]+(?:\.\w+)?", text)
     assert [path for path in paths if not (ROOT / path).exists()] == []
+    tests = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    assert [
+        name for name in re.findall(r"tests/[^`]* -k (\w+)(?![\w-])", text) if f"{name}(" not in tests
+    ] == []
     for name in re.findall(r"`((?:pinnray|benchmarks)(?:\.\w+)+)[`(]", without_blocks(text)):
         if not set(name.split(".")) & {*PLACEHOLDERS}:
             pkgutil.resolve_name(name)

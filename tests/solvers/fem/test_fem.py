@@ -1,10 +1,29 @@
 """`fem`: refinement, plane states, advice; `tests/verification` has the exact solutions."""
 
+import numpy as np
 import pytest
 
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.problem import Load, Material, Problem
+
+
+@pytest.mark.slow
+def test_marker_displacements_have_converged():
+    """h = 0.25 mm against 0.125 mm; the point load drifts with every halving: its limit does not exist."""
+    for kind, limits in {"mean": (0.002, 0.005), "point": (0.004, 0.007)}.items():
+        coarse, fine = (
+            FemSolver(estimate=False).solve(
+                Problem(finger_mesh(Design(), settings=MeshSettings(size=size)), load=Load(kind=kind))
+            )
+            for size in (0.25, 0.125)
+        )
+        markers = coarse.problem.mesh.markers
+        difference = np.abs(coarse.displacement(markers) - fine.displacement(markers)).mean(axis=0)
+        assert (difference <= limits).all(), (kind, difference)
 
 
 def test_energy_falls_under_refinement(coarse_mesh, medium_mesh, medium_fem):
