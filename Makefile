@@ -26,10 +26,10 @@ PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -n $(or $(WORKERS),$(shell nproc)) --di
 test: setup ## run the quick tests, some four minutes on two cores
 	$(PYTEST) -m "not slow and not release" $(ARGS)
 
-test-all: setup-tests ## run all tests, as CI does
+test-all: setup-tests ## run all tests but those of a release, as CI does
 	$(PYTEST) -m "not release" $(ARGS)
 
-test-release: setup-tests ## run what judges a release: notebooks, licences and advisories of all packages
+test-release: setup-tests ## run what is left for a release: the dearest tests, notebooks, licences and advisories
 	$(PYTEST) -m release $(ARGS)
 
 # ARGS=linkcheck asks the network whether the links to other sites are alive.

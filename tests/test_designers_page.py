@@ -44,7 +44,7 @@ def test_the_example_questions_can_be_read(name: str) -> None:
     load_question(DOCS / "examples" / name)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.usefixtures("few_elements", "in_line", "without_pictures")
 def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(tmp_path, monkeypatch):
     from pinnray.cli import compare_main, main

@@ -53,7 +53,7 @@ def test_modules_of_the_user_are_in_nobodys_way(folder):
     assert Path(run(folder)) == ROOT / "pinnray" / "__init__.py"
 
 
-@pytest.mark.slow  # builds a wheel and installs it
+@pytest.mark.release  # builds a wheel and installs it
 def test_the_wheel_has_one_name_and_leaves_the_users_modules_alone(folder, tmp_path_factory):
     work = tmp_path_factory.mktemp("wheel")
     listed = subprocess.run(

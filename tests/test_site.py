@@ -15,7 +15,7 @@ CELL = "{code-cell} python"
 NOTEBOOKS = sorted({block.page for block in ALL_BLOCKS if block.language == CELL})
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_site_builds_without_a_warning(tmp_path):
     """With every page, every command and every public name, but without running the notebooks."""
     built = subprocess.run(

@@ -37,7 +37,7 @@ def identified(observations):
     return pr.solve(FINGER, "fem-id", size=1.0, load=load, measurements=observations)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_sheet_that_was_printed_at_99_percent(tmp_path):
     """Displacements were 0.05 mm off and stated to 0.0014, and the force was +11 %, outside its interval."""
     tracking, observed = tracked("print99", tmp_path)

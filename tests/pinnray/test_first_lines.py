@@ -233,7 +233,7 @@ def test_ranges_are_sampled_and_a_design_may_be_an_object(in_line: None):
 # --- what the camera sees ---
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_rig_films_what_is_calibrated_tracked_and_weighed(tmp_path: Path):
     motion, out = pr.Motion(rest=2, moving=1, held=2), tmp_path / "film"
     film = pr.rig(

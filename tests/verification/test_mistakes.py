@@ -13,7 +13,7 @@ from pinnray.solvers import elasticity
 from pinnray.solvers.fem import equilibrium
 from pinnray.solvers.problem import Material
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.release
 
 
 def passes(rows, **properties):

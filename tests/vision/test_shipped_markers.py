@@ -18,7 +18,7 @@ def test_the_shipped_markers_are_those_of_the_default_finger_and_simulated():
     assert (seen.standard_deviations == 0.02).all()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_shipped_markers_are_made_as_their_file_says(without_pictures):
     from pinnray import compare
 

@@ -316,7 +316,7 @@ def test_a_full_disk_is_told_in_one_line_and_leaves_no_part_of_a_file(
 # Surroundings
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_home_that_cannot_be_written_is_not_needed(folder, tmp_path_factory):
     """Neither for the mesh nor for what DOLFINx compiles and matplotlib remembers."""
     cache = tmp_path_factory.mktemp("cache")

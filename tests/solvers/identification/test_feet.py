@@ -87,7 +87,7 @@ def test_derivatives_by_the_feet_pass_the_taylor_test(pair, name):
     check_taylor(*pair, name, PRESSED | there)  # type: ignore[call-arg]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_foot_that_turned_is_found_where_the_markers_show_it(standing, pair):
     """Ten times as far as a print is off at its ends; markers with a noise of 0.01 mm."""
     true = 0.12

@@ -240,7 +240,7 @@ def under(problem, loads):
     return observed_at(problem.mesh.markers, moved, NOISE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_two_contacts_are_said_to_be_something_else(problem):
     """One contact cannot explain two that are 35 mm apart; the interval of their force opens and holds it."""
     solution = sought(problem, under(problem, [(20, 4, 0, -0.15), (55, 4, 0, -0.1)]), law="given")

@@ -74,7 +74,7 @@ def test_where_the_network_finds_no_equilibrium_the_status_says_so(problem, monk
     assert not found.status.converged
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_where_first_order_does_not_settle_the_network_seeks_the_unknowns(problem, found, monkeypatch):
     """With derivatives that are off by a third; the search has its own."""
     carried, asked, fit = pinn_id._projected, [], LawFits.fit
@@ -96,7 +96,7 @@ def test_where_first_order_does_not_settle_the_network_seeks_the_unknowns(proble
     assert abs(sought.stats["force"] - found.stats["force"]) < 0.02 * width
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_refit_of_first_order_is_a_fit_for_what_a_marker_left_out_changes(problem, found, refit):
     """The prediction of the marker by the others, to half of the noise."""
     observed = problem.observations

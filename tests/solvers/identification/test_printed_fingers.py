@@ -18,7 +18,7 @@ def quick(few_elements, monkeypatch):
     monkeypatch.setattr(fingers, "SIZE", 2.0)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_mechanics_predict_a_real_finger_better_than_none():
     """Held-out errors of u and v (rms), mm. Nothing is set by hand: every solver finds the picture's turn."""
     experiment, off = Experiment(FINGERS[1]), {}  # the harder one: its wall wraps around the cylinder
@@ -52,7 +52,7 @@ def identified(measurements):
     return pr.solve(finger, "fem-id", size=2.0, load=load, measurements=DATA / measurements)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.usefixtures("few_elements")
 def test_one_wrong_marker_makes_no_wrong_law_certain():
     """Laws were compared by fits that had not converged: the wrong one had all of the probability, +20 %."""

@@ -183,7 +183,7 @@ def test_training_ends_early_when_it_no_longer_gains(problem, straight):
     assert not straight.status.converged
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.mpi
 def test_two_processes_train_as_one(problem, tmp_path):
     """In double precision; 15 epochs let rounding of another order of summation grow little."""

@@ -144,7 +144,7 @@ def test_a_step_where_the_curvature_is_negative_goes_downhill(coarse, local):
     np.testing.assert_array_equal(downhill.change, other.change)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_along_the_load_the_same_is_found(local, problem, monkeypatch):
     monkeypatch.setattr(pressed_network.PressedNetwork, "refined", lambda *_: None)
     found = LOCAL.solve(problem)

@@ -134,7 +134,7 @@ def test_a_run_without_a_solution_says_why(wanted, monkeypatch, error, state):
 # The search
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_whole_search(tmp_path, capsys, monkeypatch, request):
     """In its own process, then here: nothing is left to do again, and a wider grid trains what is new."""
     monkeypatch.chdir(tmp_path)

@@ -78,7 +78,7 @@ def test_no_step_leads_on_from_a_corner_of_the_ranges():
     assert stepped(asked, corner, measured(asked.task(0, corner))) is None
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_search_ends_with_the_steps_and_says_what_they_gained(tmp_path, monkeypatch, in_line):
     asked = question(runs=20, steps=2)
     monkeypatch.setattr("pinnray.studies.optimum.proposals.POPULATION", 16)

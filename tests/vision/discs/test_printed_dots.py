@@ -98,7 +98,7 @@ def test_no_plain_centroid_is_more_accurate(radius, changes):
 @pytest.mark.parametrize(
     ("radius", "period"),
     [
-        pytest.param(12.0, 3.2, marks=pytest.mark.slow),
+        pytest.param(12.0, 3.2, marks=pytest.mark.release),
         (4.0, 8.0),
     ],
 )
@@ -199,7 +199,7 @@ def test_specks_cover_the_share_that_the_bench_is_told(coarse_mesh):
     assert not replace(bench, mottle=0.0).specks(rest)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_film_of_printed_dots_is_tracked_to_thousandths_of_a_millimetre():
     recording = films.recording()
     mesh = finger_mesh(films.DESIGN, settings=MeshSettings(size=1.0))

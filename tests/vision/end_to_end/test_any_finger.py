@@ -83,7 +83,7 @@ def error(name: str) -> float:
     return float(np.linalg.norm(wrong, axis=1).mean())
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_ring_is_tracked_as_accurately_as_the_default_finger() -> None:
     """In proportion to the size of a pixel, about 0.1 mm: hundredths of it."""
     assert error("ring") < max(2 * error("default"), 0.003)

@@ -16,7 +16,7 @@ from pinnray.vision.calibration.chessboard import Board
 from pinnray.vision.rig.boards import board_poses
 from tests.vision.films import DESIGN, bent
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.release
 
 LENS = Camera(1280, 720, 1350.0, 1348.0, 640.0, 362.0, distortion=(-0.2, 0.03, 4e-4, -3e-4, 0.0))
 BOARD = Board(9, 6, 8.0)

@@ -10,7 +10,7 @@ from pinnray.cli import main
 from tests.solvers.conftest import SHORT
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.usefixtures("few_elements")
 def test_the_models_for_mujoco_are_near_finite_elements_at_loads_that_they_have_not_seen(
     tmp_path, monkeypatch

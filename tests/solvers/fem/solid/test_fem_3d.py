@@ -120,7 +120,7 @@ def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
     assert np.abs(plane - expected).max() > 0.01 * expected.max()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.mpi
 def test_two_ranks_find_what_one_finds(start_ranks, wedge, tmp_path):
     wedge.save(tmp_path / "mesh.npz")
