@@ -1,4 +1,4 @@
-"""How long work tells its caller how far it is."""
+"""Progress: the function by which work tells its caller how far it is."""
 
 from collections.abc import Callable
 

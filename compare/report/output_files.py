@@ -59,7 +59,7 @@ def metrics(comparison: Results) -> dict[str, Any]:
     since nobody knows the fields of a real finger.
 
     Any number can be NaN, such as the error at a marker that was not seen. The file has null for it, which
-    `read_solvers` undoes.
+    `solver_numbers` undoes.
     """
     observations = comparison.observations
     return {
@@ -80,7 +80,7 @@ def metrics(comparison: Results) -> dict[str, Any]:
     }
 
 
-def read_solvers(content: Mapping[str, Any]) -> dict[str, Any]:
+def solver_numbers(content: Mapping[str, Any]) -> dict[str, Any]:
     """The solvers in the content of a file `metrics.json`: NaN where null stands for a number.
 
     JSON has no word for a number that is not finite, such as the force by a solver that finds none.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pinnray.comparison.evaluation.metrics import MEANS
-from pinnray.comparison.report.output_files import SCHEMA, read_solvers
+from pinnray.comparison.report.output_files import SCHEMA, solver_numbers
 from pinnray.comparison.report.summary import RunAnswer, answers
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.html import picture_urls, write_html
@@ -87,7 +87,7 @@ def _read(name: str, folder: Path) -> Run:
             f"{folder / 'metrics.json'} is not of `compare`, or of another version; make the run again"
         )
     try:  # what is asked of it later
-        run = Run(name, folder, metrics | {"solvers": read_solvers(metrics)}, record)
+        run = Run(name, folder, metrics | {"solvers": solver_numbers(metrics)}, record)
         _ = run.answers, run.settings, run_rows([run])
     except (AttributeError, LookupError, TypeError, ValueError):
         raise UserError(

@@ -1,4 +1,4 @@
-"""What the model of a disc leaves at edges: their mean profile, and straight edges beside the disc.
+"""Residuals of the disc model at edges: their mean profile, and straight edges beside the disc.
 
 An edge that is sharpened, or has another profile than the model's, and the blur of an outline that bends
 leave residuals that all discs share. They are alike all along an edge, so they do not move a centre, but

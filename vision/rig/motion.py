@@ -1,4 +1,4 @@
-"""How the finger, the camera and the light move while the rig films."""
+"""Motion of the finger, the camera and the light while the rig films."""
 
 from dataclasses import dataclass
 from functools import cached_property
