@@ -14,7 +14,6 @@ from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import HAND_HELD, Homography, nearest_similarity
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.foreign_tables import foreign_table
 
 FEWEST = 3
 """Points that tell a picture's mirror image from itself."""
@@ -65,8 +64,6 @@ def read_clicks(path: Path) -> Clicks:
         reason = error.strerror if isinstance(error, OSError) else "it is no table in CSV and UTF-8"
         raise UserError(f"cannot read the clicks {path}: {reason}") from None
     rows = [(line, row) for line, row in rows if not row[0].lstrip().startswith("#")]
-    if other := foreign_table([[cell.strip() for cell in row] for _, row in rows]):
-        raise UserError(f"{path} is no list of clicks; {other}")
     header = [cell.strip().lower() for cell in rows[0][1]] if rows else []
     if not {"x", "y"} <= set(header):
         found = f"it has {', '.join(map(repr, header))}" if header else "it is empty"

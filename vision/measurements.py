@@ -15,7 +15,6 @@ from pinnray.geometry.registration import FIXED, HAND_HELD, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import atomic_path
 from pinnray.runtime.errors import UserError
-from pinnray.vision.foreign_tables import foreign_table
 
 POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")
@@ -125,8 +124,6 @@ def measurements_of(
     """
     for name in REQUIRED:
         if name not in header:
-            if other := foreign_table([header, *(cells for _, cells in rows)]):
-                raise UserError(f"{table} has no column {name}; {other}")
             raise UserError(
                 f"{table} has no column {name}; the header must name {', '.join(REQUIRED)} "
                 f"and may name {', '.join(OPTIONAL)}, with commas between; it {_titles(header)}"
