@@ -147,8 +147,6 @@ class SceneOptions:
     Attributes:
         paint: Colour of the markers.
         irregular: Deviation of the markers' outlines from circles, rms over the radius, up to 0.1.
-        mottle: Share of the markers' area that light specks cover, up to 0.5.
-        layers: Difference between the reflectances of every other layer of the print, relative, up to 0.5.
         marker_plane: Height of the markers above the fiducials, mm.
         cover: Cover a share of a marker's diameter with a cable, such as 5=0.4; may be repeated.
         cover_paint: Colour of the cables.
@@ -157,8 +155,6 @@ class SceneOptions:
 
     paint: Literal["dark", "red", "green", "blue"] = "dark"
     irregular: float = 0.0
-    mottle: float = 0.0
-    layers: float = 0.0
     marker_plane: float = 0.0
     cover: Repeated = ()
     cover_paint: Literal["dark", "light"] = "dark"
@@ -172,11 +168,9 @@ class SceneOptions:
         """
         from pinnray.vision.rig.bench import Bench
 
-        for name, most in (("irregular", 0.1), ("mottle", 0.5), ("layers", 0.5)):
-            value = getattr(self, name)
-            if not 0 <= value <= most:
-                raise UserError(f"--{name} {value:g}: give a share from 0 to {most:g}")
-        return Bench(mesh, finger, workspace, self.paint, self.irregular, self.mottle, self.layers)
+        if not 0 <= self.irregular <= 0.1:
+            raise UserError(f"--irregular {self.irregular:g}: give a share from 0 to 0.1")
+        return Bench(mesh, finger, workspace, self.paint, self.irregular)
 
     def covered(self) -> dict[int, float]:
         """The shares of --cover by the numbers of the markers."""

@@ -85,8 +85,8 @@ class FrameTracker:
             raise UserError(
                 f"{count} of {len(names)} markers are where the design has them, and {least} must be; show "
                 "the finger before it is pressed, and give its design, the markers' colour, and the "
-                "workspace: where the fiducials lie around the finger, and by how much nearer the markers are "
-                f"to the camera (marker_plane, here {scene.workspace.marker_plane:g} mm), which only a "
+                "workspace: where the fiducials lie around the finger, and how much nearer to the camera the "
+                f"markers are (marker_plane, here {scene.workspace.marker_plane:g} mm), which only a "
                 "calibrated camera accounts for"
             )
         self._lost = 1  # frames since the last search
