@@ -57,7 +57,7 @@ def calibrate(
         dictionary: ArUco dictionary of a ChArUco board.
         model: Lens model: `brown` up to about 100 degrees of view, `fisheye` beyond.
         k3: Whether to fit the third radial coefficient too.
-        out: Camera file, .json or .yaml, that `track` takes; nothing is written if None.
+        out: Camera file, .json, that `track` takes; nothing is written if None.
 
     Raises:
         UserError: If the photographs do not determine the camera.

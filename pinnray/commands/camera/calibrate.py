@@ -38,7 +38,7 @@ def command(
         model: Lens model: brown up to about 100 degrees of view, fisheye beyond.
         k3: Fit the third radial coefficient too.
         without: Photograph to leave out; may be repeated.
-        out: Camera file, .json or .yaml.
+        out: Camera file, .json.
     """
     from pinnray.film.calibration_report import calibration_table, draw_calibration, view_table
     from pinnray.vision.calibration.camera_calibration import better_lens, calibrate_camera
