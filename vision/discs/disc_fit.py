@@ -27,6 +27,8 @@ LARGEST_DEVIATION = 0.5
 """Standard deviation of the centre, pixels, above which a disc counts as not found."""
 LARGEST_RESIDUAL = 0.25
 """Root mean square residual, over the contrast, above which a disc counts as not found."""
+LARGEST_CONTRAST = 400.0
+"""Contrast, grey levels, above which a disc counts as not found: of light that is clipped."""
 RADII = (0.6, 1.6)
 """Accepted ratios of fitted to guessed radius."""
 
@@ -126,6 +128,7 @@ def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDis
         & (deviations <= LARGEST_DEVIATION)
         & (np.sqrt(fit.variance) <= LARGEST_RESIDUAL * np.abs(contrast))
         & (np.hypot(*(centres - guesses[:, :2]).T) <= np.maximum(guesses[:, 2], 3))
+        & (np.abs(contrast) <= LARGEST_CONTRAST)
         & (ratio >= RADII[0])
         & (ratio <= RADII[1])
     )

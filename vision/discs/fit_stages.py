@@ -75,7 +75,8 @@ def _fit_windows(window: PixelWindows, votes: HoughVotes, known: Known) -> DiscF
             noise[again] = own
     if np.isfinite(noise).any():
         # What a robust fit leaves out shifts a disc as well, so none has less noise than is usual.
-        inflation = np.fmax(noise, np.nanmedian(noise, axis=0)).max(axis=1)
+        usual = np.maximum(np.nanmedian(noise, axis=0), 1e-3)  # pictures without any noise have none
+        inflation = np.fmax(noise, usual).max(axis=1)
         first.covariances *= inflation[:, None, None]
         first.shade_precision /= inflation[:, None]
     return first
