@@ -21,7 +21,6 @@ from pinnray.studies.optimum.pictures import draw_front, draw_front_fingers, dra
 from pinnray.studies.optimum.question import Question
 from pinnray.studies.optimum.search import Optimum
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.page import slow_sentence
 from pinnray.studies.sweep.study import physics_of, title, unit_of
 from pinnray.studies.sweep.sweep import Sweep
 from pinnray.studies.sweep.tables import failure_grid
@@ -129,28 +128,10 @@ def front_sentences(optimum: Optimum, sharpest: float = SHARP, command: str = CO
         f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are on the "
         f"front: none of them is beaten in every objective by another run.{itself} "
         "An emulator proposed fingers; all numbers here are the solver's.",
-        *steps_sentence(optimum),
         *ends_sentence(optimum),
         *tip_sentence(sharpest),
-        *slow_sentence(as_sweep(optimum)),
         "front/01.toml is the shape of the first finger of the table, for `pinnray design`. "
         f"`{command.format('problems/01.toml')}` solves it with load, material and solver of this search.",
-    ]
-
-
-def steps_sentence(optimum: Optimum) -> list[str]:
-    """What the steps along derivatives gained, in a sentence; nothing where there are none."""
-    runs = optimum.question.runs
-    steps = len(optimum.measurements) - runs
-    if not optimum.question.steps:
-        return []
-    if not steps:
-        return ["No step along the derivatives would gain: the front is as good as they can tell."]
-    better = sum(run >= runs for run in optimum.front)
-    gain = optimum.volumes[-1] / optimum.volumes[runs - 1] - 1
-    return [
-        f"{steps} of the runs are a step along exact derivatives from fingers of the front; {better} of them "
-        f"are on it, and the hypervolume is {100 * gain:.2g} % larger by them."
     ]
 
 

@@ -18,7 +18,6 @@ from pinnray.runtime.stages import Stages
 from pinnray.studies.emulator.emulator import fitted_emulator
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.optimum.front import hypervolume, reference_point, unbeaten
-from pinnray.studies.optimum.gradient_step import stepped
 from pinnray.studies.optimum.question import ENOUGH, Question
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement
@@ -80,7 +79,6 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
         "objectives": dict(question.objectives),
         "constraints": {name: limit.model_dump() for name, limit in question.constraints.items()},
         "runs": question.runs,
-        **({"steps": question.steps} if question.steps else {}),
     }
     check_resumable_folder(job.out / QUESTION_FILE, definition, job="search", free={"study.name"})
     job.out.mkdir(parents=True, exist_ok=True)
@@ -103,13 +101,7 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
                 finish(tasks, journal, workers, progress)
             done = len(fingers)
             if done >= question.runs:
-                found = _optimum(question, fingers, journal)
-                more = [] if done > question.runs else _steps(job, found, stages)
-                if not more:
-                    return found
-                fingers = fingers + more
-                _keep_fingers(job.out / FINGERS_FILE, fingers)
-                continue
+                return _optimum(question, fingers, journal)
             count = min(-(-(question.runs - start) // ROUNDS), question.runs - done)
             with stages.stage(f"proposals after {done}") as progress:
                 progress(0.0, "the emulator is fitted and searched")
@@ -164,22 +156,6 @@ def _proposed(
             seed=question.seed + len(fingers),
         )
     return found + more[: count - len(found)]
-
-
-def _steps(job: StudyJob[Question], found: Optimum, stages: Stages) -> list[dict[str, Value]]:
-    """Fingers a step along the derivatives from some of the front, evenly chosen."""
-    count = min(job.study.steps, len(found.front))
-    if not count:
-        return []
-    chosen = np.unique(np.linspace(0, len(found.front) - 1, count).round().astype(int))
-    more = []
-    with stages.stage("derivatives") as progress:
-        for number, place in enumerate(chosen):
-            run = found.front[place]
-            progress(number / len(chosen), f"of finger {place + 1} of the front")
-            if (finger := stepped(job, found.fingers[run], found.measurements[run])) is not None:
-                more.append(finger)
-    return more
 
 
 def is_allowed(question: Question, run: Measurement) -> bool:

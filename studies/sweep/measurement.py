@@ -1,8 +1,9 @@
 """The work of a worker: one sample from its definition to its quantities."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -34,18 +35,18 @@ class Measurement:
     """What one sample gave.
 
     Attributes:
-        number: Of the sample.
+        number: Of the sample, or its name.
         state: How it ended.
         message: The solver's sentence, or the reason why there is no result.
         seconds: Time of the worker, meshing included, s.
-        values: The quantities by name; empty if there is no result.
+        values: The quantities by name, ready for JSON; empty if there is no result.
     """
 
-    number: int
+    number: Any
     state: Ending
     message: str
     seconds: float
-    values: dict[str, float] = field(default_factory=dict)
+    values: dict[str, Any] = field(default_factory=dict)
 
     @property
     def through_itself(self) -> bool:
@@ -57,7 +58,12 @@ class OutOfTime(UserError):
     """The work on a sample takes too long."""
 
 
-def measured(task: Task) -> Measurement:
+def measured(task: Task, _report: Callable[..., None] | None = None) -> list[Measurement]:
+    """The one sample of a task, as a worker answers."""
+    return [measurement(task)]
+
+
+def measurement(task: Task) -> Measurement:
     """Draw, mesh and solve one sample.
 
     Whatever goes wrong with this sample is told in the answer, so that it does not stop the others.

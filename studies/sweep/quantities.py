@@ -9,8 +9,7 @@ from pinnray.comparison.evaluation.evaluation import field_difference
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.finger_figures import QUANTITIES, Quantity, figures_at_rest, figures_of
-from pinnray.solvers.finger_figures import heading as heading_of
+from pinnray.solvers.finger_figures import Quantity, figures_at_rest, figures_of
 from pinnray.solvers.problem import Load, Problem, contact_functional
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Progress, Solver, TrainedSolver, silent, solved, with_law
@@ -27,11 +26,6 @@ TRAINING: Mapping[str, Quantity] = {
     "seconds": Quantity("s", "time of the training"),
 }
 """What a training gives besides, compared with `fem`."""
-
-
-def quantity_heading(name: str) -> str:
-    """Column heading of a quantity or of a training's, its name with the unit, such as `force_N`."""
-    return heading_of(name, {**QUANTITIES, **TRAINING}[name])
 
 
 def quantities(

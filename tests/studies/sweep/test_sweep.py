@@ -21,14 +21,13 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.figure import figure
 from pinnray.solvers.solution import Solution
 from pinnray.studies.sweep.job import StudyJob
-from pinnray.studies.sweep.measurement import Measurement, measured
-from pinnray.studies.sweep.page import slow_sentence
+from pinnray.studies.sweep.measurement import Measurement, measurement
 from pinnray.studies.sweep.pictures import draw_medians
 from pinnray.studies.sweep.quantities import quantities
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import opened
 from pinnray.studies.sweep.study import load_study
-from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
+from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep, run_tasks
 from pinnray.studies.sweep.tables import failure_grid, sample_table
 from pinnray.studies.sweep.workers import Workers
 from tests.conftest import inline
@@ -66,14 +65,14 @@ def test_a_sample_is_kept_once(tmp_path: Path) -> None:
 def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path, 1))
     job = StudyJob(study, tmp_path, tmp_path / "out")
-    refused = measured(job.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
+    refused = measurement(job.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
     assert (refused.state, refused.values) == ("refused", {})
     assert "ribs" in refused.message
     task = job.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
-    assert measured(task).state == "done"
-    pressed = measured(replace(task, physics={**task.physics, "stroke": 60.0}))
+    assert measurement(task).state == "done"
+    pressed = measurement(replace(task, physics={**task.physics, "stroke": 60.0}))
     assert (pressed.state, pressed.through_itself) == ("done", True)
-    soft = measured(replace(task, physics={**task.physics, "stroke": 0.001}))
+    soft = measurement(replace(task, physics={**task.physics, "stroke": 0.001}))
     assert "this looks like metres" in soft.message
     remarks = Sweep(study, [{}] * 2, [pressed, replace(soft, number=0)]).remarks
     assert [remark.partition(";")[0] for remark in remarks] == [
@@ -81,7 +80,7 @@ def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
         "1 of 2 samples (0): this looks like",
     ]
     object.__setattr__(task, "mesh", "broken")
-    assert measured(task).state in ("refused", "failed")
+    assert measurement(task).state in ("refused", "failed")
 
 
 def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,7 +92,7 @@ def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr("pinnray.studies.sweep.measurement.quantities", without_stress)
     sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
-    found = measured(
+    found = measurement(
         StudyJob(load_study(study_file(tmp_path, 1)), tmp_path, tmp_path / "out").task(1, sample)
     )
     assert (found.state, found.message.partition(";")[0]) == ("not converged", "von_mises cannot be computed")
@@ -159,7 +158,7 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
     study = study.model_copy(update={"solver": "fem-nonlinear", "time_limit": 1e-3})
     job = StudyJob(study, tmp_path, tmp_path / "out", 1)
     sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
-    found = measured(job.task(0, sample))
+    found = measurement(job.task(0, sample))
     assert (found.state, found.message.partition(":")[0]) == ("not converged", "stopped at the time limit")
     sweep = Sweep(study, [sample], [found])
     assert failure_grid(sweep).rows == [("not converged", "1", "stopped at the time limit", "0")]
@@ -178,25 +177,19 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
 def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     tmp_path, monkeypatch, request, ending, limit, state, said
 ):
-    monkeypatch.setattr("pinnray.studies.sweep.workers._measured", ending)
-    monkeypatch.setattr("pinnray.studies.sweep.workers.GRACE_S", 1.0)
-    monkeypatch.setattr("pinnray.studies.sweep.workers.DEATHS", 2)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.measured", ending)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.GRACE_S", 1.0)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.DEATHS", 2)
     study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
     sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", state, "done"]
     assert [(row[0], row[2]) for row in failure_grid(sweep).rows] == [(state, said)]
     assert list(sample_table(sweep)["state"]) == ["done", state, "done"]
-    monkeypatch.setattr("pinnray.studies.sweep.workers._measured", answered)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.measured", answered)
     request.getfixturevalue("in_line")
     longer = study.model_copy(update={"time_limit": 600.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
-
-
-def test_a_finger_that_takes_much_longer_than_the_others_is_told(tmp_path: Path) -> None:
-    found = [Measurement(number, "done", "", 64.0 if number == 2 else 0.6) for number in range(3)]
-    (sentence,) = slow_sentence(Sweep(load_study(study_file(tmp_path, 3)), [{}] * 3, found))
-    assert sentence.startswith("Number 2 took 64 s")
 
 
 def test_medians_are_drawn_of_enough_samples_alone() -> None:
@@ -215,21 +208,23 @@ def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(monkeypatch):
+def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(tmp_path):
     from distributed import KilledWorker, LocalCluster
 
-    def dying(task: SimpleNamespace) -> Measurement:
+    def dying(task: SimpleNamespace, report: object) -> list[Measurement]:
         if task.number == 1:
             raise KilledWorker("sample", SimpleNamespace(address="tcp://a"), 0)  # as the scheduler does
         return answered(task)
 
-    monkeypatch.setattr("pinnray.studies.sweep.workers.measured", dying)
     tasks = {number: SimpleNamespace(number=number) for number in range(3)}
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
         Workers(1, cluster.scheduler_address) as workers,
+        opened(tmp_path / "journal.sqlite") as journal,
     ):
-        found = {each.number: each.state for part in ({0: tasks[0]}, tasks) for each in workers.answers(part)}
+        for part in ({0: tasks[0]}, {1: tasks[1], 2: tasks[2]}):
+            run_tasks(dying, part, tasks, journal, workers, deaths=8)
+        found = {each.number: each.state for each in journal.measurements()}
     assert found == {0: "done", 1: "failed", 2: "done"}
 
 
@@ -268,7 +263,7 @@ def test_drawings_are_samples_too(tmp_path: Path) -> None:
     )
     study = load_study(path)
     job = StudyJob(study, tmp_path, tmp_path / "out")
-    found = [measured(job.task(number, sample)) for number, sample in enumerate(samples(study))]
+    found = [measurement(job.task(number, sample)) for number, sample in enumerate(samples(study))]
     assert [each.state for each in found] == ["done"] * 4
     areas = [Design(rib_count=ribs).section.area for ribs in (2, 2, 6, 6)]
     assert [each.values["area"] for each in found] == pytest.approx(areas, rel=1e-6)

@@ -1,16 +1,11 @@
-"""A solver in folds: it does not see what is held out; finished folds are kept."""
+"""A solver in folds: it does not see what is held out."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
-from pinnray.comparison.crossval.folds import ALL, LOAD, ONE, RANDOM, Fold, FoldResult, LoadCase
-from pinnray.comparison.crossval.scores import score
-from pinnray.comparison.crossval.solver_folds import SolverTask, run_folds, sweep_weights
-from pinnray.comparison.crossval.study import CrossvalStudy, SolverVariant
-from pinnray.comparison.crossval.true_fields import FieldSampler, TrueContact, TrueField
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
@@ -23,7 +18,13 @@ from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import Estimated, IdentifiedForce, Solution, State, Uncertainty
 from pinnray.solvers.solver import FieldSettings, Progress, silent
-from tests.compare.crossval.conftest import NOISE
+from pinnray.studies.crossval.fold_runner import SolverTask, run_folds
+from pinnray.studies.crossval.folds import ALL, LOAD, ONE, RANDOM, Fold, LoadCase
+from pinnray.studies.crossval.scores import FIELDS
+from pinnray.studies.crossval.study import SolverVariant
+from pinnray.studies.crossval.true_fields import FieldSampler, TrueContact, TrueField
+from pinnray.studies.sweep.measurement import Measurement
+from tests.studies.crossval.conftest import NOISE
 
 QUICK = {"degree": 1, "law": "given", "parameters": "normal_force,position"}
 SETTINGS: dict[str, dict[str, object]] = {"gp": {}, "fem-id": QUICK}
@@ -31,36 +32,43 @@ SETTINGS: dict[str, dict[str, object]] = {"gp": {}, "fem-id": QUICK}
 
 
 @pytest.fixture
-def task(tmp_path, coarse_mesh, truth, observations) -> SolverTask:
+def task(coarse_mesh, truth, observations) -> SolverTask:
     """`gp` and one fold of each kind, at the full load and half of it."""
-    coarse_mesh.save(tmp_path / "mesh.npz")
     sampled = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8).of_solution(truth, coarse_mesh)
-    paths = [tmp_path / f"truth-{share}.npz" for share in (1.0, 0.5)]
-    for path, share in zip(paths, (1.0, 0.5), strict=True):
-        u, v = (share * truth.reaction).tolist()
-        TrueField(sampled * share, TrueContact((u, v), 35.0, 34.0, 2.0)).save(path)
+    truths = [
+        TrueField(sampled * share, TrueContact(tuple(share * truth.reaction), 35.0, 34.0, 2.0))
+        for share in (1.0, 0.5)
+    ]
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
-        study=CrossvalStudy(design=Design(), variants=[], out=tmp_path),
-        layout="joints",
+        name="gp, sliding, joints",
+        problem=Problem(coarse_mesh, finger=Design()),
         variant=variant("gp"),
         load_cases=[
             LoadCase("full", Load(), 1.0, 35.0),
             LoadCase("half", Load(displacement=(0.0, -5.0)), 0.5, 35.0),
         ],
-        truths=paths,
+        truths=truths,
         observations=[[observations, half]],
-        folds=[Fold(ALL, "all", ()), Fold(ONE, "marker 4", (3,)), Fold(LOAD, "half", (), 1)],
+        folds=folds(Fold(ALL, "all", ()), Fold(ONE, "marker 4", (3,)), Fold(LOAD, "half", (), 1)),
     )
+
+
+def folds(*wanted: Fold) -> dict[int, dict[str, Fold]]:
+    """Folds of one seed."""
+    return {0: {fold.name: fold for fold in wanted}}
 
 
 def variant(name: str, **settings: object) -> SolverVariant:
     return SolverVariant(name, make_solver(name, **settings))
 
 
-def judged(task: SolverTask) -> list[FoldResult]:
-    (outcomes,) = run_folds(task)
-    return outcomes
+def judged(task: SolverTask) -> list[dict[str, Any]]:
+    """The values of the samples in the order of the folds."""
+    found: list[Measurement] = []
+    assert run_folds(task, found.append) == []
+    assert [each.number for each in found] == [name for each in task.folds.values() for name in each]
+    return [each.values for each in found]
 
 
 class Doubled(FemSolver):
@@ -80,23 +88,14 @@ class Tripled(Doubled):
 
 
 def test_a_solver_of_ones_own_is_judged_whatever_its_name(task, observations):
-    task = replace(task, folds=[Fold(ONE, "marker 4", (3,))])
+    task = replace(task, folds=folds(Fold(ONE, "marker 4", (3,))))
     given = observations.displacements
     plain, twice, thrice = (
-        np.array(judged(replace(task, variant=SolverVariant("fem", kind(degree=1))))[0].errors) + given
+        np.array(judged(replace(task, variant=SolverVariant("fem", kind(degree=1))))[0]["errors_mm"]) + given
         for kind in (FemSolver, Doubled, Tripled)  # in one folder: no fold of another class is taken over
     )
     np.testing.assert_allclose(twice, 2 * plain, rtol=1e-12)
     np.testing.assert_allclose(thrice, 3 * plain, rtol=1e-12)
-
-
-def test_folds_of_a_class_without_source_are_not_kept(task, monkeypatch):
-    """An edit of a notebook's class cannot be told."""
-    task = replace(task, folds=[Fold(ONE, "marker 4", (3,))], variant=SolverVariant("fem", Doubled(degree=1)))
-    monkeypatch.setattr(Doubled, "__module__", "a notebook")
-    before = judged(task)
-    monkeypatch.setattr(Doubled, "solve", FemSolver.solve)
-    assert judged(task)[0].errors != before[0].errors
 
 
 class Drawing:
@@ -149,7 +148,7 @@ def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name)
     settings = SETTINGS.get(name, {"degree": 1})
     if name == "fem-asm":
         settings = {**settings, "weights": "precision", "choose": "left-out"}
-    own = replace(task, variant=variant(name, **settings), folds=[fold])
+    own = replace(task, variant=variant(name, **settings), folds=folds(fold))
     moved = observations.displacements.copy()
     moved[3] += [5.0, -5.0]
     other = replace(observations, displacements=moved)
@@ -158,8 +157,8 @@ def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name)
     after = judged(replace(own, variant=relabelled, observations=[[other, other]]))[0]
     change = np.zeros((9, 2))
     change[3] = [-5.0, 5.0]
-    np.testing.assert_allclose(np.array(after.errors) - before.errors, change, atol=1e-12)
-    assert after.fields == before.fields
+    np.testing.assert_allclose(np.array(after["errors_mm"]) - before["errors_mm"], change, atol=1e-12)
+    assert all(after[name] == before[name] for name in FIELDS)
 
 
 @pytest.mark.parametrize("name", ["gp", "fem-asm", "statfem"])
@@ -169,30 +168,30 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     """By `solve`, with what the command shares between folds left aside; errors and distances by hand."""
     held = (1, 3)
     settings = SETTINGS.get(name, {"degree": 1})
-    folds = [Fold(ALL, "all", ()), Fold(RANDOM, "draw 1", held)]  # the second one finds shared work
-    _, outcome = judged(replace(task, variant=variant(name, **settings), folds=folds))
+    both = folds(Fold(ALL, "all", ()), Fold(RANDOM, "draw 1", held))  # the second one finds shared work
+    _, outcome = judged(replace(task, variant=variant(name, **settings), folds=both))
     visible = ~np.isin(np.arange(9), held)
     problem = Problem(coarse_mesh, observations=replace(observations, visible=visible))
     solution = make_solver(name, **settings).solve(problem)
     disc = misfit_of(Problem(coarse_mesh, observations=observations))
     points, means = disc.sampling()
     np.testing.assert_allclose(
-        outcome.errors, means @ solution.displacement(points) - observations.displacements, atol=1e-7
+        outcome["errors_mm"], means @ solution.displacement(points) - observations.displacements, atol=1e-7
     )
     rule = body_quadrature(coarse_mesh)
     mine, true = (each.displacement(rule.location) for each in (solution, truth))
     squares = [(rule.weights[:, None] * values**2).sum() for values in (mine - true, true)]
-    assert outcome.fields["displacement"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
+    assert outcome["displacement"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
     finite = replace(truth.problem, material=Material(law="neo-hookean"))
     true = State.from_gradient(truth.field.gradient(rule.location), finite).von_mises
     mine = solution.state(rule.location).von_mises
     squares = [(rule.weights * values**2).sum() for values in (mine - true, true)]
-    assert outcome.fields["von_mises"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
+    assert outcome["von_mises"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
     if name in ("gp", "statfem"):
         spread = solution.field.standard_deviation(coarse_mesh.locate(observations.points))  # type: ignore[attr-defined]
-        np.testing.assert_allclose(outcome.deviations, np.hypot(spread, NOISE), rtol=1e-5)
+        np.testing.assert_allclose(outcome["deviations_mm"], np.hypot(spread, NOISE), rtol=1e-5)
     else:
-        assert outcome.deviations is None
+        assert outcome["deviations_mm"] is None
 
 
 @pytest.mark.parametrize("name", ["gp", "fem-asm", "statfem"])
@@ -200,31 +199,24 @@ def test_what_was_learnt_is_carried_to_half_the_load(task, name):
     """All of it is linear, and so is this truth: half the load has half the errors."""
     settings = SETTINGS.get(name, {"degree": 1})
     outcomes = judged(replace(task, variant=variant(name, **settings)))
-    np.testing.assert_allclose(outcomes[2].errors, 0.5 * np.array(outcomes[0].errors), atol=1e-6)
-    assert outcomes[2].held == list(range(9))
-    assert len(outcomes[2].in_sample) == 0
-    assert outcomes[2].fields["displacement"] == pytest.approx(outcomes[0].fields["displacement"], rel=1e-5)
+    np.testing.assert_allclose(outcomes[2]["errors_mm"], 0.5 * np.array(outcomes[0]["errors_mm"]), atol=1e-6)
+    assert outcomes[2]["displacement"] == pytest.approx(outcomes[0]["displacement"], rel=1e-5)
 
 
 @pytest.mark.slow
 def test_an_identified_finger_is_carried_to_half_the_load(task, coarse_mesh, observations):
     """By the solver's own `transferred`."""
     solver = make_solver("fem-id", **SETTINGS["fem-id"])
-    own = replace(task, variant=variant("fem-id", **SETTINGS["fem-id"]), folds=[Fold(LOAD, "half", (), 1)])
+    own = replace(
+        task, variant=variant("fem-id", **SETTINGS["fem-id"]), folds=folds(Fold(LOAD, "half", (), 1))
+    )
     (outcome,) = judged(own)
     problem = Problem(coarse_mesh, Material(law="neo-hookean"), observations=observations)
     half = replace(problem, load=task.load_cases[1].load)
     carried = solver.transferred(solver.refitter(problem)(observations), problem, half)  # type: ignore[attr-defined]
     points, means = misfit_of(problem).sampling()
     errors = means @ carried.displacement_in_space(points) - 0.5 * observations.displacements
-    np.testing.assert_allclose(outcome.errors, errors, atol=1e-6)
-
-
-def test_a_solver_that_is_given_nothing_has_nothing_in_sample(task):
-    outcomes = judged(replace(task, variant=variant("fem", degree=1, estimate=False)))
-    assert [len(outcome.in_sample) for outcome in outcomes] == [0, 0, 0]
-    assert [len(outcome.held_out) for outcome in outcomes] == [0, 1, 9]
-    assert outcomes[0].errors == outcomes[1].errors
+    np.testing.assert_allclose(outcome["errors_mm"], errors, atol=1e-6)
 
 
 def deviation(location: LocatedPoints) -> FloatArray:
@@ -242,20 +234,19 @@ def test_force_place_and_stated_intervals_are_judged_by_the_truth(task, coarse_m
         uncertainty=Uncertainty(lambda location: np.zeros_like(location.points), deviation),
     )
     monkeypatch.setattr(
-        "pinnray.comparison.crossval.solver_folds.refitter", lambda *_: lambda observations: stating
+        "pinnray.studies.crossval.fold_runner.refitter", lambda *_: lambda observations: stating
     )
     full, one, _ = judged(task)
-    assert full.force == pytest.approx(1.0)
-    assert full.position == pytest.approx(1.5)
-    assert full.force_within is True
-    assert full.position_within is False
+    assert full["force_error"] == pytest.approx(1.0)
+    assert full["position_error_mm"] == pytest.approx(1.5)
+    assert full["force_within_stated"] is True
+    assert full["position_within_stated"] is False
     rule = body_quadrature(coarse_mesh)
     beyond = rule.location.points[:, 0] >= 30.0  # the linear stress is nowhere exactly the neo-Hookean one
-    assert full.von_mises_coverage == pytest.approx(np.average(beyond, weights=rule.weights), abs=1e-12)
-    assert (one.force, one.force_within, one.von_mises_coverage) == (None, None, None)
-    found = score([[full]])
-    assert found.force.mean == pytest.approx(1.0)
-    assert (found.force_within, found.position_within) == (1.0, 0.0)
+    assert full["von_mises_within_stated"] == pytest.approx(
+        np.average(beyond, weights=rule.weights), abs=1e-12
+    )
+    assert not {"force_error", "force_within_stated", "von_mises_within_stated"} & one.keys()
 
 
 def test_errors_are_those_in_the_picture_whose_frame_was_found(task, truth, observations, monkeypatch):
@@ -266,63 +257,36 @@ def test_errors_are_those_in_the_picture_whose_frame_was_found(task, truth, obse
     results = []
     for label, each in (("fixed", truth), ("turned", replace(truth, pictures=pictures))):
         monkeypatch.setattr(
-            "pinnray.comparison.crossval.solver_folds.refitter", lambda *_, each=each: lambda _: each
+            "pinnray.studies.crossval.fold_runner.refitter", lambda *_, each=each: lambda _: each
         )
         results.append(judged(replace(task, variant=replace(task.variant, label=label))))
-    for fixed, found in zip(*results, strict=True):
-        moved = observations.displacements if fixed.fold.load_case == 0 else 0.0
-        field = np.array(fixed.errors) + moved
-        shown = pictures.shown(observations.points, field) if fixed.fold.load_case == 0 else field
-        np.testing.assert_allclose(found.errors, shown - moved, atol=1e-12)
-        assert fixed.fields == found.fields
+    for at_full_load, fixed, found in zip((True, True, False), *results, strict=True):
+        moved = observations.displacements if at_full_load else 0.0
+        field = np.array(fixed["errors_mm"]) + moved
+        shown = pictures.shown(observations.points, field) if at_full_load else field
+        np.testing.assert_allclose(found["errors_mm"], shown - moved, atol=1e-12)
+        assert all(fixed[name] == found[name] for name in FIELDS)
 
 
 def test_the_stress_is_that_of_the_material_that_a_solver_has_found(task, truth, monkeypatch):
     softer = replace(truth.problem, material=Material(young=5.7))
     monkeypatch.setattr(
-        "pinnray.comparison.crossval.solver_folds.refitter",
+        "pinnray.studies.crossval.fold_runner.refitter",
         lambda *_: lambda _: replace(truth, problem=softer),
     )
-    halved = judged(task)[0].fields
-    monkeypatch.setattr("pinnray.comparison.crossval.solver_folds.refitter", lambda *_: lambda _: truth)
-    own = judged(replace(task, variant=replace(task.variant, label="own")))[0].fields
+    halved = judged(task)[0]
+    monkeypatch.setattr("pinnray.studies.crossval.fold_runner.refitter", lambda *_: lambda _: truth)
+    own = judged(replace(task, variant=replace(task.variant, label="own")))[0]
     assert halved["displacement"] == own["displacement"]
     assert halved["von_mises"] > own["von_mises"] + 0.1  # 0.69 and 0.48
-
-
-def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monkeypatch):
-    first = judged(task)
-
-    def again(*_: object) -> None:
-        raise RuntimeError("solved again")
-
-    monkeypatch.setattr("pinnray.comparison.crossval.solver_folds.refitter", again)
-    assert [outcome.errors for outcome in judged(task)] == [outcome.errors for outcome in first]
-    with pytest.raises(RuntimeError, match="solved again"):
-        judged(replace(task, variant=variant("gp", clamp=True)))
-
-
-def test_the_curve_of_weights_is_what_solving_again_with_them_gives(task, coarse_mesh, observations):
-    own = replace(task, variant=variant("fem-asm", degree=1))
-    curve = sweep_weights(own)
-    number = 24
-    assert curve["factor"][number] == pytest.approx(1e-3)
-    (outcome,) = judged(
-        replace(own, variant=variant("fem-asm", degree=1, asm_weight=1.0), folds=[Fold(ALL, "all", ())])
-    )
-    missed = np.sqrt((np.array(outcome.errors) ** 2).mean())
-    assert curve["in_sample_mm"][number] == pytest.approx(missed, rel=1e-6)
-    assert {name: curve[name][number] for name in outcome.fields} == pytest.approx(
-        outcome.fields, nan_ok=True
-    )
 
 
 def test_an_error_that_is_no_number_is_in_no_mean(task, monkeypatch):
     """A displacement that is not finite at the markers alone, where no mesh node is."""
     monkeypatch.setattr(
-        "pinnray.comparison.crossval.solver_folds.FieldSampler.of_solution",
-        lambda *_: replace(TrueField.load(task.truths[0]).sampled, markers=np.full((9, 2), np.nan)),
+        "pinnray.studies.crossval.fold_runner.FieldSampler.of_solution",
+        lambda *_: replace(task.truths[0].sampled, markers=np.full((9, 2), np.nan)),
     )
-    assert run_folds(replace(task, variant=variant("fem"))) == (
-        "fem: its displacement is not finite at every marker"
-    )
+    (failed,) = run_folds(replace(task, variant=variant("fem")), lambda *_: None)
+    said = "fem: its displacement is not finite at every marker"
+    assert (failed.number, failed.state, failed.message) == (task.name, "failed", said)

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.text import Text
 
 from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
@@ -20,8 +21,11 @@ from pinnray.options.shared import (
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 if TYPE_CHECKING:
-    from pinnray.comparison.crossval.study import SolverVariant
     from pinnray.solvers.physics import Material
+    from pinnray.studies.crossval.study import SolverVariant
+
+TEXTS = ("solver", "held out")
+"""Headings of columns of words."""
 
 
 @quietable
@@ -65,12 +69,13 @@ def command(
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/crossval-DESIGN.
     """
-    from pinnray.comparison.crossval.cross_validation import cross_validate
-    from pinnray.comparison.crossval.folds import LOAD
-    from pinnray.comparison.crossval.study import SIZES, CrossvalStudy
-    from pinnray.comparison.crossval.tables import terminal_tables
     from pinnray.geometry.registration import Registration
     from pinnray.runtime.stages import Stages
+    from pinnray.runtime.tables import terminal_table
+    from pinnray.studies.crossval.cross_validation import cross_validate
+    from pinnray.studies.crossval.folds import LOAD
+    from pinnray.studies.crossval.study import SIZES, CrossvalStudy
+    from pinnray.studies.crossval.tables import all_tables, truth_tables
     from pinnray.vision.measurements import read_measurements
 
     design, mesh = finger.read(options.preset, SIZES)
@@ -100,21 +105,20 @@ def command(
         say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")
     with going_on_from(study.out), Stages() as stages:
         result = cross_validate(study, stages)
-    console = Console()
-    for table in terminal_tables(result):
-        console.print(table)
-    for name in ("crossval.json", "report.html", "truths.csv", "held_out.csv", "fields.csv"):
-        if (study.out / name).exists():
-            print(study.out / name)
+    several = result.samples["truth"].nunique() > 1
+    for table in truth_tables(result)[-1:] if several else all_tables(result):
+        Console().print(terminal_table(table.title, table.headings, table.rows, left=TEXTS, narrow=True))
+        Console().print(Text(f"{table.caption}\n", style="table.caption"))
+    for name in ("report.html", "samples.csv", "scores.csv", "crossval.json"):
+        print(study.out / name)
     for name, message in result.failed.items():
         say(f"error: {name} failed, and is tried again by the same command: {message}")
-    converged = all(score.converged == 1 for _, _, score in result.every_score())
-    return 0 if converged and not result.failed else NOT_CONVERGED
+    return 0 if result.samples["converged"].all() and not result.failed else NOT_CONVERGED
 
 
 def read_variants(options: SolverOptions, names: str, material: "Material") -> "list[SolverVariant]":
     """The solvers and their variants; a single one where --solver-set chooses the weight of the markers."""
-    from pinnray.comparison.crossval.study import solver_variants
+    from pinnray.studies.crossval.study import solver_variants
 
     keys = [text.partition("=")[0].split(".") for text in options.solver_set]
     fixed = [key[0] for key in keys if key[1:] in (["choose"], ["weights"])]

@@ -1,12 +1,11 @@
-"""Folds, the markers and loads that are held out together, and the errors of a solver in them."""
+"""Folds: the markers and loads that are held out together."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Load, Problem, contact_ends
 
@@ -42,70 +41,6 @@ class Fold:
     name: str  # unique in its scheme
     held: tuple[int, ...]  # numbers of the markers that are not given, from zero
     load_case: int = 0  # number of the predicted load; markers are given at load case zero
-
-
-@dataclass(frozen=True)
-class FoldResult:
-    """A solver in one fold for one seed.
-
-    The numbers from `force` on exist in the scheme `ALL` with a truth only; else they are None, and where the
-    solver states nothing.
-
-    Attributes:
-        fold: The held-out markers and the load.
-        errors: Predicted minus observed displacement of every marker at the fold's load, shape (m, 2), mm.
-        deviations: Standard deviations that the solver states for them, shape (m, 2), mm; None if none.
-        fields: Relative L2 distances from the truth; empty without a truth.
-        converged: Whether the solver converged, by its own criterion.
-        given: Whether it was given any markers.
-        force: Magnitude of the reaction over the true one, less one.
-        position: Stated minus true abscissa at which the contact's force acts, mm.
-        von_mises_coverage: Share of the body whose true von Mises stress lies in the stated interval.
-        force_within: Whether the magnitude of the true force lies in the stated interval.
-        position_within: Whether the place of the true force lies in the stated interval.
-        message: What speaks against the result; empty if nothing does.
-    """
-
-    fold: Fold
-    errors: Sequence[Sequence[float]]
-    deviations: Sequence[Sequence[float]] | None = None
-    fields: Mapping[str, float] = field(default_factory=dict)
-    converged: bool = True
-    given: bool = True
-    force: float | None = None
-    position: float | None = None
-    von_mises_coverage: float | None = None
-    force_within: bool | None = None
-    position_within: bool | None = None
-    message: str = ""
-
-    @property
-    def held(self) -> list[int]:
-        """Numbers of the markers whose errors count as held out: all of them at another load."""
-        return list(range(len(self.errors)) if self.fold.load_case else self.fold.held)
-
-    @property
-    def held_out(self) -> FloatArray:
-        """Errors at markers that were not given at this load, shape (h, 2), mm."""
-        return np.asarray(np.array(self.errors)[self.held])
-
-    @property
-    def in_sample(self) -> FloatArray:
-        """Errors at markers that were given at this load, shape (g, 2), mm."""
-        given = np.full(len(self.errors), self.given)
-        given[self.held] = False
-        return np.asarray(np.array(self.errors)[given])
-
-    @property
-    def ratios(self) -> FloatArray:
-        """Errors of held-out markers over their stated standard deviations, shape (h, 2), or (0, 2)."""
-        if self.deviations is None:
-            return np.zeros((0, 2))
-        return np.asarray(self.held_out / np.array(self.deviations)[self.held])
-
-
-SeedResults = Sequence[Sequence[FoldResult]]
-"""For each seed, the results of its folds."""
 
 
 def load_cases_of(problem: Problem, *, others: bool) -> list[LoadCase]:

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 
-from pinnray.comparison.crossval.folds import LoadCase
-from pinnray.comparison.crossval.study import SIZES, CrossvalStudy
 from pinnray.comparison.evaluation.evaluation import field_difference
 from pinnray.comparison.evaluation.truths import Truth, simulate
 from pinnray.geometry.cache import finger_mesh
@@ -17,7 +16,7 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_arrays
-from pinnray.runtime.cache import cache_folder, kept_if_possible
+from pinnray.runtime.cache import cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
@@ -25,7 +24,8 @@ from pinnray.runtime.tables import Cell
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import SolidField, Solution, State
-from pinnray.solvers.solver import Progress, silent
+from pinnray.studies.crossval.folds import LoadCase
+from pinnray.studies.crossval.study import SIZES, CrossvalStudy
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class SampledField:
         Args:
             truth: The true displacement.
             own: Problem with the solver's law.
-            finite: Problem with the truth's law; it also gives this displacement's `von_mises_finite`.
+            finite: Problem with the truth's law; it also gives this displacement's `von_mises_true_law`.
             weights: Quadrature weights, shape (q,), mm².
         """
         state, true = self.state(own), truth.state(finite)
@@ -75,7 +75,7 @@ class SampledField:
             "displacement": (self.displacement, truth.displacement),
             "strain": (state.strain.reshape(flat), true.strain.reshape(flat)),
             "von_mises": (state.von_mises, true.von_mises),
-            "von_mises_finite": (with_true_law.von_mises, true.von_mises),
+            "von_mises_true_law": (with_true_law.von_mises, true.von_mises),
         }
         return {name: field_difference(*pair, weights).rel_l2 for name, pair in pairs.items()}
 
@@ -189,28 +189,27 @@ class TrueField:
 
 @dataclass(frozen=True)
 class TruthTask:
-    """A truth and a load case of a study, which a process simulates."""
+    """A truth and a load case of a study, which a process simulates and samples on the shared mesh."""
 
     study: CrossvalStudy
     truth: Truth
     case: LoadCase
+    mesh: TriangleMesh
 
 
-def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Path]:
+def simulate_truth(task: TruthTask, _: object = None) -> dict[str, TrueField]:
     """Simulate the true field, unless the cache has it, and sample it with the markers of every layout.
 
     Returns:
-        Files by layout: in the cache, or in the study's folder where the cache cannot be written.
+        The field by layout.
 
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
     """
-    study, truth = task.study, task.truth
+    study, truth, shared = task.study, task.truth, task.mesh
     drawn = study.design.at_contact(task.case.contact)
     design = truth.finger(drawn)
     stroke = -task.case.share * float(study.load.displacement[1] or 0.0)
-    shared = TriangleMesh.load(study.mesh_file)
-    markers = study.markers
     parts = [
         design.digest,
         study.mesh and study.mesh.model_dump(),
@@ -221,40 +220,29 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
         package_versions(),
         sources_digest(__name__),
     ]
-    names = {
-        layout: f"truth-{content_hash([*parts, points.tolist()])}.npz" for layout, points in markers.items()
-    }
-    folders = cache_folder(), study.out / "truths"
-    files = {
-        layout: file
-        for folder in reversed(folders)
-        for layout, name in names.items()
-        if (file := folder / name).exists()
-    }
-    missing = [layout for layout in names if layout not in files]
-    if not missing:
-        progress(1.0, "from the cache")
-        return files
-    sizes = study.mesh or SIZES
-    finer = sizes.model_copy(update={"size": truth.finer * sizes.size})
-    mesh = finger_mesh(design, settings=finer)
-    problem = Problem(mesh, study.material, Load(displacement=(0.0, -stroke)))
-    solution = simulate(problem, progress, truth)
-    contact = _contact(solution)
-    for layout in missing:
-        sampler = FieldSampler.of(shared, markers[layout], design.marker_radius)
-        sampled = sampler.of_solution(solution, shared, truth.changes(drawn))
-        files[layout] = _kept(TrueField(sampled, contact), *(folder / names[layout] for folder in folders))
-    return files
 
+    @lru_cache(maxsize=1)
+    def solution() -> Solution:
+        sizes = study.mesh or SIZES
+        finer = sizes.model_copy(update={"size": truth.finer * sizes.size})
+        mesh = finger_mesh(design, settings=finer)
+        return simulate(Problem(mesh, study.material, Load(displacement=(0.0, -stroke))), truth=truth)
 
-def _kept(field: TrueField, entry: Path, own: Path) -> Path:
-    """The file of a true field: an entry of the cache if that can be written, else the study's own."""
-    with kept_if_possible(entry.parent, "the virtual experiment of another study"):
-        field.save(entry)
-        return entry
-    field.save(own)
-    return own
+    def sampled(points: FloatArray) -> TrueField:
+        sampler = FieldSampler.of(shared, points, design.marker_radius)
+        found = sampler.of_solution(solution(), shared, truth.changes(drawn))
+        return TrueField(found, _contact(solution()))
+
+    return {
+        layout: cached(
+            cache_folder() / f"truth-{content_hash([*parts, points.tolist()])}.npz",
+            "the virtual experiment",
+            partial(sampled, points),
+            TrueField.load,
+            TrueField.save,
+        )
+        for layout, points in study.markers.items()
+    }
 
 
 def _contact(solution: Solution) -> TrueContact:

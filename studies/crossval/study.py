@@ -7,7 +7,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from pinnray.comparison.crossval.folds import ALL, SCHEMES
 from pinnray.comparison.evaluation.definition import job_definition
 from pinnray.comparison.evaluation.truths import EVERY_TRUTH, SLIDING, TRUTHS, Truth, check_truths
 from pinnray.geometry.cache import mesh_sizes
@@ -22,6 +21,7 @@ from pinnray.runtime.machine import cores
 from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, check_load, check_name, with_law
+from pinnray.studies.crossval.folds import ALL, SCHEMES
 
 SIZES = MeshSettings(size=0.5)
 """Usual element sizes: `fem` is off by 0.01 mm at the markers, a hundredth of its model error."""
@@ -134,11 +134,6 @@ class CrossvalStudy:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", mesh_sizes(self.design, self.mesh, SIZES))
-
-    @property
-    def mesh_file(self) -> Path:
-        """File of the shared mesh."""
-        return self.out / "mesh.npz"
 
     @property
     def truth_names(self) -> tuple[str, ...]:

@@ -1,0 +1,234 @@
+"""A cross-validation as a study: its samples are solvers in folds, by seed, truth and layout of markers."""
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from secrets import token_hex
+
+import numpy as np
+
+from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
+from pinnray.comparison.evaluation.truths import experiment_source
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
+from pinnray.geometry.registration import FIXED
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import write_json
+from pinnray.runtime.content_hash import content_hash, has_source, sources_digest
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import cores
+from pinnray.runtime.output_folder import check_resumable_folder, locked
+from pinnray.runtime.processes.child import ProcessFailed
+from pinnray.runtime.processes.pool import known_to_children
+from pinnray.runtime.stages import Stages
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import Traits
+from pinnray.studies.crossval.fold_runner import SolverTask, run_folds
+from pinnray.studies.crossval.folds import LOAD, LoadCase, folds_of, load_cases_of
+from pinnray.studies.crossval.report import write_results
+from pinnray.studies.crossval.result import CrossvalResult
+from pinnray.studies.crossval.scores import Sample, sample_table
+from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant, visible_markers
+from pinnray.studies.crossval.true_fields import TrueField, TruthTask, simulate_truth
+from pinnray.studies.sweep.measurement import Measurement
+from pinnray.studies.sweep.store import opened
+from pinnray.studies.sweep.sweep import JOURNAL, run_tasks
+from pinnray.studies.sweep.workers import Workers
+
+DEFINITION = "definition.json"
+Case = tuple[str, str]
+"""A truth and a layout of its markers; with measurements both are called `measured` or `simulated`."""
+
+
+def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> CrossvalResult:
+    """Run every sample of a cross-validation that has no result yet, and keep each result at once.
+
+    Solvers run in processes of their own; one whose class those cannot import, such as a class of the calling
+    script or notebook, runs in this process after them.
+
+    Args:
+        study: The finger, the solvers and what to hold out.
+        stages: Shows the progress; None shows nothing.
+
+    Raises:
+        UserError: If the study cannot be done, or the folder holds something else.
+    """
+    stages = stages or Stages(quiet=True)
+    study.check()
+    given = study.measurements and visible_markers(study.measurements)
+    definition = study.definition(given)
+    check_resumable_folder(study.out / DEFINITION, definition, job="cross-validation")
+    with stages.stage("mesh"):
+        mesh = finger_mesh(study.design, settings=study.mesh)
+        if mesh.moduli is not None:
+            raise UserError("crossval takes a body of one material, and parts of this one have their own")
+        if given:
+            check_positions(given, mesh)
+        problem = Problem(mesh, study.material, study.load)
+        remarks = displacement_remarks(given, problem) if given else []
+        for remark in [*problem_remarks(problem), *remarks]:
+            warnings.warn(remark, stacklevel=2)
+    load_cases = load_cases_of(problem, others=LOAD in study.schemes and given is None)
+    study.out.mkdir(parents=True, exist_ok=True)
+    threads = max(1, cores() // study.processes)
+    with (
+        locked(study.out),
+        opened(study.out / JOURNAL) as journal,
+        Workers(study.processes, threads=threads, warm=True) as workers,
+    ):
+        write_json(study.out / DEFINITION, definition)
+        truths: dict[str, dict[str, list[TrueField]]] = {}
+        if given:
+            observations = {(given.label, given.label): [[given]] * study.seeds}
+        else:
+            truths = _true_fields(study, mesh, load_cases, workers, stages)
+            observations = _noisy(study, truths, problem)
+        wanted = dict(_samples(study, observations, load_cases))
+        journal.forget("failed")
+        known = journal.numbers()
+        tasks = []
+        for truth, layout in observations:
+            for variant in study.variants:
+                task = SolverTask(
+                    f"{variant.label}, {truth}, {layout}",
+                    replace(problem, finger=study.design),
+                    variant,
+                    load_cases,
+                    truths.get(truth, {}).get(layout, []),
+                    observations[truth, layout],
+                    {
+                        seed: {
+                            name: sample.fold
+                            for name, sample in wanted.items()
+                            if sample[:4] == (truth, layout, variant.label, seed) and name not in known
+                        }
+                        for seed in range(study.seeds)
+                    },
+                    study.chosen_truths.get(truth),
+                )
+                tasks += [task] if any(task.folds.values()) else []
+        with stages.stage("samples") as progress:
+            run = partial(run_tasks, run_folds, samples=wanted, journal=journal, progress=progress, deaths=1)
+            # Slow solvers are usually named last: started first, they leave no processor idle at the end.
+            pooled = [task for task in reversed(tasks) if known_to_children(task.variant.solver)]
+            run({task.name: task for task in pooled}, workers=workers)
+            run({task.name: task for task in tasks if task not in pooled}, workers=None)
+        found = _result(study, wanted, journal.measurements(), observations, truths)
+        with stages.stage("report"):
+            write_results(found, {**definition, "problem_sha256": problem.digest, **stages.record()})
+    for remark in found.remarks:
+        warnings.warn(remark, stacklevel=2)
+    return found
+
+
+def _true_fields(
+    study: CrossvalStudy, mesh: TriangleMesh, load_cases: Sequence[LoadCase], workers: Workers, stages: Stages
+) -> dict[str, dict[str, list[TrueField]]]:
+    """The true fields at every load by truth and layout, each simulated in a process."""
+    own = replace(study, variants=())  # other processes may not know the classes of all solvers
+    tasks = {
+        (truth.name, case.name): TruthTask(own, truth, case, mesh)
+        for truth in study.chosen_truths.values()
+        for case in load_cases
+    }
+    found: dict[tuple[str, str], dict[str, TrueField]] = {}
+    with stages.stage("truths") as progress:
+        for (truth, load), answer in workers.answers(simulate_truth, tasks, deaths=1):
+            if isinstance(answer, ProcessFailed):
+                raise UserError(
+                    f"truth {truth}, {load}: the virtual experiment did not come to its end; press less, "
+                    f"drop the truth or {LOAD}, or give measurements"
+                )
+            found[truth, load] = answer
+            progress(len(found) / len(tasks), f"{len(found)} of {len(tasks)} truths")
+    return {
+        truth: {layout: [found[truth, case.name][layout] for case in load_cases] for layout in study.markers}
+        for truth in study.chosen_truths
+    }
+
+
+def _noisy(
+    study: CrossvalStudy, truths: Mapping[str, Mapping[str, Sequence[TrueField]]], problem: Problem
+) -> dict[Case, list[list[Observations]]]:
+    """True marker displacements with noise, for each seed at each load; the noise is equal in every truth."""
+
+    def observed(true: FloatArray, truth: str, layout: str, seed: int, at: int) -> Observations:
+        points = study.markers[layout]
+        known = study.frame if at == 0 else FIXED
+        shown = true if known.fixed else study.pressed_picture(points, seed).moved(points + true) - points
+        source = experiment_source(problem, study.chosen_truths[truth])
+        return Observations(
+            points=points,
+            displacements=shown + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
+            standard_deviations=np.full_like(true, study.noise),
+            visible=np.ones(len(true), dtype=bool),
+            source=f"{source}, with {study.noise:g} mm of noise",
+            simulated=True,
+            marker_radius=study.design.marker_radius,
+            pressed=known,
+        )
+
+    found = {}
+    for truth, layouts in truths.items():
+        for layout, fields in layouts.items():
+            found[truth, layout] = [
+                [observed(field.sampled.markers, truth, layout, seed, at) for at, field in enumerate(fields)]
+                for seed in range(study.seeds)
+            ]
+    return found
+
+
+def _samples(
+    study: CrossvalStudy,
+    observations: Mapping[Case, Sequence[Sequence[Observations]]],
+    load_cases: Sequence[LoadCase],
+) -> Iterator[tuple[str, Sample]]:
+    """Every sample by its name in the journal, which tells all that its result depends on."""
+    for (truth, layout), seeds in observations.items():
+        folds = folds_of(study.schemes, len(seeds[0][0].points), load_cases)
+        for variant in study.variants:
+            for seed in range(study.seeds):
+                digest = _digest(variant, seed)
+                for fold in folds:
+                    name = f"{truth}, {layout}, {variant.label}, {seed}, {fold.scheme}, {fold.name}, {digest}"
+                    yield name, Sample(truth, layout, variant.label, seed, fold)
+
+
+def _digest(variant: SolverVariant, seed: int) -> str:
+    """Digest of a solver's class, source and settings; another one each time if the class has no source."""
+    kind = type(solver := variant.make(seed))
+    source = sources_digest(kind.__module__) if has_source(kind.__module__) else token_hex()
+    return content_hash([kind.__module__, kind.__qualname__, source, solver.settings()])
+
+
+def _result(
+    study: CrossvalStudy,
+    wanted: Mapping[str, Sample],
+    measurements: Sequence[Measurement],
+    observations: Mapping[Case, Sequence[Sequence[Observations]]],
+    truths: Mapping[str, Mapping[str, Sequence[TrueField]]],
+) -> CrossvalResult:
+    """The result of the samples; the solvers that failed with a truth and layout have no score there.
+
+    Raises:
+        UserError: If all solvers have failed with one of them.
+    """
+    failed = {each.number: each.message for each in measurements if each.state == "failed"}
+    found = {each.number: each for each in measurements}
+    takes = {variant.label: Traits.of(variant.make(0)).assimilates for variant in study.variants}
+    rows = [
+        (sample, takes[sample.solver], found[name])
+        for name, sample in wanted.items()
+        if f"{sample.solver}, {sample.truth}, {sample.layout}" not in failed
+    ]
+    if {(sample.truth, sample.layout) for sample, *_ in rows} < observations.keys():
+        raise UserError("; ".join(f"{name}: {message}" for name, message in failed.items()))
+    return CrossvalResult(
+        study,
+        sample_table(rows),
+        {truth: seeds[0][0].origin for (truth, _), seeds in observations.items()},
+        {truth: next(iter(each.values()))[0].contact for truth, each in truths.items()},
+        failed,
+    )
