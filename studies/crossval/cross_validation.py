@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from secrets import token_hex
@@ -26,7 +27,7 @@ from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Traits
 from pinnray.studies.crossval.fold_runner import SolverTask, run_folds
-from pinnray.studies.crossval.folds import LOAD, LoadCase, folds_of, load_cases_of
+from pinnray.studies.crossval.folds import LOAD, Fold, LoadCase, folds_of, load_cases_of
 from pinnray.studies.crossval.report import write_results
 from pinnray.studies.crossval.result import CrossvalResult
 from pinnray.studies.crossval.scores import Sample, sample_table
@@ -72,13 +73,11 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
             warnings.warn(remark, stacklevel=2)
     load_cases = load_cases_of(problem, others=LOAD in study.schemes and given is None)
     study.out.mkdir(parents=True, exist_ok=True)
-    threads = max(1, cores() // study.processes)
-    with (
-        locked(study.out),
-        opened(study.out / JOURNAL) as journal,
-        Workers(study.processes, threads=threads, warm=True) as workers,
-    ):
-        write_json(study.out / DEFINITION, definition)
+    threads = max(1, cores() // min(study.processes, len(study.variants)))
+    with locked(study.out), ExitStack() as stack:
+        write_json(study.out / DEFINITION, definition)  # first: a folder without it is taken for someone's
+        journal = stack.enter_context(opened(study.out / JOURNAL))
+        workers = stack.enter_context(Workers(study.processes, threads=threads, warm=True))
         truths: dict[str, dict[str, list[TrueField]]] = {}
         if given:
             observations = {(given.label, given.label): [[given]] * study.seeds}
@@ -87,28 +86,24 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
             observations = _noisy(study, truths, problem)
         wanted = dict(_samples(study, observations, load_cases))
         journal.forget("failed")
-        known = journal.numbers()
-        tasks = []
-        for truth, layout in observations:
-            for variant in study.variants:
-                task = SolverTask(
-                    f"{variant.label}, {truth}, {layout}",
-                    replace(problem, finger=study.design),
-                    variant,
-                    load_cases,
-                    truths.get(truth, {}).get(layout, []),
-                    observations[truth, layout],
-                    {
-                        seed: {
-                            name: sample.fold
-                            for name, sample in wanted.items()
-                            if sample[:4] == (truth, layout, variant.label, seed) and name not in known
-                        }
-                        for seed in range(study.seeds)
-                    },
-                    study.chosen_truths.get(truth),
-                )
-                tasks += [task] if any(task.folds.values()) else []
+        known, variants = journal.numbers(), {variant.label: variant for variant in study.variants}
+        missing: dict[tuple[str, str, str], dict[int, dict[str, Fold]]] = {}
+        for name, sample in wanted.items():
+            if name not in known:
+                missing.setdefault(sample[:3], {}).setdefault(sample.seed, {})[name] = sample.fold
+        tasks = [
+            SolverTask(
+                f"{label}, {truth}, {layout}",
+                replace(problem, finger=study.design),
+                variants[label],
+                load_cases,
+                truths[truth][layout] if truths else [],
+                observations[truth, layout],
+                folds,
+                study.chosen_truths.get(truth),
+            )
+            for (truth, layout, label), folds in missing.items()
+        ]
         with stages.stage("samples") as progress:
             run = partial(run_tasks, run_folds, samples=wanted, journal=journal, progress=progress, deaths=1)
             # Slow solvers are usually named last: started first, they leave no processor idle at the end.

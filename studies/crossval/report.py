@@ -79,7 +79,8 @@ def draw_held_out(result: CrossvalResult) -> Figure:
         for case, said, (axes,) in charts:
             for label, values in means.loc[case].groupby("solver", sort=False):
                 _line(axes, result, label, values.droplevel("solver"))
-            axes.set_xlabel("marker, by its number in the drawing" + said)
+            axes.set_title(said, fontsize=8.5, loc="left")
+            axes.set_xlabel("marker, by its number in the drawing")
             axes.set_ylabel(r"$|\Delta u| + |\Delta v|$, mm")
             axes.set_xticks(sorted(means.loc[case].index.unique("marker")))
         drawn = axes.figure
@@ -100,7 +101,8 @@ def draw_fields(result: CrossvalResult) -> Figure:
                     _line(axes, result, label, pd.Series(each.to_numpy(), places))
                 axes.axhline(100, color="#999999", linewidth=0.6, zorder=1)
                 axes.set_xticks(range(len(schemes)), schemes, rotation=45, ha="right")
-                axes.set_xlabel(field + said)
+                axes.set_xlabel(field)
+            columns[0].set_title(said, fontsize=8.5, loc="left")
             columns[0].set_ylabel("%")
         drawn = axes.figure
     return drawn  # type: ignore[return-value]
@@ -110,7 +112,7 @@ def draw_fields(result: CrossvalResult) -> Figure:
 def _charts(
     result: CrossvalResult, title: str, note: str, *, columns: int = 1, gap: float = 0.0, foot: float = 0.5
 ) -> Iterator[Sequence[tuple[tuple[str, str], str, list[Axes]]]]:
-    """Logarithmic charts: for each truth and layout both, words for labels, and a row of charts.
+    """Logarithmic charts: for each truth and layout both, a title, and a row of charts.
 
     Height of the foot and the gap between charts in inches.
     """
@@ -124,8 +126,7 @@ def _charts(
         rows = []
         for row, case in enumerate(cases):
             boxes = [(left + at * (width + gap), top + row * pitch, width, height) for at in range(columns)]
-            said = f"; {result.said(*case)}" if len(cases) > 1 else ""
-            rows.append((case, said, [axes_at(drawn, box) for box in boxes]))
+            rows.append((case, result.said(*case), [axes_at(drawn, box) for box in boxes]))
         for axes in drawn.axes:
             axes.set_yscale("log")
             axes.yaxis.set_major_formatter("{x:g}")

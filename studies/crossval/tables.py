@@ -149,7 +149,8 @@ def _grid(
 def verdict_sentences(result: CrossvalResult) -> Iterator[str]:
     """For each solver that takes markers where it is better or worse than each baseline.
 
-    With several truths or layouts that is said of the main scheme alone, else of every scheme.
+    With several truths or layouts that is said of the main scheme alone, else of every scheme; a verdict
+    without a place holds in all of them.
     """
     takes = [each.label for each in result.study.variants if Traits.of(each.make(0)).assimilates]
     several = len(result.scores.groupby(CASE)) > 1
@@ -164,8 +165,10 @@ def verdict_sentences(result: CrossvalResult) -> Iterator[str]:
                     meant = ALL if score != HELD_OUT else result.main_scheme if several else at["scheme"]
                     if (at["solver"], at["score"], at["scheme"]) == (solver, score, meant):
                         where = result.said(at["truth"], at["layout"]) if several else at["scheme"]
-                        verdicts.setdefault(verdict, []).append(where)
+                        verdicts.setdefault(verdict, []).append(where.replace(", ", " "))
                 said = (f"{verdict} in {', '.join(where)}" for verdict, where in verdicts.items())
-                clauses += [f"{words} {', '.join(said)}"] if verdicts else []
+                clauses += (
+                    [f"{words} {', '.join(said if len(verdicts) > 1 else verdicts)}"] if verdicts else []
+                )
             if clauses:
                 yield f"{solver} against {baseline}: {'; '.join(clauses)}."

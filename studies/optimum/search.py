@@ -37,24 +37,18 @@ CANDIDATES = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Optimum:
-    """All runs of a search, and those on the front.
+class Optimum(Sweep):
+    """All runs of a search as the samples of a sweep, and those on the front.
 
     Attributes:
-        question: The question.
-        fingers: Of the runs.
-        measurements: Their results, in the same order.
+        study: The question.
         front: Numbers of the runs on the Pareto front, ordered by the first objective.
         volumes: Hypervolume after each run, shape (n,), in the product of the objectives' units.
-        reference: Point from which it counts, as values of the objectives.
     """
 
-    question: Question
-    fingers: list[dict[str, Value]]
-    measurements: list[Measurement]
+    study: Question
     front: list[int]
     volumes: FloatArray
-    reference: dict[str, float]
 
     __repr__ = brief
 
@@ -190,9 +184,7 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
         hypervolume(costs[[each.number <= number for each in allowed]], reference)
         for number in range(len(measured))
     ]
-    signs = [1.0 if sense == "least" else -1.0 for sense in question.objectives.values()]
-    point = dict(zip(question.objectives, map(float, reference * signs), strict=True))
-    return Optimum(question, fingers, measured, on_front, np.array(volumes), point)
+    return Optimum(question, fingers, measured, on_front, np.array(volumes))
 
 
 def _known_fingers(file: Path) -> list[dict[str, Value]]:

@@ -4,14 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.patches import Rectangle
 
 from pinnray.comparison.figures.style import HALO, axes_at, write_heading
 from pinnray.geometry.drawing.drawn_finger import finger_from
 from pinnray.geometry.finger.picture import draw_section
-from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.studies.sweep.job import StudyJob
@@ -25,9 +23,6 @@ SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
 MOST_DOTS = 2_000
 """Largest number of samples drawn in a panel."""
 
-BINS, LEAST_BINS, IN_A_BIN = 8, 3, 8
-"""Bins of the medians at most and at least, and samples for each: medians of fewer vary by chance."""
-
 WIDE = 6
 """Largest number of columns that have room for long words."""
 
@@ -36,7 +31,7 @@ COLUMNS = 3
 
 
 def draw_pairs(sweep: Sweep) -> Figure:
-    """Draw quantities over the varied parameters: a dot for each sample, and medians of bins."""
+    """Draw quantities over the varied parameters: a dot for each sample."""
     names = [name for name in SHOWN if _varies(sweep, name)]
     parameters = list(sweep.study.varied)
     good = sweep.good[:MOST_DOTS]
@@ -44,9 +39,7 @@ def draw_pairs(sweep: Sweep) -> Figure:
     left, head, foot, gap, tall = 1.1, 0.5, 0.95, 0.12, 0.62
     width = (WIDTH - left - 0.1 - gap * (len(parameters) - 1)) / len(parameters)
     with figure(head + foot + (tall + gap) * len(names)) as drawn:
-        bins = min(BINS, len(good) // IN_A_BIN)
-        line = f"line: medians of {bins} bins" if bins >= LEAST_BINS else "too few for a line of medians"
-        note = f"{len(good)} of {len(sweep.good)} samples; {line}"
+        note = f"{len(good)} of {len(sweep.good)} samples"
         write_heading(drawn, f"Quantities over parameters: {sweep.study.name}", note)
         for row, name in enumerate(names):
             values = np.array([each.values[name] for each in good])
@@ -57,7 +50,6 @@ def draw_pairs(sweep: Sweep) -> Figure:
                 choices = sweep.study.varied[parameter].values
                 x = np.array([choices.index(text) if choices else text for text in texts], dtype=np.float64)
                 axes.plot(x, values, "o", ms=size, color="#0072b2", alpha=0.7, mew=0, clip_on=False, zorder=3)
-                draw_medians(axes, x, values)
                 axes.tick_params(length=2, pad=1.5)
                 axes.locator_params(axis="y", nbins=3)
                 ends = _ends(sweep, parameter)
@@ -178,19 +170,6 @@ def draw_fingers(sweep: Sweep, job: StudyJob[Study]) -> Figure:
                 axes.set_title(f"{name}, {unit}", size=SMALL, pad=14, loc="left", weight="bold")
             axes.text(0, 1.04, f"{value:.3g} (sample {number})", size=SMALL, transform=axes.transAxes)
     return drawn
-
-
-def draw_medians(axes: Axes, x: FloatArray, values: FloatArray) -> None:
-    """Draw the medians of bins, or of levels, that hold enough samples each; nothing if they are few."""
-    levels = np.unique(x)
-    bins = min(BINS, len(x) // IN_A_BIN)
-    if (len(levels) if len(levels) <= 12 else LEAST_BINS) * IN_A_BIN > len(x):
-        return
-    edges = np.linspace(x.min(), x.max(), bins + 1) if len(levels) > 12 else np.append(levels, np.inf)
-    places = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
-    used = [number for number in range(len(edges) - 1) if (places == number).any()]
-    middles = [np.median(x[places == number]) for number in used]
-    axes.plot(middles, [np.median(values[places == number]) for number in used], color=INK, lw=1.0)
 
 
 def _varies(sweep: Sweep, name: str) -> bool:

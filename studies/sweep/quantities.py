@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import field_difference
-from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.finger_figures import Quantity, figures_at_rest, figures_of
@@ -29,13 +28,12 @@ TRAINING: Mapping[str, Quantity] = {
 
 
 def quantities(
-    finger: Finger, problem: Problem, solver: Solver, *, density: float, progress: Progress = silent
+    problem: Problem, solver: Solver, *, density: float, progress: Progress = silent
 ) -> tuple[Solution, dict[str, float]]:
     """Solve a problem and evaluate every quantity.
 
     Args:
-        finger: The finger of the problem's mesh.
-        problem: The problem; its material's law is replaced by one that the solver has.
+        problem: The problem, with its finger; its material's law is replaced by one that the solver has.
         solver: The solver.
         density: Of the material, g/cm^3.
         progress: Called by the solver; it may stop it by an exception.
@@ -43,7 +41,6 @@ def quantities(
     Returns:
         The solution, and the quantities by the names of `QUANTITIES`; NaN where the solver does not give one.
     """
-    problem = replace(problem, finger=finger)
     linear = replace(problem, material=problem.material.model_copy(update={"law": "linear"}))
     plain = replace(solver, estimate=False) if isinstance(solver, FemSolver) else FemSolver(estimate=False)
     if isinstance(solver, FemSolver):

@@ -65,7 +65,7 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     own = scores.loc["sliding", "joints", "fem-asm"]["against_fem"]
     assert (own["tip-out", HELD_OUT], own["tip-out", "von_mises"]) == ("better", "worse")
     assert ("sliding", "joints", "fem", "all", "in_sample_mae_sum_mm") not in scores.index
-    assert "gp against fem: held-out error better in tip-out" in (tmp_path / "report.html").read_text()
+    assert "gp against fem: held-out error better" in (tmp_path / "report.html").read_text()
 
     assert run(f"{line} --seeds 1 --noise 0.02", tmp_path) == 2
     assert "holds a cross-validation with other settings (noise_mm)" in capsys.readouterr().err

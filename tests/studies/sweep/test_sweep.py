@@ -9,20 +9,16 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from pinnray.cli import main
-from pinnray.comparison.figures.style import axes_at
 from pinnray.geometry.cache import cad_files
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.figure import figure
 from pinnray.solvers.solution import Solution
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement, measurement
-from pinnray.studies.sweep.pictures import draw_medians
 from pinnray.studies.sweep.quantities import quantities
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import opened
@@ -190,14 +186,6 @@ def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     longer = study.model_copy(update={"time_limit": 600.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
-
-
-def test_medians_are_drawn_of_enough_samples_alone() -> None:
-    with figure(2.0) as drawn:
-        axes = axes_at(drawn, (1, 1, 1, 1))
-        for count, lines in ((16, 0), (64, 1)):
-            draw_medians(axes, np.linspace(0, 1, count), np.linspace(0, 1, count))
-            assert len(axes.lines) == lines
 
 
 def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
