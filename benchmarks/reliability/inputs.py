@@ -20,7 +20,7 @@ from benchmarks.tables import keep_rows, kept_rows
 from pinnray.geometry.cache import drawn_finger
 from pinnray.geometry.drawing.description import load_description
 from pinnray.runtime.errors import UserError
-from pinnray.studies.sweep.measurement import Measurement, measurement
+from pinnray.studies.sweep.measurement import Measurement, measured
 
 if TYPE_CHECKING:
     from benchmarks.reliability.strategies import Given
@@ -72,7 +72,7 @@ def answer_to(given: "Given", folder: Path) -> Measurement:
                 path.write_text(given.sketch.svg, encoding="utf-8")
                 finger = drawn_finger(path, load_description(None, given.sketch.lines), cache_dir=folder)
                 task = replace(task, definition=finger.definition())
-            return measurement(task)
+            return measured(task)
         except UserError as error:
             return Measurement(0, "refused", str(error), 0.0)
         except Exception as error:

@@ -35,6 +35,10 @@ FEM, THREE, TWO = (
 RIG = "rig --mesh-size 4 --size 320x240 --rest 4 --moving 2 --held 4 --codec png"
 TRACK = _words("track FOLDER/film/frames --camera FOLDER/film/camera.json")
 CROSSVAL = _words("crossval --solvers fem --schemes one-out --seeds 1 --mesh-size 4 --processes 1")
+GRIDSEARCH = _words(
+    "gridsearch --mesh-size 4 --epochs 4 --learning-rates 1e-3,1e-2 --bc-weights 1 --processes 1 "
+    "--solver-set pinn-std.checkpoint_every=2"
+)
 STUDY = "mesh_size = 4.0\nsamples = 3\n[varied]\nrib_angle = {from = -10, to = 20}\n"
 JOBS = (
     Job("compare", FEM, again=("--resume",)),
@@ -46,6 +50,7 @@ JOBS = (
     Job("rig", _words(RIG)),
     Job("track", TRACK, earlier=_words(RIG, "film")),
     Job("crossval", CROSSVAL, whole=False),
+    Job("gridsearch", GRIDSEARCH, whole=False),
 )
 
 

@@ -26,7 +26,7 @@ from pinnray.studies.fields.explorer import write_explorer
 from pinnray.studies.fields.reader import FIGURES
 from pinnray.studies.sweep.field_path import FieldPath, moved_mesh
 from pinnray.studies.sweep.job import FieldOrder, Task, field_base
-from pinnray.studies.sweep.measurement import Measurement, measurement
+from pinnray.studies.sweep.measurement import Measurement, measured
 from pinnray.studies.sweep.study import PHYSICS, physics_of
 
 HOST = "127.0.0.1"
@@ -139,7 +139,7 @@ class LiveSolver:
 
 def solved_task(task: Task, report: Callable[..., None]) -> Measurement:
     """The work of the child process."""
-    return measurement(task)
+    return measured(task)
 
 
 def handler(

@@ -112,8 +112,6 @@ class StudyJob(Generic[S]):
         processes: Worker processes on this machine.
         scheduler: Address of a Dask scheduler whose workers are used instead.
         finger: The finger from which the samples differ, in place of the study's design.
-        mesh: Element sizes, in place of the study's size.
-        kind: What messages call the job.
     """
 
     study: S
@@ -122,8 +120,6 @@ class StudyJob(Generic[S]):
     processes: int = 1
     scheduler: str | None = None
     finger: Finger | None = None
-    mesh: MeshSettings | None = None
-    kind: str = "sweep"
 
     def task(self, number: int, sample: Mapping[str, Value]) -> Task:
         """The task of a sample.
@@ -146,7 +142,7 @@ class StudyJob(Generic[S]):
         return Task(
             number,
             self._drawing(shape) if "section" in shape else definition,
-            self.mesh or MeshSettings(size=study.mesh_size),
+            MeshSettings(size=study.mesh_size),
             {name: value for name, value in values.items() if name in PHYSICS},
             study.solver,
             {**study.settings, **settings},

@@ -52,12 +52,12 @@ class OutOfTime(UserError):
     """The work on a sample takes too long."""
 
 
-def measured(task: Task, _report: Callable[..., None] | None = None) -> list[Measurement]:
+def sampled(task: Task, _report: Callable[..., None]) -> list[Measurement]:
     """The one sample of a task, as a worker answers."""
-    return [measurement(task)]
+    return [measured(task)]
 
 
-def measurement(task: Task) -> Measurement:
+def measured(task: Task) -> Measurement:
     """Draw, mesh and solve one sample.
 
     Whatever goes wrong with this sample is told in the answer, so that it does not stop the others.

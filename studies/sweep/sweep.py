@@ -19,7 +19,7 @@ from pinnray.runtime.stages import Stages
 from pinnray.runtime.text_files import read_json
 from pinnray.solvers.solver import Progress, silent
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, measured
+from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, sampled
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import Journal, opened
 from pinnray.studies.sweep.study import Study, Value
@@ -78,13 +78,13 @@ def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
     stages = stages or Stages(quiet=True)
     all_samples = samples(job.study)
     tasks = {number: job.task(number, sample) for number, sample in enumerate(all_samples)}
-    definition = {**job.definition(all_samples[0], __name__), "mesh": job.mesh and job.mesh.model_dump()}
+    definition = job.definition(all_samples[0], __name__)
     free = {"study.name", "study.time_limit"}  # on which no result depends
     if job.study.sampling == "sobol":
         free.add("study.samples")  # which may be continued
     if trainings := job.study.settings_alone:
         free.add("study.varied")  # the trainings of another grid go on from their checkpoints
-    check_resumable_folder(job.out / STUDY_FILE, definition, job=job.kind, free=free)
+    check_resumable_folder(job.out / STUDY_FILE, definition, job="sweep", free=free)
     job.out.mkdir(parents=True, exist_ok=True)
     with locked(job.out), ExitStack() as stack:
         before = _study_in(job.out) if (job.out / JOURNAL).exists() else job.study
@@ -108,7 +108,7 @@ def finish(
     known = journal.numbers()
     waiting = {number: task for number, task in tasks.items() if number not in known}
     limit = next((task.time_limit for task in tasks.values()), None)
-    run_tasks(measured, waiting, tasks, journal, workers, progress, time_limit=limit, deaths=DEATHS)
+    run_tasks(sampled, waiting, tasks, journal, workers, progress, time_limit=limit, deaths=DEATHS)
 
 
 def run_tasks(

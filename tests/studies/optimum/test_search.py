@@ -21,7 +21,7 @@ from pinnray.studies.optimum.pictures import cylinder_at_end
 from pinnray.studies.optimum.question import Limit, Question
 from pinnray.studies.optimum.search import Optimum, search_front
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.measurement import Measurement, measurement
+from pinnray.studies.sweep.measurement import Measurement, measured
 from pinnray.studies.sweep.store import Journal
 from pinnray.studies.sweep.study import physics_of
 
@@ -165,7 +165,7 @@ def test_the_problem_of_a_finger_gives_the_number_of_the_front(tmp_path, capsys,
     asked = QUESTION.model_copy(update={**solver, "fixed": {"contact_position": 35.0, **physics}})
     job = StudyJob(asked, Path(), tmp_path / "search")
     task = job.task(7, {"rib_count": 3, "rib_thickness": 1.9, "front_thickness": 0.9})
-    found = measurement(task)
+    found = measured(task)
     assert found.state == "done"
     write_designs(job, task, tmp_path / "search" / "front" / "01.toml")
     problem = tmp_path / "search" / "problems" / "01.toml"
@@ -180,7 +180,7 @@ def test_thin_walls_are_not_refused_for_their_markers(tmp_path: Path) -> None:
     asked = QUESTION.model_copy(update={"fixed": {"marker_diameter": 1.6}, "mesh_size": 3.0})
     job = StudyJob(asked, Path(), tmp_path / "out")
     task = job.task(0, {"rib_count": 3, "rib_thickness": 0.8, "front_thickness": 0.8})
-    assert measurement(task).state == "done"
+    assert measured(task).state == "done"
     path = write_designs(job, task, tmp_path / "front" / "01.toml")
     assert 0.1 < load_design(path).marker_diameter <= 0.7  # which fits, and can be printed
 

@@ -18,7 +18,7 @@ from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.solution import Solution
 from pinnray.studies.sweep.job import StudyJob
-from pinnray.studies.sweep.measurement import Measurement, measurement
+from pinnray.studies.sweep.measurement import Measurement, measured
 from pinnray.studies.sweep.quantities import quantities
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import opened
@@ -61,14 +61,14 @@ def test_a_sample_is_kept_once(tmp_path: Path) -> None:
 def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path, 1))
     job = StudyJob(study, tmp_path, tmp_path / "out")
-    refused = measurement(job.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
+    refused = measured(job.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
     assert (refused.state, refused.values) == ("refused", {})
     assert "ribs" in refused.message
     task = job.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
-    assert measurement(task).state == "done"
-    pressed = measurement(replace(task, physics={**task.physics, "stroke": 60.0}))
+    assert measured(task).state == "done"
+    pressed = measured(replace(task, physics={**task.physics, "stroke": 60.0}))
     assert (pressed.state, pressed.through_itself) == ("done", True)
-    soft = measurement(replace(task, physics={**task.physics, "stroke": 0.001}))
+    soft = measured(replace(task, physics={**task.physics, "stroke": 0.001}))
     assert "this looks like metres" in soft.message
     remarks = Sweep(study, [{}] * 2, [pressed, replace(soft, number=0)]).remarks
     assert [remark.partition(";")[0] for remark in remarks] == [
@@ -76,7 +76,7 @@ def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
         "1 of 2 samples (0): this looks like",
     ]
     object.__setattr__(task, "mesh", "broken")
-    assert measurement(task).state in ("refused", "failed")
+    assert measured(task).state in ("refused", "failed")
 
 
 def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,7 +88,7 @@ def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr("pinnray.studies.sweep.measurement.quantities", without_stress)
     sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
-    found = measurement(
+    found = measured(
         StudyJob(load_study(study_file(tmp_path, 1)), tmp_path, tmp_path / "out").task(1, sample)
     )
     assert (found.state, found.message.partition(";")[0]) == ("not converged", "von_mises cannot be computed")
@@ -154,7 +154,7 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
     study = study.model_copy(update={"solver": "fem-nonlinear", "time_limit": 1e-3})
     job = StudyJob(study, tmp_path, tmp_path / "out", 1)
     sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
-    found = measurement(job.task(0, sample))
+    found = measured(job.task(0, sample))
     assert (found.state, found.message.partition(":")[0]) == ("not converged", "stopped at the time limit")
     sweep = Sweep(study, [sample], [found])
     assert failure_grid(sweep).rows == [("not converged", "1", "stopped at the time limit", "0")]
@@ -173,7 +173,7 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
 def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     tmp_path, monkeypatch, request, ending, limit, state, said
 ):
-    monkeypatch.setattr("pinnray.studies.sweep.sweep.measured", ending)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.sampled", ending)
     monkeypatch.setattr("pinnray.studies.sweep.sweep.GRACE_S", 1.0)
     monkeypatch.setattr("pinnray.studies.sweep.sweep.DEATHS", 2)
     study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
@@ -181,7 +181,7 @@ def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     assert [each.state for each in sweep.measurements] == ["done", state, "done"]
     assert [(row[0], row[2]) for row in failure_grid(sweep).rows] == [(state, said)]
     assert list(sample_table(sweep)["state"]) == ["done", state, "done"]
-    monkeypatch.setattr("pinnray.studies.sweep.sweep.measured", answered)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.sampled", answered)
     request.getfixturevalue("in_line")
     longer = study.model_copy(update={"time_limit": 600.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
@@ -251,7 +251,7 @@ def test_drawings_are_samples_too(tmp_path: Path) -> None:
     )
     study = load_study(path)
     job = StudyJob(study, tmp_path, tmp_path / "out")
-    found = [measurement(job.task(number, sample)) for number, sample in enumerate(samples(study))]
+    found = [measured(job.task(number, sample)) for number, sample in enumerate(samples(study))]
     assert [each.state for each in found] == ["done"] * 4
     areas = [Design(rib_count=ribs).section.area for ribs in (2, 2, 6, 6)]
     assert [each.values["area"] for each in found] == pytest.approx(areas, rel=1e-6)
