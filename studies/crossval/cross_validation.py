@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from secrets import token_hex
 
 import numpy as np
@@ -181,21 +182,21 @@ def _samples(
     load_cases: Sequence[LoadCase],
 ) -> Iterator[tuple[str, Sample]]:
     """Every sample by its name in the journal, which tells all that its result depends on."""
+    digests = {variant.label: _digests(variant, study.seeds) for variant in study.variants}
     for (truth, layout), seeds in observations.items():
         folds = folds_of(study.schemes, len(seeds[0][0].points), load_cases)
-        for variant in study.variants:
-            for seed in range(study.seeds):
-                digest = _digest(variant, seed)
-                for fold in folds:
-                    name = f"{truth}, {layout}, {variant.label}, {seed}, {fold.scheme}, {fold.name}, {digest}"
-                    yield name, Sample(truth, layout, variant.label, seed, fold)
+        for solver, each in digests.items():
+            for (seed, digest), fold in product(enumerate(each), folds):
+                name = f"{truth}, {layout}, {solver}, {seed}, {fold.scheme}, {fold.name}, {digest}"
+                yield name, Sample(truth, layout, solver, seed, fold)
 
 
-def _digest(variant: SolverVariant, seed: int) -> str:
-    """Digest of a solver's class, source and settings; another one each time if the class has no source."""
-    kind = type(solver := variant.make(seed))
+def _digests(variant: SolverVariant, seeds: int) -> list[str]:
+    """Digests of a solver's class, source and settings; other ones each time if the class has no source."""
+    kind = type(variant.solver)
     source = sources_digest(kind.__module__) if has_source(kind.__module__) else token_hex()
-    return content_hash([kind.__module__, kind.__qualname__, source, solver.settings()])
+    own = [kind.__module__, kind.__qualname__, source]
+    return [content_hash([*own, variant.make(seed).settings()]) for seed in range(seeds)]
 
 
 def _result(
@@ -212,7 +213,7 @@ def _result(
     """
     failed = {each.number: each.message for each in measurements if each.state == "failed"}
     found = {each.number: each for each in measurements}
-    takes = {variant.label: Traits.of(variant.make(0)).assimilates for variant in study.variants}
+    takes = {variant.label: Traits.of(variant.solver).assimilates for variant in study.variants}
     rows = [
         (sample, takes[sample.solver], found[name])
         for name, sample in wanted.items()

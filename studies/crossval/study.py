@@ -1,6 +1,6 @@
 """A cross-validation to run: finger, solvers, held-out markers and loads, and the output folder."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -31,42 +31,31 @@ FEWEST_MARKERS = 3
 
 @dataclass(frozen=True)
 class SolverVariant:
-    """A solver, some of whose settings are changed.
-
-    Attributes:
-        label: Its name in tables: the solver's name, and how it differs from others of that name.
-        solver: The solver, of any class.
-        changes: The settings that are changed.
-    """
+    """A solver with a name that tells it from others of its own name, as tables have it."""
 
     label: str
     solver: Solver
-    changes: Mapping[str, object] = field(default_factory=dict)
-
-    @property
-    def settings(self) -> dict[str, object]:
-        """All settings of the variant, ready for JSON."""
-        return self.make(0).settings()
 
     def make(self, seed: int) -> Solver:
-        """The solver; `seed` is added to its own seed, if it draws random numbers.
+        """The solver; `seed` is added to its own seed, if it draws random numbers."""
+        first = self.solver.settings().get("seed")
+        return changed(self.solver, seed=first + seed) if seed and isinstance(first, int) else self.solver
 
-        Raises:
-            UserError: If its class cannot be made with the settings.
-        """
-        changes, kind = dict(self.changes), type(self.solver)
-        if seed and isinstance(first := self.solver.settings().get("seed"), int):
-            changes["seed"] = first + seed
-        if not changes:
-            return self.solver
-        try:
-            if is_dataclass(self.solver):
-                return cast(Solver, replace(cast(Any, self.solver), **changes))
-            return kind(**{**self.solver.settings(), **changes})
-        except UserError:
-            raise
-        except Exception as error:  # the constructor of another package may raise anything
-            raise UserError(f"solver {self.solver.name} cannot be made with {changes}: {error}") from error
+
+def changed(solver: Solver, **changes: object) -> Solver:
+    """A solver, of any class, with other settings.
+
+    Raises:
+        UserError: If its class cannot be made with them.
+    """
+    try:
+        if is_dataclass(solver):
+            return cast(Solver, replace(cast(Any, solver), **changes))
+        return type(solver)(**{**solver.settings(), **changes})
+    except UserError:
+        raise
+    except Exception as error:  # the constructor of another package may raise anything
+        raise UserError(f"solver {solver.name} cannot be made with {changes}: {error}") from error
 
 
 def solver_variants(
@@ -87,8 +76,8 @@ def solver_variants(
         chooses = isinstance(solver, MarkerSettings)
         if chooses and solver.name not in fixed and with_law(material, solver).law == "linear":
             for choice in ("left-out", "evidence"):
-                chosen = {"weights": "precision", "choose": choice}
-                variants.append(SolverVariant(f"{solver.name} {choice}", solver, chosen))
+                chosen = changed(solver, weights="precision", choose=choice)
+                variants.append(SolverVariant(f"{solver.name} {choice}", chosen))
     return variants
 
 
@@ -207,7 +196,7 @@ class CrossvalStudy:
                 f"noise {self.noise:g}: give a standard deviation of zero or more, at most 100 mm"
             )
         for variant in self.variants:
-            solver = variant.make(0)
+            solver = variant.solver
             check_name(solver.name)
             check_load(solver, self.load)
             with_law(self.material, solver)

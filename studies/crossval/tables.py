@@ -152,7 +152,7 @@ def verdict_sentences(result: CrossvalResult) -> Iterator[str]:
     With several truths or layouts that is said of the main scheme alone, else of every scheme; a verdict
     without a place holds in all of them.
     """
-    takes = [each.label for each in result.study.variants if Traits.of(each.make(0)).assimilates]
+    takes = [each.label for each in result.study.variants if Traits.of(each.solver).assimilates]
     several = len(result.scores.groupby(CASE)) > 1
     compared = {HELD_OUT: "held-out error", "von_mises": "von Mises stress", "force_error": "force"}
     for solver in takes:

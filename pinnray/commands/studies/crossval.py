@@ -98,7 +98,7 @@ def command(
         processes=read_processes(processes),
         picture_formats=read_formats(pictures),
     )
-    made = [variant.make(0) for variant in study.variants]
+    made = [variant.solver for variant in study.variants]
     physics.check_law(made)
     finger.check_cost(design, mesh, made, simulated=True)
     if study.measurements and LOAD in study.schemes:

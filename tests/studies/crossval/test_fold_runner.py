@@ -129,7 +129,7 @@ def test_a_variant_keeps_class_and_settings_and_changes_the_seed(kind):
     made = [variant.make(seed) for seed in (0, 2)]
     assert [type(each) for each in made] == [kind, kind]
     assert [each.given for each in made] == [(3, 2.0), (5, 2.0)]  # type: ignore[attr-defined]
-    assert variant.settings == {"seed": 3, "size": 2.0}
+    assert variant.solver.settings() == {"seed": 3, "size": 2.0}
 
 
 def test_a_class_that_cannot_be_made_from_its_settings_is_refused_in_one_line():
