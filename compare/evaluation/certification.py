@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pinnray.comparison.evaluation.certificate import ROUNDING, Certificate, Region
-from pinnray.comparison.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation, field_difference
+from pinnray.comparison.evaluation.differences import FieldDifference
+from pinnray.comparison.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation
 from pinnray.geometry.mesh.boundary import boundary_loops, mean_thickness, singular_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.runtime.arrays import BoolArray, FloatArray
@@ -178,7 +179,7 @@ class Certifier:
             here = np.repeat(triangles, len(weights) // len(triangles))
             share = energy[here].sum() / total if total > ROUNDING**2 * evaluation.energy else np.nan
             displacement, von_mises = (
-                field_difference(np.where(here, own.T, fem.T).T, fem, weights).rel_l2
+                FieldDifference.of(np.where(here, own.T, fem.T).T, fem, weights).rel_l2
                 for own, fem in (
                     (evaluation.displacement, self._displacement),
                     (evaluation.von_mises, self._von_mises),

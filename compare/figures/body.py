@@ -21,7 +21,7 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 from PIL import Image
 
-from pinnray.comparison.evaluation.evaluation import weighted_percentile
+from pinnray.comparison.evaluation.differences import weighted_percentile
 from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent, Pixels
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray, IntArray

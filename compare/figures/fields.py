@@ -7,8 +7,8 @@ import matplotlib as mpl
 import numpy as np
 
 from pinnray.comparison.evaluation.comparison import TRUTH, Results
-from pinnray.comparison.evaluation.evaluation import Evaluation, field_difference, weighted_percentile
-from pinnray.comparison.evaluation.metrics import COMPONENTS
+from pinnray.comparison.evaluation.differences import COMPONENTS, FieldDifference, weighted_percentile
+from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.body import PERCENT, ColourScale, diverging, sequential, symmetric
 from pinnray.comparison.figures.pyvista_canvas import Canvas
@@ -158,7 +158,7 @@ def draw_field(comparison: Results, quantity: FieldQuantity, solvers: Collection
             if evaluation is not reference:
                 axes = axes_at(drawn, beside)
                 own = difference_scale(quantity, mesh, evaluation, reference)
-                distance = percent(field_difference(values, base, reference.weights).rel_l2)
+                distance = percent(FieldDifference.of(values, base, reference.weights).rel_l2)
                 title = f"minus {reference.solver}, ±{significant(own.high, 2)} {quantity.unit}"
                 colours = own.paint(evaluation.per_triangle(values - base))
                 body.panel(axes, canvas, mesh, colours, title, f"rel. L² {distance}", bold=False)
@@ -210,7 +210,7 @@ def draw_differences(
             row, column = divmod(number, columns)
             top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
             axes = axes_at(drawn, (MARGIN + column * (width + MARGIN), top, width, height))
-            distance = field_difference(quantity.values(each), quantity.values(base), base.weights).rel_l2
+            distance = FieldDifference.of(quantity.values(each), quantity.values(base), base.weights).rel_l2
             note = f"rel. L² {percent(distance)}"
             body.panel(axes, canvas, mesh, scale.paint(difference), each.label, note)
         body.scale_bar(axes, extent)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import IN_SAMPLE, Evaluation
-from pinnray.comparison.evaluation.metrics import ForceCurve, force_curves, held_out_errors
+from pinnray.comparison.evaluation.force_curves import ForceCurve, force_curves
 from pinnray.comparison.figures.body import PERCENT
 from pinnray.comparison.figures.design_drawing import draw_design
 from pinnray.comparison.figures.fields import (
@@ -86,7 +86,7 @@ def _marker_errors(comparison: Results) -> Illustration | None:
         each_of(
             "Mean of |Δu| + |Δv| at markers that were not given, mm",
             comparison.evaluations,
-            lambda each: getattr(held_out_errors(each, observations), "mae_sum", float("nan")),
+            lambda each: getattr(comparison.scores[each.solver].held_out, "mae_sum", float("nan")),
         ),
     )
 

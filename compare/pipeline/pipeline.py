@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from pinnray.comparison.evaluation.branches import with_branches
-from pinnray.comparison.evaluation.comparison import Results, supported_solvers
+from pinnray.comparison.evaluation.comparison import Results, pick_reference, supported_solvers
 from pinnray.comparison.evaluation.deformed_body import with_body_checks
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import force_curves, pick_reference, write_force_displacement
+from pinnray.comparison.evaluation.force_curves import force_curves, write_force_displacement
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
 from pinnray.comparison.evaluation.truths import (
     TRUTHS,
@@ -24,7 +24,6 @@ from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
 from pinnray.comparison.pipeline.solving import ERRORS, solve_all
 from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.atomic import write_json
 from pinnray.runtime.content_hash import file_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
@@ -32,7 +31,6 @@ from pinnray.runtime.output_folder import check_output, replaced_folder, write_r
 from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.shared_work import SharedWork
 from pinnray.solvers.solver import Solver, Traits
 from pinnray.vision.measurements import write_measurements
 
@@ -161,13 +159,14 @@ def _write(
     """Write every file of a comparison but its solutions; photographs are for the report."""
     # They need the libraries of pictures.
     from pinnray.comparison.report.html_report import viewer, write_report
-    from pinnray.comparison.report.output_files import metrics, write_vtu
+    from pinnray.comparison.report.output_files import write_vtu
 
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
-    figures, work = folder / "figures", SharedWork()
-    with pictures_beside(figures, comparison, job.picture_formats, pool) as beside, work.used():
+    comparison.scores.write(folder)
+    figures = folder / "figures"
+    with pictures_beside(figures, comparison, job.picture_formats, pool) as beside:
         with stages.stage("fields"):
             for evaluation in comparison.shown_fields:
                 write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
@@ -180,13 +179,11 @@ def _write(
                 write_force_displacement(
                     folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
                 )
-            numbers = metrics(comparison)
-            write_json(folder / "metrics.json", numbers)
         with stages.stage("pictures") as progress:
             pictures = draw_all(figures, comparison, progress, job.picture_formats, beside)
-    with stages.stage("report"), work.used():
+    with stages.stage("report"):
         record = _provenance(folder, job, comparison, stages)
-        write_report(folder / "report.html", comparison, [*pictures, *photographs], record, numbers, viewed)
+        write_report(folder / "report.html", comparison, [*pictures, *photographs], record, viewed)
         write_run(folder, record)
 
 

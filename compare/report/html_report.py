@@ -16,12 +16,6 @@ from jinja2 import Template
 from pinnray.comparison.evaluation.certification import REGION_RADIUS
 from pinnray.comparison.evaluation.comparison import TRUTH, Results, unsupported_remarks
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import (
-    force_error,
-    indistinct,
-    reference_differences,
-    truth_differences,
-)
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.figures.body import diverging
 from pinnray.comparison.figures.fields import (
@@ -34,9 +28,8 @@ from pinnray.comparison.figures.fields import (
 )
 from pinnray.comparison.figures.overlay import contact_motion
 from pinnray.comparison.report import text
-from pinnray.comparison.report.output_files import metrics
 from pinnray.comparison.report.summary import answers
-from pinnray.comparison.report.tables import millimetres, printed_rows, seconds, table_one
+from pinnray.comparison.report.tables import printed_rows, seconds, table_one
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_text
@@ -168,35 +161,33 @@ def write_report(
     comparison: Results,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
-    numbers: Mapping[str, Any] | None = None,
     viewed: Mapping[str, Any] | None = None,
 ) -> None:
     """Write the report as one HTML file, atomically; arguments as for `report_html`."""
-    write_text(path, report_html(comparison, pictures, provenance, numbers, viewed))
+    write_text(path, report_html(comparison, pictures, provenance, viewed))
 
 
 def report_html(
     comparison: Results,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
-    numbers: Mapping[str, Any] | None = None,
     viewed: Mapping[str, Any] | None = None,
 ) -> str:
     """The report as HTML text.
 
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
-    `numbers` are the comparison's `metrics` and `viewed` its `viewer`, where they are known already.
+    `viewed` is the comparison's `viewer`, where it is known already.
     """
-    numbers = metrics(comparison) if numbers is None else numbers
-    design = comparison.design
+    design, scores = comparison.design, comparison.scores
     certificates = [each.certificate for each in comparison.evaluations if each.certificate]
     fields = {*(quantity.name for quantity in QUANTITIES), "differences"}
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
-        answers=answers(numbers, unsupported=comparison.unsupported, failed=comparison.failed),
-        own=comparison.reference.uncertainty,
-        table_one=table_one(comparison),
+        scores=scores,
+        answers=answers(scores),
+        own=scores[scores.reference].to_reference.reference_uncertainty,
+        table_one=table_one(scores),
         printed=printed_rows(design),
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
         unsupported=[*unsupported_remarks(comparison.unsupported), *comparison.failed.values()],
@@ -215,29 +206,21 @@ def report_html(
 @cache  # compiling takes a fifth of a second
 def _template() -> Template:
     environment = template_environment("pinnray.comparison")
-    filters = (millimetres, number, distance, percent)
+    filters = (number, distance, percent)
     environment.filters |= {each.__name__: each for each in filters}
     return environment.get_template("report.html.j2")
 
 
 def _entry(evaluation: Evaluation, comparison: Results) -> dict[str, object]:
     """One solver's part of the tables."""
-    reference, truth = comparison.reference, comparison.truth
-    differences = reference_differences(evaluation, reference)
+    own = comparison.scores[evaluation.solver]
     return {
         "label": evaluation.label,
-        "is_reference": evaluation is reference,
+        "is_reference": evaluation.solver == comparison.scores.reference,
         "evaluation": evaluation,
-        "to_truth": None if truth is None else truth_differences(evaluation, truth),
-        "force_to_truth": None if truth is None else force_error(evaluation, truth),
-        "differences": differences,
-        "indistinct": text.indistinct_sentence(
-            evaluation.label,
-            reference.label,
-            [] if evaluation is reference else indistinct(differences, reference.uncertainty),
-        ),
-        "reaction": text.without_rounding(evaluation.reaction),
-        "seconds": seconds(evaluation),
+        "own": own,
+        "reaction": text.without_rounding(own.reaction),
+        "seconds": seconds(own),
         "certificate": evaluation.certificate,
         "certificate_sentences": text.certificate_sentences(evaluation, comparison.load.kind),
     }

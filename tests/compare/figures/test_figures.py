@@ -12,7 +12,6 @@ from PIL import Image
 from pinnray.comparison.evaluation.certification import with_certificates
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import held_out_errors, marker_errors
 from pinnray.comparison.figures import FORMATS, draw_all, pictures_beside
 from pinnray.comparison.figures.fields import QUANTITIES, draw_field
 from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
@@ -162,8 +161,9 @@ def test_a_solver_that_failed_is_marked(name: str, pages: dict[str, Page]) -> No
 def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(fem, pinn, observations, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     untold = replace(told, solver="pinn-x", left_out=None)
-    errors = held_out_errors(told, observations), marker_errors(told, observations)
     comparison = compared(fem, told, untold)
+    own = comparison.scores[told.solver]
+    errors = own.held_out, own.markers
     overlay, bars = (page_of(draw(comparison, name).figure) for name in ("overlay", "marker_errors"))
     for kind, found in zip(("held out", "training"), errors, strict=True):
         assert found is not None
