@@ -22,6 +22,7 @@ from pinnray.comparison.figures import Picture, draw_all, pictures_beside
 from pinnray.comparison.pipeline.job import Job, MarkerSource, checked
 from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
 from pinnray.comparison.pipeline.solving import ERRORS, solve_all
+from pinnray.comparison.report.comparison import Comparison
 from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.content_hash import file_digest
@@ -35,7 +36,7 @@ from pinnray.solvers.solver import Solver, Traits
 from pinnray.vision.measurements import write_measurements
 
 
-def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
+def run(job: Job, stages: Stages, pool: Pool | None = None) -> Comparison:
     """Make the comparison and write its output folder.
 
     Args:
@@ -62,7 +63,7 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
     return comparison
 
 
-def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) -> Results:
+def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) -> Comparison:
     """Mesh, solve and evaluate a checked job whose markers are known or simulated.
 
     Solutions and checkpoints go into the folder.
@@ -97,7 +98,7 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
     with stages.stage("checks"):
         evaluations, impossible = with_body_checks(list(outcome.evaluations.values()), mesh, truth)
         evaluations, branches = with_branches(evaluations, problem)
-    return Results(
+    return Comparison(
         design=job.design,
         mesh=mesh,
         observations=observations,
