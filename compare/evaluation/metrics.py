@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
-from pinnray.comparison.evaluation.certificate import ROUNDING
+from pinnray.comparison.evaluation.certificate import ROUNDING, Region
 from pinnray.comparison.evaluation.differences import Differences, FieldDifference, Number, Numbers
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.geometry.observations import Observations
@@ -125,15 +125,6 @@ class FigureScores(Numbers):
         return None if figures is None else cls(values=figures.columns(), places=figures.places)
 
 
-class RegionScore(Numbers):
-    """A `Region` of a certificate."""
-
-    area: Number
-    excess: Number
-    rel_l2_displacement: Number
-    rel_l2_von_mises: Number
-
-
 class CertificateScore(Numbers):
     """The numbers of a `Certificate`, which explains them."""
 
@@ -151,7 +142,7 @@ class CertificateScore(Numbers):
     work: Number
     base: Number
     load: Vector
-    regions: Mapping[str, RegionScore]
+    regions: Mapping[str, Region]
 
     @property
     def excess_beyond_rounding(self) -> float:

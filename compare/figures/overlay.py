@@ -13,7 +13,7 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import SolverScores
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.body import ColourScale
-from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent
+from pinnray.comparison.figures.canvas import Canvas, Extent
 from pinnray.comparison.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -45,7 +45,8 @@ def draw_overlay(comparison: Results) -> Figure:
     given = "\n".join(notes)
     head = HEAD + LEGEND_LINE * len(notes)
     total = head + rows * (PANEL_TITLE + height) + FOOT
-    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
+    canvas = Canvas(mesh, extent, width=body.PIXELS // columns)
+    with figure(total) as drawn:
         write_heading(drawn, "Deformed finger, true scale")
         for number, evaluation in enumerate(evaluations):
             row, column = divmod(number, columns)

@@ -1,6 +1,6 @@
 """Charts of solvers: the record of each on the way to its solution, and its errors at the markers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -51,30 +51,13 @@ def approaches_reference(group: Group) -> bool:
     return column == "energy" and not abscissa.startswith("load")
 
 
-def draw_energy(comparison: Results) -> Figure | None:
-    """Draw every record of another kind than energies of one problem, a lettered panel for each kind.
-
-    Along a load that grows, or over factors of the markers' weight. None without a record.
-    """
-    groups = records_by_kind(comparison.evaluations)
-    chosen = {group: members for group, members in groups.items() if not approaches_reference(group)}
-    return _draw_kinds(comparison, chosen, "Energy along the load and over the markers’ weight")
-
-
 def draw_convergence(comparison: Results) -> Figure | None:
-    """Draw energies on the way to the solution; beside them their distances from the reference's energy.
+    """Draw the records of energy, a row of lettered panels for each kind; None without a record.
 
-    None without such a record.
+    Energies on the way to a solution have their distances from the reference's energy beside them. Others are
+    along a load that grows, or over factors of the markers' weight.
     """
     groups = records_by_kind(comparison.evaluations)
-    chosen = {group: members for group, members in groups.items() if approaches_reference(group)}
-    return _draw_kinds(comparison, chosen, "Energy on the way to the solution")
-
-
-def _draw_kinds(
-    comparison: Results, groups: Mapping[Group, Sequence[Evaluation]], heading: str
-) -> Figure | None:
-    """Lettered panels in rows, one for each kind of record; None if there is none."""
     evaluations, reference = comparison.evaluations, comparison.reference
     if not groups:
         return None
@@ -86,7 +69,7 @@ def _draw_kinds(
         for group, members in groups.items()
     ]
     with figure(HEAD + sum(heights) + len(groups) * (height + foot)) as drawn:
-        write_heading(drawn, heading)
+        write_heading(drawn, "Records of the energy")
         for row, (group, members) in enumerate(groups.items()):
             others = [each for each in members if each is not reference and not each.in_sample]
             compared = others if approaches_reference(group) else []

@@ -18,7 +18,7 @@ from pinnray.comparison.evaluation.truths import (
     no_displacements,
     virtual_experiment,
 )
-from pinnray.comparison.figures import Picture, draw_all, pictures_beside
+from pinnray.comparison.figures import Picture, draw_all
 from pinnray.comparison.pipeline.job import Job, MarkerSource, checked
 from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
 from pinnray.comparison.pipeline.solving import ERRORS, solve_all
@@ -42,7 +42,7 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Comparison:
     Args:
         job: What to compare.
         stages: Is told what is done.
-        pool: A second process, which solves and draws beside this one.
+        pool: A second process, which solves beside this one.
 
     Raises:
         UserError: If the job cannot be done; the output folder is as it was.
@@ -53,13 +53,13 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Comparison:
     with replaced_folder(job.out, keep=kept) as folder:
         if not isinstance(job.measurements, MarkerSource):
             comparison = compute(job, stages, folder, pool)
-            _write(folder, job, comparison, stages, pool)
+            _write(folder, job, comparison, stages)
             return comparison
         measured = job.measurements.measured(job.design, folder, stages)
         comparison = compute(replace(job, measurements=measured.observations), stages, folder, pool)
         comparison = replace(comparison, warnings=[*measured.warnings, *comparison.warnings])
         photographs = [*measured.pictures, *measured.compared(comparison)]
-        _write(folder, job, comparison, stages, pool, photographs)
+        _write(folder, job, comparison, stages, photographs)
     return comparison
 
 
@@ -154,37 +154,33 @@ def _write(
     job: Job,
     comparison: Results,
     stages: Stages,
-    pool: Pool | None,
     photographs: Sequence[Picture] = (),
 ) -> None:
     """Write every file of a comparison but its solutions; photographs are for the report."""
     # They need the libraries of pictures.
-    from pinnray.comparison.report.html_report import viewer, write_report
+    from pinnray.comparison.report.html_report import write_report
     from pinnray.comparison.report.output_files import write_vtu
 
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
     comparison.scores.write(folder)
-    figures = folder / "figures"
-    with pictures_beside(figures, comparison, job.picture_formats, pool) as beside:
-        with stages.stage("fields"):
-            for evaluation in comparison.shown_fields:
-                write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
-            viewed = viewer(comparison)
-        with stages.stage("tables"):
-            write_markers(folder / "markers.csv", comparison)
-            write_table_one(folder / "table1.csv", comparison)
-            write_summary(folder / "summary.csv", comparison)
-            if curves := force_curves(comparison.evaluations, job.load):
-                write_force_displacement(
-                    folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
-                )
-        with stages.stage("pictures") as progress:
-            pictures = draw_all(figures, comparison, progress, job.picture_formats, beside)
+    with stages.stage("fields"):
+        for evaluation in comparison.shown_fields:
+            write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
+    with stages.stage("tables"):
+        write_markers(folder / "markers.csv", comparison)
+        write_table_one(folder / "table1.csv", comparison)
+        write_summary(folder / "summary.csv", comparison)
+        if curves := force_curves(comparison.evaluations, job.load):
+            write_force_displacement(
+                folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
+            )
+    with stages.stage("pictures") as progress:
+        pictures = draw_all(folder / "figures", comparison, progress, job.picture_formats)
     with stages.stage("report"):
         record = _provenance(folder, job, comparison, stages)
-        write_report(folder / "report.html", comparison, [*pictures, *photographs], record, viewed)
+        write_report(folder / "report.html", comparison, [*pictures, *photographs], record)
         write_run(folder, record)
 
 

@@ -161,26 +161,23 @@ def write_report(
     comparison: Results,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
-    viewed: Mapping[str, Any] | None = None,
 ) -> None:
     """Write the report as one HTML file, atomically; arguments as for `report_html`."""
-    write_text(path, report_html(comparison, pictures, provenance, viewed))
+    write_text(path, report_html(comparison, pictures, provenance))
 
 
 def report_html(
     comparison: Results,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
-    viewed: Mapping[str, Any] | None = None,
 ) -> str:
     """The report as HTML text.
 
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
-    `viewed` is the comparison's `viewer`, where it is known already.
     """
     design, scores = comparison.design, comparison.scores
     certificates = [each.certificate for each in comparison.evaluations if each.certificate]
-    fields = {*(quantity.name for quantity in QUANTITIES), "differences"}
+    fields = {quantity.name for quantity in QUANTITIES}
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
@@ -195,7 +192,7 @@ def report_html(
         regions={name for certificate in certificates for name in certificate.regions},
         near=REGION_RADIUS,
         text=text,
-        viewer=viewed or viewer(comparison),
+        viewer=viewer(comparison),
         urls=picture_urls([picture.path for picture in pictures]),
         pictures=[picture for picture in pictures if picture.path.stem not in fields],
         stills=[picture for picture in pictures if picture.path.stem in fields],

@@ -6,7 +6,6 @@ import numpy as np
 from markupsafe import Markup
 
 from pinnray.comparison.evaluation.certificate import Certificate
-from pinnray.comparison.evaluation.certification import REGIONS
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import Scores
@@ -203,23 +202,12 @@ def certificate_sentences(evaluation: Evaluation, load: str = "mean") -> str:
         return f"{label} is the finite-element solution itself: nothing is left out of balance."
     excess, residual = percent(certificate.rel_excess), percent(certificate.weak_residual)
     verdict = f"is converged to {excess} of the energy" if evaluation.converged else "is not to be relied on"
-    base, contact = distance(certificate.base), distance(certificate.off_at_contact)
-    sentences = [
+    said = (
         f"{label} {verdict}: its displacement, taken over to the elements of fem, has {excess} more energy "
         "than the least with the same values at base and contact, and its own stress is out of balance by "
-        f"{residual} in the energy norm.",
-        _where(certificate),
-        f"At the base it is off by at most {base} mm, at the contact by {contact} mm.",
-        _reported(certificate),
-    ]
-    return " ".join(filter(None, sentences))
-
-
-def _where(certificate: Certificate) -> str:
-    if not certificate.has_excess:
-        return ""
-    name, region = max(certificate.regions.items(), key=lambda item: item[1].excess)
-    return f"{percent(region.excess)} of the excess sits {REGIONS[name]}, {percent(region.area)} of the area."
+        f"{residual} in the energy norm."
+    )
+    return f"{said} {_reported(certificate)}".rstrip()
 
 
 def _reported(certificate: Certificate) -> str:

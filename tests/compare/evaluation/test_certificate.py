@@ -107,7 +107,6 @@ def test_energies_of_any_displacement_against_another_program(finger, load):
     assert certificate.weak_residual == pytest.approx(np.sqrt(certificate.rel_excess), rel=1e-6)
     shares = [region.excess for region in certificate.regions.values()]
     assert sum(shares) == pytest.approx(1)
-    assert (certificate.density * finger.areas).sum() == pytest.approx(certificate.excess, rel=1e-9)
 
 
 def stiffness_of_scikit_fem(problem: Problem, *, centroids_only: bool = False) -> tuple[csr_matrix, IntArray]:
