@@ -1,12 +1,10 @@
 """The report: one HTML file that holds its pictures and a viewer of the fields, and needs nothing else.
 
-The browser draws the fields with Plotly.js (MIT licence), which comes with the Python package `plotly` and is
-packed into the page. Numbers have 16 bits: the range of a field, or of its difference, in 65,535 steps.
+Numbers have 16 bits: the range of a field, or of its difference, in 65,535 steps.
 """
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +15,6 @@ from pinnray.comparison.evaluation.certification import REGION_RADIUS
 from pinnray.comparison.evaluation.comparison import TRUTH, Results, unsupported_remarks
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
-from pinnray.comparison.figures.body import diverging
 from pinnray.comparison.figures.fields import (
     QUANTITIES,
     VIEWED,
@@ -28,12 +25,12 @@ from pinnray.comparison.figures.fields import (
 )
 from pinnray.comparison.figures.overlay import contact_motion
 from pinnray.comparison.report import text
+from pinnray.comparison.report.page_body import packed_body
 from pinnray.comparison.report.summary import answers
 from pinnray.comparison.report.tables import printed_rows, seconds, table_one
-from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_text
-from pinnray.runtime.html import Packed, base64_text, picture_urls, template_environment
+from pinnray.runtime.html import Packed, picture_urls, template_environment
 from pinnray.runtime.tables import distance, number, percent
 
 BUDGET = 6_000_000
@@ -41,7 +38,7 @@ BUDGET = 6_000_000
 
 
 def viewer(comparison: Results) -> dict[str, Any] | None:
-    """Manifest, packed arrays and library of the viewer; None where there is no field to show.
+    """Manifest and packed arrays of the viewer; None where there is no field to show.
 
     There are no solvers whose field is not finite, and no quantities beyond the `BUDGET`.
     """
@@ -53,11 +50,8 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
         return None
     packed = Packed()
     manifest = {
-        "points": packed.add(mesh.points.astype("<f4")),
-        "triangles": packed.add(mesh.triangles.astype("<u4")),
-        "outlines": [path.tolist() for path in edge_paths(mesh.boundary_edges)],
+        **packed_body(mesh, packed),
         "reference": reference.label,
-        "differences": [_stop(share) for share in np.linspace(0, 1, 17)],
         "quantities": [
             {
                 "name": quantity.name,
@@ -72,7 +66,7 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
         "solvers": [_solver(each, comparison, quantities, packed) for each in shown],
         "name": comparison.design.name,
     }
-    return {"manifest": manifest, "data": packed.text(), "library": _library(), "shown": shown}
+    return {"manifest": manifest, "data": packed.text()}
 
 
 def _solver(
@@ -142,18 +136,6 @@ def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
     )
     end = evaluation.node_displacement
     return [0.0, 1.0], np.stack([np.zeros_like(end), end]), word
-
-
-def _stop(share: float) -> list[Any]:
-    """A stop of the colour scale of differences, as Plotly takes it."""
-    red, green, blue, _ = diverging()(share, bytes=True)
-    return [round(float(share), 4), f"rgb({red},{green},{blue})"]
-
-
-@cache
-def _library() -> str:
-    """Plotly.js, compressed, in Base64."""
-    return base64_text(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes())
 
 
 def write_report(
