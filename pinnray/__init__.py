@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from pinnray.camera import film_forces as film_forces
     from pinnray.camera import rig as rig
     from pinnray.camera import track as track
-    from pinnray.compared import Comparison as Comparison
     from pinnray.comparison.evaluation.evaluation import Evaluation as Evaluation
+    from pinnray.comparison.report.comparison import Comparison as Comparison
     from pinnray.designers import optimise as optimise
     from pinnray.designers import predict as predict
     from pinnray.designers import predict_field as predict_field

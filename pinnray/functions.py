@@ -21,7 +21,7 @@ from pinnray.arguments import (
     read_solvers,
 )
 from pinnray.camera import read_observations
-from pinnray.compared import Comparison
+from pinnray.comparison.report.comparison import Comparison
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.finger import Finger
@@ -222,9 +222,9 @@ def compare(
     )
     with shown_stages(progress) as stages:
         if out is not None:
-            return Comparison.of(run(replace(job, out=as_path(out, "out")), stages))
+            return run(replace(job, out=as_path(out, "out")), stages)
         with TemporaryDirectory() as folder:
-            return Comparison.of(compute(checked(job), stages, Path(folder)))
+            return compute(checked(job), stages, Path(folder))
 
 
 def crossval(
