@@ -15,7 +15,7 @@ GROUPS = ("base", "front")
 
 
 def write_msh(path: Path, body: SolidMesh) -> None:
-    """Write the tetrahedra and the triangles of `GROUPS` as Gmsh's format 2.2, which SOFA and MuJoCo read."""
+    """Write the tetrahedra and the triangles of `GROUPS` as Gmsh's format 2.2, which most simulators read."""
     names = [*(f'2 {group} "{name}"' for group, name in enumerate(GROUPS, 1)), f'3 {len(GROUPS) + 1} "body"']
     nodes = [f"{number} {x:.9g} {y:.9g} {z:.9g}" for number, (x, y, z) in enumerate(body.points.tolist(), 1)]
     kinds = [(2, body.faces_on(name)) for name in GROUPS] + [(4, body.tetrahedra)]

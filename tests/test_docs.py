@@ -283,7 +283,7 @@ def test_the_docs_have_every_field_of_a_model_as_it_is(page, column, model):
     assert names(table(page, column)) == list(model.model_fields)
 
 
-RIG_LINE = "rig --size 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
+RIG_LINE = "rig --frame 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
 SEARCH_LINE = "gridsearch --learning-rates 1e-3 --bc-weights 10 --epochs 2 --solver-set pinn-std.width=4"
 FOLDS_LINE = "crossval --solvers fem,fem-asm --schemes one-out --seeds 1"
 FOLDS_NAMES = {"SEED": "seed-NAME", "LAYOUT": "joints", "TRUTH": "sliding"}

@@ -1,7 +1,5 @@
 """Models for robot simulators: the chain against MuJoCo's mechanics, tetrahedra against Gmsh's reading."""
 
-from xml.etree import ElementTree as ET
-
 import gmsh
 import numpy as np
 import pytest
@@ -11,11 +9,9 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.mjcf import Damping, chain_mjcf
 from pinnray.robots.simulation import chain_front
-from pinnray.robots.sofa import sofa_scene
 from pinnray.robots.solid_files import write_msh
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.robots.springs import Springs
-from pinnray.solvers.physics import Material
 from tests.solvers.conftest import SHORT
 
 DENSITY = 1200.0
@@ -108,15 +104,3 @@ def test_gmsh_reads_the_body_with_its_groups(tmp_path, section):
             assert (outward > 0).all()
     finally:
         gmsh.finalize()
-
-
-def test_the_scene_holds_the_base_in_the_units_of_its_mesh(section):
-    body = SolidMesh.of(section, 2)
-    root = ET.fromstring(sofa_scene("finger.msh", body, Material(young=3.0, poisson=0.4), DENSITY, 0.01))
-    (finger,) = root.findall("Node")
-    field, mass = finger.find("TetrahedronFEMForceField"), finger.find("UniformMass")
-    assert (field.get("youngModulus"), field.get("poissonRatio")) == ("3e+06", "0.4")
-    assert float(mass.get("totalMass")) == pytest.approx(DENSITY * body.volume, rel=1e-5)
-    held = np.array(finger.find("FixedProjectiveConstraint").get("indices").split(), dtype=int)
-    assert (body.points[held, 0] == 0).all()
-    assert len(held) == 3 * len(np.unique(section.boundary("base")))

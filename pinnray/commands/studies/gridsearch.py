@@ -1,6 +1,5 @@
 """Repeat the paper's grid search."""
 
-from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -29,10 +28,10 @@ SEARCHED = {"learning_rate": "--learning-rates", "bc_weight": "--bc-weights"}
 
 @quietable
 def command(
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    *,
     learning_rates: str = "1e-4,1e-3,1e-2",
     bc_weights: str = "0.1,1,10,100,1000",
     epochs: int | None = None,
@@ -107,7 +106,7 @@ def read_settings(options: SolverOptions, epochs: int | None) -> dict[str, Any]:
         epochs = SHORT
     if epochs is not None:
         texts = (*texts, f"{SOLVER}.epochs={epochs}")
-    (solver,) = replace(options, preset="paper", solver_set=texts).read(SOLVER)
+    (solver,) = options.model_copy(update={"preset": "paper", "solver_set": texts}).read(SOLVER)
     return {key: value for key, value in solver.settings().items() if key not in SEARCHED}
 
 

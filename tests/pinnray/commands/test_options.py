@@ -1,6 +1,5 @@
 """Options of every command: --quiet, defaults in its help, completion in a shell."""
 
-from dataclasses import fields
 from importlib import import_module
 from inspect import getdoc
 from pathlib import Path
@@ -10,7 +9,6 @@ import pytest
 from pinnray.cli import main
 from pinnray.commands.app import COMMANDS, pinnray
 from pinnray.options.shared import PhysicsOptions
-from pinnray.solvers.problem import Physics
 
 HOMES = {command.rpartition(".")[2]: f"pinnray.commands.{command}" for command in COMMANDS}
 NAMES = [name for name in pinnray if not name.startswith("-")]
@@ -52,10 +50,7 @@ def test_a_shell_completes_commands_and_options(tmp_path):
     assert all(word in text for word in (*NAMES, "--mesh-size", "--seed"))
 
 
-def test_options_of_material_and_load_have_the_names_and_the_defaults_of_the_schema() -> None:
-    """But for law, load and the elastic constants: solver, preset and material may give these."""
-    own = {field.name: field.default for field in fields(PhysicsOptions)}
-    assert own.pop("material") is own.pop("young") is own.pop("poisson") is None
-    schema = Physics().model_dump()
-    assert own | {"law": "linear", "load": "mean"} == {name: schema[name] for name in own}
-    assert PhysicsOptions().values().keys() == own.keys() - {"law", "radius"}
+def test_a_preset_and_a_material_give_what_no_option_gives() -> None:
+    options = PhysicsOptions(material="tpu-95a", poisson=0.4)
+    assert options.values("paper") == {"load": "point", "young": 26.0, "poisson": 0.4}
+    assert PhysicsOptions(load="mean").read("paper")[1].kind == "mean"  # though it is the usual one
