@@ -31,13 +31,6 @@ class FilmSettings(CheckedModel):
         description="Frames a second of pictures or a pipe, which do not say it; none: 30, with a warning",
     )
 
-    @field_validator("camera", "workspace")
-    @classmethod
-    def _there(cls, file: Path | None) -> Path | None:
-        if file is not None and not file.is_file():
-            raise ValueError("there is no such file")
-        return file
-
     def of(self, source: str) -> "Film":
         """The film from a source, with these settings."""
         return Film(source=source, **self.model_dump())
@@ -53,6 +46,13 @@ class Film(FilmSettings):
     source: str = Field(
         description='Video, folder or glob of pictures, number of a camera, or "-" for a pipe'
     )
+
+    @field_validator("camera", "workspace")
+    @classmethod
+    def _there(cls, file: Path | None) -> Path | None:
+        if file is not None and not file.is_file():
+            raise ValueError("there is no such file")
+        return file
 
     def scene(self, design: "Finger") -> "FilmedScene":
         """The filmed scene of a finger.

@@ -227,6 +227,10 @@ class LiveForce:
         """The last force in words."""
         return force_line(self.forces[-1], self._depth) if self.forces else "force: not yet"
 
+    def newest_row(self) -> dict[str, Cell | None] | None:
+        """The last force by the columns of `force.csv`; None before there is one."""
+        return force_row(self.forces[-1], self._depth) if self.forces else None
+
     @property
     def _rest(self) -> FloatArray:
         """Mean of the markers in the frames before they move, shape (m, 2), mm; nan for one not seen."""
@@ -261,35 +265,33 @@ def force_line(force: FrameForce, depth: float) -> str:
     return "; ".join(filter(None, [*parts, reading.status]))
 
 
-def force_rows(forces: Sequence[FrameForce], depth: float) -> list[dict[str, Cell]]:
-    """A row for every frame with a force; empty cells where there is no estimate or no bound."""
-    rows = []
-    for frame, when, reading, delay in forces:
-        x, y = reading.force
-        numbers = {
-            "force_N": reading.size * depth,
-            "force_low_N": reading.low * depth,
-            "force_high_N": reading.high * depth,
-            "N_per_mm": reading.size,
-            "N_per_mm_low": reading.low,
-            "N_per_mm_high": reading.high,
-            "force_x_N_per_mm": x,
-            "force_y_N_per_mm": y,
-            "position_mm": reading.position,
-            "position_low_mm": reading.position_low,
-            "position_high_mm": reading.position_high,
-            "inflation": reading.inflation,
-        }
-        row: dict[str, Cell] = {"frame": frame, "time_s": when}
-        row |= {name: float(value) if np.isfinite(value) else "" for name, value in numbers.items()}
-        row |= {"equilibria": reading.evaluations, "seconds": reading.seconds, "delay_s": delay}
-        rows.append(row | {"remark": reading.status})
-    return rows
+def force_row(force: FrameForce, depth: float) -> dict[str, Cell | None]:
+    """The force in a frame by the columns of `force.csv`; None where there is no estimate or no bound."""
+    reading = force.reading
+    x, y = reading.force
+    numbers = {
+        "force_N": reading.size * depth,
+        "force_low_N": reading.low * depth,
+        "force_high_N": reading.high * depth,
+        "N_per_mm": reading.size,
+        "N_per_mm_low": reading.low,
+        "N_per_mm_high": reading.high,
+        "force_x_N_per_mm": x,
+        "force_y_N_per_mm": y,
+        "position_mm": reading.position,
+        "position_low_mm": reading.position_low,
+        "position_high_mm": reading.position_high,
+        "inflation": reading.inflation,
+    }
+    row: dict[str, Cell | None] = {"frame": force.frame, "time_s": force.time}
+    row |= {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
+    row |= {"equilibria": reading.evaluations, "seconds": reading.seconds, "delay_s": force.delay}
+    return row | {"remark": reading.status}
 
 
 def write_forces(folder: Path, forces: Sequence[FrameForce], depth: float) -> None:
     """Write `force.csv` and the picture `force.png` into a folder."""
-    write_csv(folder / "force.csv", force_rows(forces, depth))
+    write_csv(folder / "force.csv", [force_row(force, depth) for force in forces])
     readings = [force.reading for force in forces]
     times = np.array([force.time for force in forces])
     sizes, places = (

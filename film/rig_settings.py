@@ -10,7 +10,9 @@ from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.errors import UserError
 
 if TYPE_CHECKING:  # options are of this class, and `--help` has to be quick
+    from pinnray.geometry.finger.finger import Finger
     from pinnray.vision.calibration.camera import Camera, Pose
+    from pinnray.vision.calibration.chessboard import Board
     from pinnray.vision.tracking.workspace import Workspace
 
 MOST_PIXELS = 4_000_000
@@ -65,14 +67,25 @@ class RigSettings(CheckedModel):
             shares[int(found[1])] = float(found[2])
         return shares
 
-    def view(self, workspace: "Workspace") -> "tuple[Camera, Pose]":
-        """The camera and its pose.
+    def sheet(self) -> "Board":
+        """The calibration board.
+
+        Raises:
+            UserError: If it cannot be read.
+        """
+        from pinnray.vision.calibration.charuco import parse_board
+
+        return parse_board(self.board, self.square, marker=self.marker)
+
+    def view(self, finger: "Finger") -> "tuple[Workspace, Camera, Pose]":
+        """The fiducials around a finger, the camera and its pose.
 
         Raises:
             UserError: If the frame or the camera's file cannot be read, or the frames are too large.
         """
         from pinnray.vision.calibration.camera_file import load_camera
         from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
+        from pinnray.vision.tracking.workspace import Workspace, default_workspace
 
         if not (found := re.fullmatch(r"(\d{2,4})x(\d{2,4})", self.frame.strip())):
             raise UserError(f"frame {self.frame}: give width and height in pixels, such as 1280x720")
@@ -82,5 +95,7 @@ class RigSettings(CheckedModel):
                 f"frames of {camera.width}x{camera.height} pixels; the rig makes up to "
                 f"{MOST_PIXELS // 1_000_000} million"
             )
+        around = default_workspace(finger).model_dump()
+        workspace = Workspace(**{**around, "marker_plane": self.marker_plane})
         pose = viewing_pose(camera, workspace, tilt=self.tilt, direction=self.tilt_direction, turn=self.turn)
-        return camera, pose
+        return workspace, camera, pose

@@ -14,7 +14,6 @@ from pinnray.runtime.tables import write_csv
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Solver, solved, with_law
-from pinnray.vision.calibration.charuco import parse_board
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.boards import board_poses, board_scene
 from pinnray.vision.rig.exposure import Exposure
@@ -22,7 +21,6 @@ from pinnray.vision.rig.motion import Motion
 from pinnray.vision.rig.occluders import cables, check_covers
 from pinnray.vision.rig.recording import Recording
 from pinnray.vision.rig.recording_files import photograph, record
-from pinnray.vision.tracking.workspace import Workspace, default_workspace
 
 
 def filmed_solution(problem: Problem, solver: Solver | None, stages: Stages) -> tuple[Solution, str]:
@@ -80,9 +78,8 @@ def film_finger(
     finger, mesh = problem.finger, problem.mesh
     if finger is None:
         raise UserError("a film is of a finger")
-    workspace = Workspace(**{**default_workspace(finger).model_dump(), "marker_plane": rig.marker_plane})
-    camera, pose = rig.view(workspace)
-    board, covered = parse_board(rig.board, rig.square, marker=rig.marker), rig.covered
+    workspace, camera, pose = rig.view(finger)
+    board, covered = rig.sheet(), rig.covered
     check_covers(covered, len(mesh.marker_nodes))
     bench = Bench(mesh, finger, workspace, rig.paint, rig.irregular, rig.mottle, rig.layers)
     solution, source = filmed_solution(problem, solver, stages)

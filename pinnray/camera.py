@@ -20,7 +20,6 @@ from pinnray.solvers.solver import Solver
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pinnray.runtime.tables import Cell
     from pinnray.vision.calibration.camera_calibration import Calibration
     from pinnray.vision.rig.exposure import Exposure
     from pinnray.vision.rig.motion import Motion
@@ -131,9 +130,10 @@ def film_forces(
     Raises:
         UserError: If the film does not show the finger, or DOLFINx is missing.
     """
+    import numpy as np
     import pandas as pd
 
-    from pinnray.film.force_estimate import MESH, force_rows, force_tracker, forces_of
+    from pinnray.film.force_estimate import MESH, force_row, force_tracker, forces_of
     from pinnray.film.track_film import track_film
     from pinnray.geometry.cache import finger_mesh, mesh_sizes
     from pinnray.runtime.stages import shown_stages
@@ -149,8 +149,7 @@ def film_forces(
         with stages.stage("force") as report:
             tracker = force_tracker(mesh, elastic, seen.points, finger.marker_radius)
             forces = forces_of(tracking, tracker, report)
-    rows = force_rows(forces, finger.depth)
-    return pd.DataFrame([_with_nan(row) for row in rows])
+    return pd.DataFrame([force_row(force, finger.depth) for force in forces]).fillna(np.nan)
 
 
 def rig(
@@ -207,6 +206,11 @@ def rig(
     settings = RigSettings(**taken(given, RigSettings))
     words = ("size", "material", "load", *RigSettings.model_fields)
     finger, elastic, moved = read_job(design, material, load, given, besides=words)
+    (
+        settings.view(finger),
+        settings.sheet(),
+        settings.covered,
+    )  # or says what is wrong, before the mesh is made
     chosen = None if solver is None else read_solver(solver)
     with shown_stages(progress) as stages:
         with stages.stage("mesh"):
@@ -234,8 +238,3 @@ def read_observations(
     if isinstance(given, str | Path) and Path(given).suffix.lower() != ".csv":
         return track(given, design)
     return load_measurements(given, marker_radius=design.marker_radius)
-
-
-def _with_nan(row: "dict[str, Cell]") -> "dict[str, Cell]":
-    """A row of a file with nan in place of empty cells, but for its remark."""
-    return {name: float("nan") if cell == "" and name != "remark" else cell for name, cell in row.items()}
