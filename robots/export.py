@@ -17,7 +17,7 @@ from pinnray.robots.picture import draw_score
 from pinnray.robots.presses import PressedFinger, press
 from pinnray.robots.score import ModelScore, scored
 from pinnray.robots.simulation import Model, chain_front, check_mujoco, flex_front
-from pinnray.robots.solid_files import write_material, write_msh, write_surface, write_vtk
+from pinnray.robots.solid_files import write_material, write_surface, write_vtk
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.robots.springs import fitted_springs
 from pinnray.runtime.atomic import write_json, write_text
@@ -81,12 +81,11 @@ def export_finger(
         body = SolidMesh.of(finger_mesh(finger, settings=coarse, across=settings.across), settings.layers)
     if kind == "mujoco":
         return _mujoco(problem, finger, density, body, out, settings, stages)
-    files = [out / f"finger.{suffix}" for suffix in ("msh", "vtk", "stl")] + [out / "material.json"]
-    write_msh(files[0], body)
-    write_vtk(files[1], body)
-    write_surface(files[2], body)
-    write_material(files[3], material, density, settings.loss_factor)
-    return Exported(tuple(files))
+    files = out / "finger.vtk", out / "finger.stl", out / "material.json"
+    write_vtk(files[0], body)
+    write_surface(files[1], body)
+    write_material(files[2], material, density, settings.loss_factor)
+    return Exported(files)
 
 
 def _mujoco(

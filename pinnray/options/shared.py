@@ -112,20 +112,11 @@ class FingerOptions(CheckedModel):
             check_mesh_cost(finger, mesh, solvers, simulated=simulated)
 
     def _designed(self) -> "Design":
-        from pinnray.geometry.finger.design import Design
-        from pinnray.geometry.finger.parameters import SYMBOLS, symbols
         from pinnray.geometry.finger.presets import load_design, parse_overrides
-        from pinnray.solvers.physics import Physics
 
         for option in ("clamp", "contact", "markers"):
             if getattr(self, option) is not None:
                 raise UserError(f"--{option} belongs to a drawing; give it by --section FILE")
-        for key in (setting.partition("=")[0].strip() for setting in self.set):
-            name = symbols(Physics).get(key, key)
-            if key not in {*SYMBOLS, *Design.model_fields} and name in Physics.model_fields:
-                raise UserError(
-                    f"{key} is no parameter of the finger, but of material and load: give --{name}"
-                )
         changes = parse_overrides(self.set)
         design = load_design(self.design, changes)
         if changes and "name" not in changes:  # so that it has its own output folder

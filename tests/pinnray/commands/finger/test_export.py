@@ -38,7 +38,7 @@ def test_a_mesh_is_written_with_the_material(tmp_path):
     common = [*finger, "--mesh-size", "2", "--young", "3", "--out", str(tmp_path)]
     assert main(["export", "mesh", *common]) == 0
     names = {each.name for each in tmp_path.iterdir()}
-    assert names == {"finger.msh", "finger.vtk", "finger.stl", "material.json"}
+    assert names == {"finger.vtk", "finger.stl", "material.json"}
     assert json.loads((tmp_path / "material.json").read_text())["young_Pa"] == 3e6
 
 
