@@ -167,7 +167,7 @@ class _Markers(NamedTuple):
     tracked: float
 
 
-class LiveForce:
+class LiveForce(NewestOnly[_Markers]):
     """Follows the force while a film is tracked: in the newest frame, as fast as it can.
 
     A context manager around the tracking, which an error of the estimate ends at the next frame.
@@ -182,34 +182,21 @@ class LiveForce:
     """
 
     def __init__(self, tracker: LawTracker, depth: float) -> None:
+        super().__init__(self._answer)
         self._tracker, self._depth = tracker, depth
         self.forces: list[FrameForce] = []
-        self._newest = NewestOnly(self._answer)
         self._started = self._answered = 0.0  # when the first and the last force were found, s
         self._moves = False
         # Over the frames before the markers move: sum of their places, mm, and number of frames in which each
         # was seen. The first frame gives them the shapes (m, 2) and (m, 1).
         self._sum, self._count = np.zeros((1, 2)), np.zeros((1, 1))
 
-    def __enter__(self) -> "LiveForce":
-        self._newest.__enter__()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        kind = error[0]
-        self._newest.__exit__(kind if isinstance(kind, type) else None)
-
-    def finish(self) -> list[FrameForce]:
-        """The forces, once that in the last frame is found; no frame may follow."""
-        self._newest.finish()
-        return self.forces
-
     @property
     def live_rate(self) -> LiveRate:
         """How it kept up with the film."""
         spent = self._answered - self._started
         rate = (len(self.forces) - 1) / spent if spent else 0.0
-        return LiveRate(self._newest.passed_over, rate)
+        return LiveRate(self.passed_over, rate)
 
     def watch(self, frame: Frame, detections: FrameDetections) -> None:
         """Take a frame; see `pinnray.vision.tracking.tracker.track`."""
@@ -221,7 +208,7 @@ class LiveForce:
         known, count = seen & (self._count > 0).all(axis=1), np.maximum(self._count, 1)
         deviations = np.repeat(noise[:, None] * np.sqrt(1 + 1 / count), 2, axis=1)
         moved = np.where(known[:, None], places - self._rest, 0.0)
-        self._newest.put(_Markers(frame.number, frame.time, moved, deviations, known, time.perf_counter()))
+        self.put(_Markers(frame.number, frame.time, moved, deviations, known, time.perf_counter()))
 
     def line(self) -> str:
         """The last force in words."""

@@ -97,7 +97,8 @@ def command(
                 film, design, folder, report, video=not without_video, record=record, watch=watch
             )
             if following is not None:
-                forces, pace = following.finish(), following.live_rate
+                following.finish()
+                forces, pace = following.forces, following.live_rate
         if mesh is not None and material and not live:
             with Stages(console) as more, more.stage("force") as report:
                 tracker = force_tracker(mesh, material, observations.points, design.marker_radius)
