@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from pinnray.geometry.finger.presets import load_design as load_design
     from pinnray.geometry.finger.presets import preset_names as preset_names
     from pinnray.geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
-    from pinnray.observations import Observations as Observations
+    from pinnray.geometry.observations import Observations as Observations
+    from pinnray.measurements import load_measurements as load_measurements
     from pinnray.robots.export import Exported as Exported
     from pinnray.runtime.errors import OutsideBodyError as OutsideBodyError
     from pinnray.runtime.errors import UserError as UserError
