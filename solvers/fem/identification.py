@@ -24,7 +24,6 @@ from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear_solvers import Factorisation
 from pinnray.solvers.identification.body import Linearised
-from pinnray.solvers.identification.contradiction import with_doubts
 from pinnray.solvers.identification.field import IdentifiedField
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
@@ -218,12 +217,7 @@ class FemIdSolver(IdentifyingSolver):
             plain = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
             said = f"without markers, this is {self.model}: {plain.status.message}"
             return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
-        found = with_doubts(
-            lambda given: self.refitter(problem)(given, progress),
-            problem.observations,
-            lambda given: self._identifier(coarser(problem) or problem).expected(given),
-        )
-        found = self._with_path(found)
+        found = self._with_path(self.refitter(problem)(problem.observations, progress))
         progress(1.0, found.force_phrase)
         return found
 

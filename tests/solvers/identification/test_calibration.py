@@ -36,7 +36,7 @@ def test_truths_from_the_priors_are_where_the_intervals_say(coarse_mesh, pressed
     identifier = Identifier(
         settings, replace(problem, observations=nothing), lambda unknowns: FemBody(unknowns, settings.degree)
     )
-    (model,) = identifier.models.values()
+    model = identifier.model(problem.material.law)
     markers = MarkerModel(model, identifier.measurement(nothing))
     count = len(identifier.parameters)
     scores, misfits = [], []
