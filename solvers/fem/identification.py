@@ -18,11 +18,11 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import COST_CHANGE
 from pinnray.solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions
-from pinnray.solvers.fem.dolfinx_compat import DistributedSpace, NodeFunction
+from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace, NodeFunction
 from pinnray.solvers.fem.equilibrium import QUADRATURE_DEGREE
+from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
-from pinnray.solvers.fem.linear_solvers import Factorisation
 from pinnray.solvers.identification.body import Linearised
 from pinnray.solvers.identification.field import IdentifiedField
 from pinnray.solvers.identification.fit import Fit
@@ -49,31 +49,31 @@ class FemBody:
         problem, motion = unknowns.problem, unknowns.motion
         space = LagrangeSpace(problem.mesh, degree)
         self.space, self._motion = space, motion
-        self._distributed = DistributedSpace(space)
+        self._elements = DolfinxSpace(space)
         self._clamped, _ = dirichlet_conditions(Problem(problem.mesh, problem.material, Load()), space)
         rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = space.shape_gradients(rule.location)
         self._wall_gradients = motion.gradients()[:, rule.location.cells]
-        moduli = self._distributed.moduli(problem.material.lame)
+        moduli = self._elements.moduli(problem.material.lame)
         self._moduli: tuple[Any, Any] = moduli[:2]
-        self._moved, self._direction = (self._distributed.node_function() for _ in range(2))
+        self._moved, self._direction = (self._elements.node_function() for _ in range(2))
         shift = ufl.Identity(2) + ufl.grad(self._moved.function)
-        gradient = ufl.dot(ufl.grad(self._distributed.function), ufl.inv(shift))
+        gradient = ufl.dot(ufl.grad(self._elements.function), ufl.inv(shift))
         density = energy_density_of(problem.material.law, gradient, moduli, ufl.ln)
         energy = density * ufl.det(shift) * ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
-        self._energy = self._distributed.form(energy)
-        function = self._distributed.function
+        self._energy = self._elements.form(energy)
+        function = self._elements.function
         force = ufl.derivative(energy, function, ufl.TestFunction(function.function_space))
         tangent = ufl.derivative(force, function, ufl.TrialFunction(function.function_space))
         slope = ufl.derivative(force, self._moved.function, self._direction.function)
-        self._force, self._tangent, self._wall_slope = map(self._distributed.form, (force, tangent, slope))
-        self._base_motion = self._distributed.node_function(degree)
+        self._force, self._tangent, self._wall_slope = map(self._elements.form, (force, tangent, slope))
+        self._base_motion = self._elements.node_function(degree)
         by_base = ufl.derivative(force, function, self._base_motion.function)
-        self._base_slope = self._distributed.form(by_base)
+        self._base_slope = self._elements.form(by_base)
         at_base = self._clamped.all(axis=1)
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
         self.feet[:, at_base] = unknowns.feet.motions(space.nodes[at_base])
-        self._conditions = self._distributed.clamp(self._clamped)
+        self._conditions = self._elements.clamp(self._clamped)
         self._factors: Factorisation | None = None
         self._sampled: dict[bytes, LocatedPoints] = {}
 
@@ -94,7 +94,7 @@ class FemBody:
         if not self.admissible(state, changes):
             return None
         self._set(state, lame, changes)
-        force = np.where(self._clamped, 0.0, self._distributed.assemble_nodal(self._force))
+        force = np.where(self._clamped, 0.0, self._elements.assemble_nodal(self._force))
         try:
             factors = self._factorised()
         except UserError:  # a singular tangent
@@ -104,10 +104,10 @@ class FemBody:
     def _factorised(self) -> Factorisation:
         """Factors of the tangent at the state that was set last."""
         if self._factors is None:
-            matrix = self._distributed.assemble_matrix(self._tangent, self._conditions)
-            self._factors = Factorisation(self._distributed, matrix, self._clamped, positive_definite=False)
+            matrix = self._elements.assemble_matrix(self._tangent, self._conditions)
+            self._factors = Factorisation(self._elements, matrix, self._clamped, positive_definite=False)
         else:
-            self._distributed.assemble_matrix(self._tangent, self._conditions, into=self._factors.matrix)
+            self._elements.assemble_matrix(self._tangent, self._conditions, into=self._factors.matrix)
             self._factors.update()
         return self._factors
 
@@ -121,7 +121,7 @@ class FemBody:
         of_moduli = np.zeros((2, *self.shape))
         for found, unit in zip(of_moduli, np.eye(2), strict=True):
             self._set_moduli(unit)
-            found[:] = self._distributed.assemble_nodal(self._force)
+            found[:] = self._elements.assemble_nodal(self._force)
         self._set_moduli(lame[:2])
         return of_walls, of_moduli, of_feet
 
@@ -130,7 +130,7 @@ class FemBody:
         found = np.zeros((len(nodal), *self.shape))
         for slope, values in zip(found, nodal, strict=True):
             direction.set(values)
-            slope[:] = self._distributed.assemble_nodal(form)
+            slope[:] = self._elements.assemble_nodal(form)
         return found
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
@@ -145,7 +145,7 @@ class FemBody:
     def energy(self, state: FloatArray, lame: Lame, changes: FloatArray) -> float:
         """By quadrature; see `Body`."""
         self._set(state, lame, changes)
-        return self._distributed.assemble_scalar(self._energy)
+        return self._elements.assemble_scalar(self._energy)
 
     def field(self, state: FloatArray) -> LagrangeField:
         """The finite-element field."""
@@ -165,7 +165,7 @@ class FemBody:
         return found.swapaxes(0, 1)
 
     def _set(self, state: FloatArray, lame: Lame, changes: FloatArray) -> None:
-        self._distributed.set_function(state)
+        self._elements.set_function(state)
         self._moved.set(np.einsum("k,knx->nx", changes, self._motion.nodal))
         self._set_moduli(lame[:2])
 

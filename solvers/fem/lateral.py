@@ -11,7 +11,7 @@ from pinnray.solvers.problem import Load, Problem, contact_functional
 from pinnray.solvers.solution import LateralStiffness
 
 
-def lateral_stiffness(problem: Problem, space: ExtrudedSpace, *, iterative: bool) -> LateralStiffness:
+def lateral_stiffness(problem: Problem, space: ExtrudedSpace) -> LateralStiffness:
     """The sideways and the torsional stiffness at the contact, at rest, with one factorisation.
 
     Force and couple are spread over the contact as a `mean` load is, and evenly over the depth. The force
@@ -25,7 +25,7 @@ def lateral_stiffness(problem: Problem, space: ExtrudedSpace, *, iterative: bool
     rest = replace(problem, material=material, load=Load(position=problem.load.position), observations=None)
     size = turned.nodes.shape
     none = DisplacementConstraints(np.zeros((0, *size)), np.zeros(0), np.zeros(0))
-    equilibrium = DiscreteEquilibrium(rest, turned, none, "iterative" if iterative else "direct")
+    equilibrium = DiscreteEquilibrium(rest, turned, none)
     contact, functionals = contact_functional(rest), np.zeros((2, *size))
     functionals[0, :, 2] = turned.mean_value(*contact)
     functionals[1, :, 1] = -turned.slope_value(*contact)

@@ -15,7 +15,6 @@ from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
 from pinnray.solvers.fem.finite_strain.newton import ConstrainedNewton
-from pinnray.solvers.fem.linear_solvers import LinearSolver
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Progress
 from pinnray.solvers.stability import aside, descended
@@ -54,7 +53,6 @@ class LoadPath:
         constraints: Their targets grow with the load; the load's own if None.
         guide: States of a simpler model at fractions of the load: each step starts from the last state plus
             the guide's change.
-        iterative: Whether multigrid solves with the tangent, not factors.
         exact_from: Fraction of the load before which the equilibria need be near only. The rest are settings
             of `FemNonlinearSolver`.
     """
@@ -66,7 +64,6 @@ class LoadPath:
         constraints: DisplacementConstraints | None = None,
         *,
         guide: Callable[[float], LoadState] | None = None,
-        iterative: bool = False,
         exact_from: float = 0.0,
         first_step: float,
         max_step: float,
@@ -75,8 +72,7 @@ class LoadPath:
         max_iterations: int,
     ) -> None:
         self._first_step, self._min_step, self.space, self._guide = first_step, min_step, space, guide
-        method: LinearSolver = "iterative" if iterative else "direct"
-        self.equilibrium = DiscreteEquilibrium(problem, space, constraints, method)
+        self.equilibrium = DiscreteEquilibrium(problem, space, constraints)
         self._begin = partial(
             ConstrainedNewton, self.equilibrium, tolerance=tolerance, max_iterations=max_iterations
         )
@@ -94,7 +90,7 @@ class LoadPath:
         self._reason = ""  # Why the last failed step failed, for Newton's method in PETSc's word
 
     def close(self) -> None:
-        """Free what PETSc holds, on all ranks at once."""
+        """Free what PETSc holds."""
         self._newton.close()
         if self._rough is not None:
             self._rough.close()

@@ -18,8 +18,8 @@ from pinnray.solvers.solver import Traits
 
 
 def test_settings_are_converted_from_text():
-    made = make_solver("fem", degree="1", estimate="no", linear_solver="direct")
-    assert made.settings() == {"degree": 1, "estimate": False, "linear_solver": "direct"}
+    made = make_solver("fem", degree="1", estimate="no")
+    assert made.settings() == {"degree": 1, "estimate": False}
 
 
 @pytest.mark.parametrize(("name", "preset"), [(name, preset) for name in PRESETS for preset in PRESETS[name]])
