@@ -132,10 +132,7 @@ def _solver(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
 
 def _force(force: IdentifiedForce) -> dict[str, Any]:
     parts = {"size": force.size, "position": force.position}
-    found: dict[str, Any] = {name: part and part._asdict() for name, part in parts.items()}
-    if force.path:
-        found["path"] = [{"share_of_travel": share, "size": size} for share, size in force.path]
-    return found
+    return {name: part and part._asdict() for name, part in parts.items()}
 
 
 def _figures(figures: FingerFigures) -> dict[str, Any]:

@@ -67,7 +67,6 @@ class DiscreteEquilibrium:
         cells = None if problem.mesh.moduli is None else np.arange(len(problem.mesh.triangles))
         lame = problem.lame(cells, solid=self.elements.dimension == 3)
         moduli = self.elements.moduli(lame)
-        self._moduli: tuple[Any, Any] = moduli[:2]
         density = energy_density_of(material.law, gradient, moduli, ufl.ln)
         measure = ufl.dx if self.linear else ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
         self._integrand = density / space.thickness * measure
@@ -103,20 +102,6 @@ class DiscreteEquilibrium:
         elif np.array_equal(functionals, self.constraints.functionals):
             return
         self._eliminated = None
-
-    def vary(self, problem: Problem) -> None:
-        """Take a problem that is a little different, on the same plane elements; keeps the factors.
-
-        Its mesh may have other points, its material other constants, its load another way or radius.
-        """
-        space = LagrangeSpace(problem.mesh, self.elements.space.degree)
-        self.elements.move(space.nodes[space.vertices])
-        self.problem, self.constraints = problem, DisplacementConstraints.of(problem, space)
-        _, self.prescribed = dirichlet_conditions(problem, space)
-        if self.contact is not None:
-            self.contact = CylinderContact.of(problem, space)
-        for constant, value in zip(self._moduli, problem.lame()[:2], strict=True):
-            constant.value = value
 
     def energy(self, nodal: FloatArray) -> float:
         """Elastic energy per depth, N mm / mm."""

@@ -52,7 +52,8 @@ class Factorisation:
 
     def solve(self, nodal: FloatArray) -> FloatArray:
         """Solve for a right-hand side of shape (N, d); the solution has the same shape."""
-        return self.solve_all(nodal[None])[0]
+        found: FloatArray = self.solve_all(nodal[None])[0]
+        return found
 
     def solve_all(self, nodal: FloatArray) -> FloatArray:
         """Solve for several right-hand sides, shape (r, N, d); the solutions have the same shape.

@@ -1,7 +1,7 @@
 """`fem-id`: contact, walls and law from the markers, by finite elements at finite strain with moved walls."""
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
@@ -16,7 +16,7 @@ from pinnray.geometry.registration import Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import COST_CHANGE
-from pinnray.solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
+from pinnray.solvers.elasticity import Lame, deformation_jacobian, energy_density_of
 from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions
 from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace, NodeFunction
 from pinnray.solvers.fem.equilibrium import QUADRATURE_DEGREE
@@ -24,15 +24,13 @@ from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.identification.body import Linearised
-from pinnray.solvers.identification.field import IdentifiedField
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
 from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.identification.settings import IdentifyingSolver
-from pinnray.solvers.identification.tracker import ForceTracker, LawTracker
-from pinnray.solvers.identification.transfer import force_path
-from pinnray.solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
+from pinnray.solvers.identification.tracker import ForceTracker
+from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import Solution, Status
@@ -189,7 +187,6 @@ def _both_components(values: FloatArray) -> FloatArray:
 class FemIdSolver(IdentifyingSolver):
     """Finite elements whose contact, walls and law are found from the markers."""
 
-    model: str = "fem-nonlinear"  # The only one: finite strain under an unknown force
     degree: int = 2  # Of the elements, 1 or 2
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
@@ -199,13 +196,6 @@ class FemIdSolver(IdentifyingSolver):
     cost: ClassVar[Cost] = Cost(per_triangle=275)
 
     def __post_init__(self) -> None:
-        if self.model == "fem":
-            raise UserError(
-                "fem-id: the linear model is gone; leave out model for finite strain, or take fem-asm, which "
-                "corrects fem by the markers"
-            )
-        if self.model != "fem-nonlinear":
-            raise UserError(f"fem-id: model must be fem-nonlinear, got {self.model!r}; leave it out")
         if self.degree not in (1, 2):
             raise UserError(f"fem-id has elements of degree 1 and 2, not {self.degree}")
         super().__post_init__()
@@ -215,23 +205,11 @@ class FemIdSolver(IdentifyingSolver):
         check_problem(self, problem)
         if problem.observations is None:
             plain = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
-            said = f"without markers, this is {self.model}: {plain.status.message}"
+            said = f"without markers, this is fem-nonlinear: {plain.status.message}"
             return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
-        found = self._with_path(self.refitter(problem)(problem.observations, progress))
+        found = self.refitter(problem)(problem.observations, progress)
         progress(1.0, found.force_phrase)
         return found
-
-    def _with_path(self, solution: Solution) -> Solution:
-        """The solution with its force at lesser loads, on a coarse mesh: the markers tell the end alone."""
-        if solution.identified is None or not isinstance(solution.field, IdentifiedField):
-            return solution
-        best = solution.field.members[0]
-        problem = best.model.unknowns.problem
-        unknowns = Unknowns(coarser(problem) or problem, self.unknowns)
-        size = solution.identified.size.value
-        shares = force_path(ResponseModel(FemBody(unknowns, self.degree), unknowns), best.response.values)
-        path = [(motion, share * size) for motion, share in shares]
-        return replace(solution, identified=solution.identified._replace(path=path))
 
     def refitter(self, problem: Problem) -> Callable[..., Solution]:
         """A function that finds the unknowns for other observations; see `Refittable`.
@@ -270,24 +248,19 @@ class FemIdSolver(IdentifyingSolver):
         return Identifier(self, problem, body, cost_change=cost_change, flexibility=flexibility)
 
 
-def fem_law_tracker(
-    problem: Problem, points: FloatArray, radius: float, laws: Sequence[LawName] = LAWS, *, degree: int = 2
-) -> LawTracker:
-    """The force tracker of a finger by the most probable of some laws of finite strain.
+def fem_force_tracker(
+    problem: Problem, points: FloatArray, radius: float, *, degree: int = 2
+) -> ForceTracker:
+    """The force tracker of a finger.
 
     Args:
-        problem: The finger; its load only gives the drawn contact.
+        problem: The finger, with a law of finite strain; its load only gives the drawn contact.
         points: Markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of the markers' discs, mm; less is taken where one is nearer to the boundary.
-        laws: The laws.
         degree: Of the elements, 1 or 2.
     """
-    trackers = {}
-    for law in laws:
-        material = problem.material.model_copy(update={"law": law})
-        unknowns = Unknowns(replace(problem, material=material, observations=None), DEFAULT)
-        trackers[law] = ForceTracker(ResponseModel(FemBody(unknowns, degree), unknowns), points, radius)
-    return LawTracker(trackers)
+    unknowns = Unknowns(replace(problem, observations=None), DEFAULT)
+    return ForceTracker(ResponseModel(FemBody(unknowns, degree), unknowns), points, radius)
 
 
 def _interpolated(fit: Fit, model: ResponseModel) -> Response:

@@ -17,7 +17,6 @@ from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.equilibrium import LoadState
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
-from pinnray.solvers.fem.lateral import lateral_stiffness
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status, unstable_phrase
 from pinnray.solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
@@ -122,7 +121,6 @@ class Fem3dSolver(FieldSettings):
     grading: float = 0.25  # Thickness of the layer at the side face over that at the middle plane
     face: Face = "side"  # Plane of the field: the "side" face or the "middle" plane
     sides: Literal["free", "held"] = "free"  # Side faces that are "held" do not move along z: plane strain
-    lateral: bool = False  # Whether to find the sideways and torsional stiffness, by one factorisation more
     max_step: float = 1.0  # Largest fraction of the load in one step, at finite strain
     min_step: float = 1e-2  # Fraction of the load below which the solver gives up
     tolerance: float = 1e-8  # Largest residual force over the largest internal force
@@ -147,8 +145,6 @@ class Fem3dSolver(FieldSettings):
         ):
             if value not in known:
                 raise UserError(f"fem-3d has {said} {', '.join(known)}, not {value!r}")
-        if self.lateral and self.sides == "held":
-            raise UserError("fem-3d has no sideways stiffness between held sides; take sides=free")
         if not 0 < self.min_step <= self.max_step <= 1:
             raise UserError("fem-3d needs 0 < min_step <= max_step <= 1")
         check_tolerance(self.name, self.tolerance)
@@ -186,10 +182,6 @@ class Fem3dSolver(FieldSettings):
         unstable = 0 if linear else path.equilibrium.unstable
         region, abscissa = path.region(last), path.force_abscissa(last)
         path.close()
-        lateral = None
-        if self.lateral:
-            progress(1.0, "sideways and torsional stiffness")
-            lateral = lateral_stiffness(problem, space)
         return Solution(
             solver=self.name,
             problem=problem,
@@ -212,7 +204,6 @@ class Fem3dSolver(FieldSettings):
             history=history,
             states=[FaceField(space, point.nodal, self.face) for point in path.points],
             contact=contact_of(problem, abscissa, region),
-            lateral=lateral,
         )
 
     def _status(self, path: LoadPath, region: ContactRegion | None, unstable: int) -> Status:

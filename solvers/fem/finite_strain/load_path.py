@@ -182,13 +182,14 @@ class LoadPath:
         self.equilibrium.constraints = constraints
         return state
 
-    def settled_from(self, nodal: FloatArray) -> LoadState | None:
-        """Equilibrium under the full load from displacements, shape (N, d), mm; None if none is found.
+    def settled_from(self, guess: LoadState) -> LoadState | None:
+        """Equilibrium under the full load from a guess, as of a problem near; None if none is found.
 
         Where Newton's method leaps away, the energy is followed down from there.
         """
-        start = replace(self.equilibrium.rest, fraction=1.0, nodal=nodal)
-        state = self._settled(self._newton, start)
+        nodal = np.where(self.equilibrium.clamped, self.equilibrium.prescribed, guess.nodal)
+        start = replace(guess, fraction=1.0, nodal=nodal)
+        state, _ = self._found(start)
         if state is not None or self.equilibrium.contact is not None:
             return state
         lower = descended(nodal, self.equilibrium.energy_with_springs(start), self.equilibrium.step_at(start))

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -165,7 +165,7 @@ def equilibria_near(problem: Problem, starts: Sequence[FloatArray]) -> list[Equi
     path = FemNonlinearSolver(max_iterations=ITERATIONS).path(problem, LagrangeSpace(problem.mesh, 2))
     found: list[Equilibrium | None] = []
     for start in starts:
-        if (state := path.settled_from(start)) is None:
+        if (state := path.settled_from(replace(path.equilibrium.rest, nodal=start))) is None:
             found.append(None)
             continue
         equilibrium = path.equilibrium
