@@ -15,7 +15,7 @@ from pinnray.runtime.machine import free_memory_gb
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.equilibrium import LoadState
-from pinnray.solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status, unstable_phrase
@@ -121,10 +121,6 @@ class Fem3dSolver(FieldSettings):
     grading: float = 0.25  # Thickness of the layer at the side face over that at the middle plane
     face: Face = "side"  # Plane of the field: the "side" face or the "middle" plane
     sides: Literal["free", "held"] = "free"  # Side faces that are "held" do not move along z: plane strain
-    max_step: float = 1.0  # Largest fraction of the load in one step, at finite strain
-    min_step: float = 1e-2  # Fraction of the load below which the solver gives up
-    tolerance: float = 1e-8  # Largest residual force over the largest internal force
-    max_iterations: int = 20  # Newton iterations in one step
     name = "fem-3d"
     family = "finite elements"
     laws = ("linear", "neo-hookean", "st-venant-kirchhoff")
@@ -145,9 +141,6 @@ class Fem3dSolver(FieldSettings):
         ):
             if value not in known:
                 raise UserError(f"fem-3d has {said} {', '.join(known)}, not {value!r}")
-        if not 0 < self.min_step <= self.max_step <= 1:
-            raise UserError("fem-3d needs 0 < min_step <= max_step <= 1")
-        check_tolerance(self.name, self.tolerance)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the problem in three dimensions; see `Solver`. A `UserError` says if memory is short."""
@@ -163,19 +156,18 @@ class Fem3dSolver(FieldSettings):
         space, linear = self.space(problem), problem.material.law == "linear"
         memory, words = affordable(space.nodes.size, len(space.levels), free_memory_gb())
         progress(0.0, words)
-        guide, step = None, 1.0
+        guide = None
         if not linear:
             guide = _plane_guide(problem, space, lambda done, text: progress(0.1 * done, f"plane: {text}"))
-            step = self.max_step
         path = LoadPath(
             problem,
             space,
             guide=guide,
-            first_step=step,
-            max_step=step,
-            min_step=self.min_step,
-            tolerance=self.tolerance,
-            max_iterations=self.max_iterations,
+            first_step=1.0,  # the guide is near, so that one step is often enough
+            max_step=1.0,
+            min_step=0.01,
+            tolerance=1e-8,
+            max_iterations=20,
         )
         path.follow(lambda done, text: progress(0.1 + 0.9 * done, text))
         last, history = path.points[-1], path.history()

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
+from pinnray.solvers.assimilation.estimation import LEVEL
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
@@ -194,10 +194,8 @@ class Identified:
                 f"{parameter.name}_high": float(high),
                 f"{parameter.name}_resolution": float(resolution),
             }
-        numbers |= {f"singular_value_{n}": float(s) for n, s in enumerate(found.singular_values, 1)}
         size, low, high = self.force().size
         numbers |= {
-            "condition": found.condition,
             "law": self.best.law,
             "force": size,
             "force_low": low,
@@ -250,18 +248,7 @@ class Identified:
             if not known
         ]:
             parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
-        if len(found.parameters) > 1:
-            parts.append(f"least is known of {_least_determined(found)}")
         return "; ".join(parts)
-
-
-def _least_determined(found: Estimate) -> str:
-    """The least determined combination of parameters, in standard deviations of their priors."""
-    direction = found.least_determined
-    direction = direction * np.sign(direction[np.abs(direction).argmax()])
-    order = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= 0.2]
-    text = " ".join(f"{direction[i]:+.2f} {found.parameters[i].name}" for i in order)
-    return f"{text.removeprefix('+')}, singular value {found.singular_values[-1]:.2g}"
 
 
 def _member(fit: Fit, probability: float, problem: Problem) -> Member:

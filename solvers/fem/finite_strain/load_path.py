@@ -9,7 +9,6 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import ContactRegion, CylinderContact
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
@@ -33,12 +32,6 @@ SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
 SOFTEST times as stiff, which is hardened by factors of at most HARDER. For a node leaves the contact within
 Newton's method where the cylinder recedes by its force over that stiffness: of a strip of steel by some
 nanometres, so that nodes would come and go for ever. A finger whose walls bend as solids has 10^3 to 10^4."""
-
-
-def check_tolerance(solver: str, tolerance: float) -> None:
-    """Raise a `UserError` unless Newton's method ends near an equilibrium."""
-    if not 0 < tolerance <= 1e-3:
-        raise UserError(f"{solver} needs 0 < tolerance <= 0.001, not {tolerance:g}")
 
 
 class LoadPath:
