@@ -55,7 +55,6 @@ class FingerFigures:
         places: Drawn points of the largest stress and strain, mm, by the names of these figures.
         curve: Travel of the indenter, mm, and its force along it, N, from rest on; one pair where the way to
             the end is not known.
-        depth: Of the finger, mm.
         strain_over_break: Largest nominal strain over the material's strain at break, of a known material.
         strain_energy: Elastic energy of the whole finger, mJ.
     """
@@ -83,30 +82,9 @@ class FingerFigures:
     narrowest_gap: float = _figure("mm", "narrowest clear width of a cavity")
     strain_over_break: float = float("nan")
     strain_energy: float = float("nan")
-    depth: float = float("nan")
     intervals: Mapping[str, Interval] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict)
     curve: tuple[tuple[float, float], ...] = ()
-
-    @property
-    def force_per_depth(self) -> float:
-        """Force of the indenter along its travel, N/mm."""
-        return self.force / self.depth
-
-    @property
-    def stroke(self) -> float:
-        """Travel of the indenter, mm."""
-        return self.curve[-1][0] if self.curve else float("nan")
-
-    @property
-    def density(self) -> float:
-        """Density of the material that the mass is of, g/cm^3."""
-        return 1000 * self.mass / (self.area * self.depth)
-
-    @property
-    def tip(self) -> float:
-        """How far the tip moves, mm."""
-        return float(np.hypot(self.tip_u, self.tip_v))
 
     def force_at(self, stroke: float) -> float:
         """Force of the indenter, N, after a travel, mm; between computed equilibria it is interpolated.
@@ -142,43 +120,25 @@ class FingerFigures:
         return found | {"strain_energy_mJ": self.strain_energy}
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """What, how much with its unit and interval, and a remark: a row for each figure that is known."""
-        rows = [
-            (
-                "grip force",
-                self._said("force", "N"),
-                f"at {self.stroke:g} mm, {self.force_per_depth:.4g} N/mm",
+        """What, how much with its unit and interval, and its meaning: a row for each figure that is known."""
+        known = {name: value for name, value in self.values().items() if not np.isnan(value)}
+        return [
+            *(
+                (name.replace("_", " "), self._said(name, value), self._meaning(name))
+                for name, value in known.items()
             ),
-            (
-                "tip displacement",
-                f"{self.tip:.4g} mm",
-                f"{self.tip_u:+.3g} mm along, {self.tip_v:+.3g} mm across (positive toward the indenter)",
-            ),
-            ("wrap", f"{self.wrap:.3g} deg", "fold of the front face around the indenter"),
-            ("compliance across", f"{self.compliance_across:.4g} mm/N", "of the contact, at rest"),
-            ("compliance along", f"{self.compliance_along:.4g} mm/N", "of the contact, at rest"),
-            ("von Mises stress", self._said("von_mises", "MPa"), self._where("von_mises")),
-            ("principal strain", f"{self.principal_strain:.2%}", self._where("principal_strain")),
-            ("strain energy", f"{self.strain_energy:.4g} mJ", ""),
-            (
-                "mass",
-                f"{self.mass:.3g} g",
-                f"at {self.density:.3g} g/cm3, {self.area:.4g} mm2 by {self.depth:g} mm",
-            ),
-            ("smallest wall", f"{self.thinnest_wall:.3g} mm", f"narrowest gap {self.narrowest_gap:.3g} mm"),
+            ("strain energy", f"{self.strain_energy:.4g} mJ", "elastic energy of the whole finger"),
         ]
-        return [row for row in rows if not row[1].startswith("nan")]
 
-    def _said(self, name: str, unit: str) -> str:
-        value = f"{getattr(self, name):.4g}"
+    def _said(self, name: str, value: float) -> str:
+        said = f"{value:.4g}"
         if (interval := self.intervals.get(name)) is not None:
-            value += f" ({interval[0]:.4g} to {interval[1]:.4g})"
-        return f"{value} {unit}"
+            said += f" ({interval[0]:.4g} to {interval[1]:.4g})"
+        return f"{said} {QUANTITIES[name].unit}".rstrip()
 
-    def _where(self, name: str) -> str:
-        if (place := self.places.get(name)) is None:
-            return ""
-        return f"largest at ({place[0]:.3g}, {place[1]:.3g}) mm, away from corners and contact"
+    def _meaning(self, name: str) -> str:
+        meaning, place = QUANTITIES[name].meaning, self.places.get(name)
+        return meaning if place is None else f"{meaning}: at ({place[0]:.3g}, {place[1]:.3g}) mm"
 
 
 QUANTITIES: Mapping[str, Quantity] = {
@@ -233,7 +193,6 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
         **(figures_at_rest(problem) if rest is None else rest),
         strain_over_break=_strain_over_break(problem.material, strain.value),
         strain_energy=float(solution.energy) * depth,
-        depth=depth,
         intervals=_intervals(solution, depth, stress),
         places={
             name: (float(each.place[0]), float(each.place[1]))
