@@ -44,7 +44,7 @@ def bent_force(problem):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "solver", [FemNonlinearSolver(), pytest.param(LOCAL, marks=pytest.mark.slow)], ids=["fem", "network"]
+    "solver", [FemNonlinearSolver(), pytest.param(LOCAL, marks=pytest.mark.release)], ids=["fem", "network"]
 )
 def test_a_column_buckles_under_eulers_load(problem, solver):
     """Within 1 %: shear and the shortening of the axis are less; straight it would bear 48 times as much.
