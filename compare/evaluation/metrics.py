@@ -90,27 +90,18 @@ class Interval(Numbers):
     high: Number
 
 
-class PathForce(Numbers):
-    """Force at a lesser load, N/mm."""
-
-    share_of_travel: Number
-    size: Number
-
-
 class ForceScore(Numbers):
     """Force of the indenter that was found from the markers."""
 
     size: Interval  #: N/mm.
     position: Interval | None  #: Abscissa where it acts, mm; None where it was no unknown.
-    path: tuple[PathForce, ...] | None  #: Force at lesser loads, where it is known.
 
     @classmethod
     def of(cls, force: IdentifiedForce | None) -> Self | None:
         """The numbers of a force, if a solver has identified one."""
         if force is None:
             return None
-        path = [{"share_of_travel": share, "size": size} for share, size in force.path]
-        return cls.model_validate({"size": force.size, "position": force.position, "path": path or None})
+        return cls.model_validate({"size": force.size, "position": force.position})
 
 
 class FigureScores(Numbers):
