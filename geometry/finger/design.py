@@ -13,11 +13,11 @@ from pinnray.geometry.finger.parameters import (
     parameter_info,
     with_unit,
 )
-from pinnray.geometry.finger.rules import fitting_marker
+from pinnray.geometry.finger.rules import broken_rule, fitting_marker
 from pinnray.geometry.finger.section import finger_section
-from pinnray.geometry.finger.validation import check
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import fact_table
 
 if TYPE_CHECKING:
@@ -103,10 +103,9 @@ class Design(Parameters):
 
     @model_validator(mode="after")
     def _obey_rules(self) -> "Design":
-        check(self)
-        self.__dict__["marker_diameter"] = fitting_marker(
-            self
-        )  # still unset: a copy shrinks by its own walls
+        if fault := broken_rule(self):
+            raise UserError(fault)
+        self.__dict__["marker_diameter"] = fitting_marker(self)  # still unset: a copy has its own walls
         return self
 
 

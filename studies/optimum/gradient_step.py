@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.parameters import Parameters
-from pinnray.geometry.finger.validation import broken_rule
+from pinnray.geometry.finger.rules import broken_rule
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures.measures import narrowest_gap, thinnest_wall
