@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.drawing.formats.closed_loops import corner_at, cut_at, nearest_piece, run_between
+from pinnray.geometry.drawing.formats.closed_loops import corner_at, cut_at, run_between
 from pinnray.geometry.drawing.formats.drawing import place
 from pinnray.geometry.section.loop import STRAIGHT, Loop
 from pinnray.geometry.section.section import Section
@@ -116,14 +116,14 @@ def with_part(loop: Loop, ends: Sequence[FloatArray], name: str) -> Loop:
 
 def on_curve(loop: Loop, point: FloatArray, name: str) -> tuple[int, float]:
     """Piece and fraction of its length at a given point of the outline, at most 0.1 mm off the curve."""
-    _, which, fraction, distance = nearest_piece([loop], point)
+    (which,), (fraction,), (distance,) = loop.places(np.asarray(point)[None])
     if distance > 0.1:
         nearest = loop.along(which, fraction)[0]
         raise UserError(
             f"the {name} at {place(point)} is {distance:.3g} mm off the outline; its nearest point is "
             f"{place(nearest)}"
         )
-    return which, fraction
+    return int(which), float(fraction)
 
 
 def with_front(loop: Loop, contact: FloatArray) -> Loop:
@@ -132,7 +132,7 @@ def with_front(loop: Loop, contact: FloatArray) -> Loop:
     Normals of up to `STEEPEST` from +y count, so that x falls along the part; arcs are cut there. It ends
     at a clamped piece.
     """
-    _, which, _, _ = nearest_piece([loop], contact)
+    which = int(loop.places(contact[None]).pieces[0])
     for step in (1, -1):
         current = which
         for _ in range(len(loop.points)):
@@ -144,7 +144,7 @@ def with_front(loop: Loop, contact: FloatArray) -> Loop:
             if not _faces(loop, current) or loop.names[following] == "base":
                 break
             current = following
-        _, which, _, _ = nearest_piece([loop], contact)
+        which = int(loop.places(contact[None]).pieces[0])
     run = {which}
     for step in (1, -1):
         current = (which + step) % len(loop.points)

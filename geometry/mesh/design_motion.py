@@ -39,15 +39,10 @@ class MovingMesh:
         self._piece, self._share = np.zeros_like(self._loop), np.zeros(len(points))
         nearest = np.full(len(points), np.inf)
         for number, loop in enumerate(self._loops):
-            piece, share = loop.places(points)
-            away = np.linalg.norm(_at(loop, piece, share) - points, axis=1)
-            nearer = away < nearest
-            self._loop[nearer], self._piece[nearer], self._share[nearer] = (
-                number,
-                piece[nearer],
-                share[nearer],
-            )
-            nearest[nearer] = away[nearer]
+            places = loop.places(points)
+            nearer = places.distances < nearest
+            self._loop[nearer], nearest[nearer] = number, places.distances[nearer]
+            self._piece[nearer], self._share[nearer] = places.pieces[nearer], places.shares[nearer]
         if nearest.max() > ON_CURVE:
             raise UserError(f"the mesh is not of the finger {finger.name!r}: its boundary is elsewhere")
 

@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.drawing.formats.drawing import UNITS, WORDS, Scale, place
+from pinnray.geometry.drawing.formats.drawing import UNITS, Scale, place
 from pinnray.geometry.drawing.formats.pieces import FARTHEST, Piece, is_near
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
@@ -26,7 +26,7 @@ LARGEST = 2000.0
 """Largest extent of a section, mm."""
 
 USUAL = (10.0, 500.0)
-"""Extents of fingers, mm: a header that gives another one where mm give such a one is doubted."""
+"""Extents of fingers, mm. Where mm give such a one and the header's unit another, the unit must be given."""
 
 
 class Joined(NamedTuple):
@@ -100,28 +100,20 @@ def check_extent(pieces: Sequence[Piece], scale: Scale) -> None:
     if not pieces:
         raise UserError("there is no line or arc in it; draw the boundary of the section")
     ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
-    extent = float(np.ptp(ends, axis=0).max()) if np.isfinite(ends).all() else np.inf
+    if not is_near(ends):
+        raise UserError(
+            f"a coordinate is not finite or beyond {FARTHEST:g} mm, read in {scale}; draw near the origin"
+        )
+    extent = float(np.ptp(ends, axis=0).max())
     drawn = extent / scale.length
-    better = [
-        name
-        for low, high in (USUAL, (1.0, LARGEST))
-        for name in ("mm", "in", "cm", "m", "um")
-        if low <= drawn * UNITS[name] <= high
-    ]
-    other = f'; give units = "{better[0]}" for {drawn * UNITS[better[0]]:.4g} mm' if better else "; scale it"
-    said = WORDS.get(scale.name, scale.name)
-    if 1 <= extent <= LARGEST and is_near(ends):
-        doubted = scale.origin == "of the header" and USUAL[0] <= drawn <= USUAL[1]
-        if doubted and scale.length != 1 and not USUAL[0] / 2 <= extent <= USUAL[1]:
-            raise UserError(
-                f"its header says {said}, in which it measures {extent:.4g} mm{other}"
-                + (f', or units = "{scale.name}" if it is so' if scale.name in UNITS else "")
-            )
-        return
-    if 0 < drawn <= FARTHEST and not 1 <= extent <= LARGEST:
-        first = f"its header says {said}: " if scale.origin == "of the header" else ""
-        raise UserError(f"{first}the drawing measures {extent:.4g} mm, not 1 to {LARGEST:g} mm{other}")
-    raise UserError(f"a coordinate is not finite or beyond {FARTHEST:g} mm; draw the section near the origin")
+    usual = USUAL[0] / 2 <= extent <= USUAL[1] or not USUAL[0] <= drawn <= USUAL[1]
+    beyond = "" if 1 <= extent <= LARGEST else f", not 1 to {LARGEST:g} mm"
+    if beyond or (scale.origin == "of the header" and not usual):
+        other = "m" if scale.length == 1 else "mm"
+        raise UserError(
+            f"read in {scale} the drawing measures {extent:.4g} mm{beyond}; give its units: "
+            f'units = "{other}" makes it {drawn * UNITS[other]:.4g} mm'
+        )
 
 
 def check_twice(found: Joined) -> None:

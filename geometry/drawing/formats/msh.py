@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 
 import gmsh
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator
 
 from pinnray.geometry.drawing.formats.closed_loops import Closed, closed_loops, straightened
 from pinnray.geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, Scale, label_of
-from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, line
+from pinnray.geometry.drawing.formats.pieces import Piece, line
 from pinnray.geometry.drawing.formats.planes import axes_across, plane_text
 from pinnray.geometry.mesh.mesher import session
 from pinnray.runtime.arrays import FloatArray, IntArray
@@ -49,7 +48,6 @@ class RawMesh(NamedTuple):
     dimension: int  # 2 or 3
     edges: Mapping[str, IntArray]  # of the physical curves by name, (k, 2) each
     nodes: Mapping[str, IntArray]  # of the physical points by name
-    bent: Mapping[tuple[int, int], list[int]]  # nodes along each bent side by its corners, the lesser first
     parts: Mapping[str, IntArray]  # of the physical surfaces by name, rows of the triangles of first order
 
     @property
@@ -63,7 +61,7 @@ def read_msh(path: Path, units: str | None = None, tolerance: float | None = Non
 
     A plane mesh gives its boundary, with the physical groups as labels; a triangle mesh with the groups
     `base` (or `clamp`) and `contact` is kept as it is. The mesh of an extruded body gives the boundary of its
-    end face; sides in one line are joined. Bent sides of elements of higher order become arcs.
+    end face; sides in one line are joined. Elements are of first order.
 
     Args:
         path: The file.
@@ -86,12 +84,12 @@ def _plane_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
     groups = sorted(raw.edges, key=lambda name: name in ("base", "contact"))  # these win over `front`
     named = {tuple(sorted(edge)): name for name in groups for edge in raw.edges[name].tolist()}
     sides = [edge for count, cells in raw.cells.items() for edge in _sides(cells, count)]
-    pieces = [piece for side in _once(sides) for piece in _pieces(raw, points, side, named.get(side, ""))]
+    pieces = [line(*points[list(side)], named.get(side, "")) for side in _once(sides)]
     loops, gaps = close(pieces)
     markers = raw.nodes.get("markers", np.empty(0, dtype=np.int64))
     contact = raw.nodes.get("contact", np.empty(0, dtype=np.int64))
     ready = None
-    if set(raw.cells) == {3} and {"base", "contact"} <= set(raw.edges) and not raw.bent:
+    if set(raw.cells) == {3} and {"base", "contact"} <= set(raw.edges):
         used, triangles = np.unique(raw.cells[3], return_inverse=True)
         number = np.full(len(points), -1)
         number[used] = np.arange(len(used))
@@ -136,7 +134,7 @@ def _extruded_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
             continue
         points = raw.points @ axes_across(normal).T
         sides = [side for which in caps[0] for side in _sides(np.array([faces[which]]), len(faces[which]))]
-        loops, gaps = close([piece for side in _once(sides) for piece in _pieces(raw, points, side, "")])
+        loops, gaps = close([line(*points[list(side)], "") for side in _once(sides)])
         return Drawing(
             loops=tuple(straightened(loop, FLAT) for loop in loops),
             unit=unit,
@@ -144,18 +142,6 @@ def _extruded_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
             depth=high - low,
         )
     raise UserError("its body is not extruded; give a mesh of the plane section")
-
-
-def _pieces(raw: RawMesh, points: FloatArray, side: tuple[int, ...], label: str) -> list[Piece]:
-    """A side of an element in the plane: a line, the arc through three nodes, or arcs through more."""
-    first, last = side
-    if (first, last) not in raw.bent:
-        return [line(points[first], points[last], label)]
-    nodes = points[[first, *raw.bent[first, last], last]]
-    if len(nodes) == 3:
-        return [arc_through(nodes[0], nodes[1], nodes[2], label)]
-    curve = BarycentricInterpolator(np.linspace(0, 1, len(nodes)), nodes)
-    return list(arcs_along(lambda parameters: np.asarray(curve(parameters)), 0.0, 1.0, label))
 
 
 def _main_directions(normals: FloatArray, areas: FloatArray) -> list[FloatArray]:
@@ -214,24 +200,22 @@ def _raw(path: Path, unit: float) -> RawMesh:
         number[tags.astype(np.int64)] = np.arange(len(tags))
         points = unit * coordinates.reshape(-1, 3)
         by_dimension: dict[int, dict[int, list[IntArray]]] = {2: {}, 3: {}}
-        bent = dict[tuple[int, int], list[int]]()
         for dimension in (2, 3):
             for kind in mesh.getElementTypes(dimension):
-                name, _, order, whole, _, corners = mesh.getElementProperties(kind)
-                if corners not in ((3, 4) if dimension == 2 else FACES):
-                    raise UserError(f"it holds elements of type {name}, which cannot be read")
+                name, _, order, _, _, corners = mesh.getElementProperties(kind)
+                if order > 1 or corners not in ((3, 4) if dimension == 2 else FACES):
+                    raise UserError(
+                        f"it holds elements of type {name}; there may be triangles, quadrilaterals, "
+                        "tetrahedra, pyramids, prisms and hexahedra of first order"
+                    )
                 _, nodes = mesh.getElementsByType(kind)
-                cells = _numbers(number, nodes.reshape(-1, int(whole))[:, :corners])
+                cells = _numbers(number, nodes.reshape(-1, int(corners)))
                 by_dimension[dimension].setdefault(int(corners), []).append(cells)
-                if order > 1:
-                    sides = mesh.getElementEdgeNodes(kind).reshape(-1, int(order) + 1)
-                    bent |= _bent(points, _numbers(number, sides))
         dimension = 3 if by_dimension[3] else 2
         if not by_dimension[dimension]:
             raise UserError("it holds no triangles, quadrilaterals or solid elements")
         return RawMesh(
             points=points,
-            bent=bent,
             cells={count: np.concatenate(parts) for count, parts in by_dimension[dimension].items()},
             dimension=dimension,
             edges={name: _numbers(number, nodes.reshape(-1, 2)) for name, nodes in _groups(1)},
@@ -251,17 +235,6 @@ def _parts(mesh: Any) -> dict[str, IntArray]:
             own, _ = mesh.getElementsByType(TRIANGLE, int(entity))
             parts.setdefault(name, []).append(order[np.searchsorted(tags, own, sorter=order)])
     return {name: np.concatenate(rows) for name, rows in parts.items() if name}
-
-
-def _bent(points: FloatArray, sides: IntArray) -> dict[tuple[int, int], list[int]]:
-    """Inner nodes of the sides (k, order + 1), corners first, that are more than `FLAT` off their chord."""
-    start, end = points[sides[:, 0]], points[sides[:, 1]]
-    shares = np.arange(1, sides.shape[1] - 1) / (sides.shape[1] - 1)
-    off = points[sides[:, 2:]] - (start[:, None] + shares[:, None] * (end - start)[:, None])
-    found = {}
-    for first, last, *inner in sides[np.linalg.norm(off, axis=2).max(axis=1) > FLAT].tolist():
-        found[min(first, last), max(first, last)] = inner if first < last else inner[::-1]
-    return found
 
 
 def _numbers(number: IntArray, tags: IntArray) -> IntArray:

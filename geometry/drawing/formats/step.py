@@ -15,7 +15,7 @@ from OCP.GeomLProp import GeomLProp_SLProps
 
 from pinnray.geometry.drawing.formats.closed_loops import closed_loops
 from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Scale
-from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
+from pinnray.geometry.drawing.formats.pieces import Piece, arcs_along, line
 from pinnray.geometry.drawing.formats.planes import axes_across, plane_of, plane_text
 from pinnray.geometry.drawing.formats.step_parts import parts_of
 from pinnray.runtime.arrays import FloatArray
@@ -61,7 +61,7 @@ def read_step(
     cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
     axes = axes_across(cut.normal)
     pieces = [
-        piece.scaled(unit)
+        piece
         for face in _united(cut.faces)
         for wire in face.Wires()
         for edge in wire.Edges()
@@ -208,18 +208,13 @@ def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
     first, last = edge._bounds()
 
     def on_edge(parameters: FloatArray) -> FloatArray:
-        return np.array([_array(edge.positionAt(float(t), mode="parameter")) for t in parameters]) @ axes.T
+        points = [_array(edge.positionAt(float(t), mode="parameter")) for t in parameters]
+        return unit * (np.array(points) @ axes.T)
 
-    start, middle, end = on_edge(np.array([first, 0.5 * (first + last), last]))
     if edge.geomType() == "LINE":
-        yield line(start, end, "")
-    elif edge.geomType() == "CIRCLE":
-        if edge.IsClosed():
-            yield from full_circle(axes @ _array(edge.arcCenter()), edge.radius(), "")
-        else:
-            yield arc_through(start, middle, end, "")
+        yield line(*on_edge(np.array([first, last])), "")
     else:
-        yield from arcs_along(on_edge, first, last, "", unit)
+        yield from arcs_along(on_edge, first, last, "")
 
 
 def _discs(

@@ -9,9 +9,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import svgelements
 
-from pinnray.geometry.drawing.formats.closed_loops import Marks
+from pinnray.geometry.drawing.formats.closed_loops import assembled
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, label_of
-from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
+from pinnray.geometry.drawing.formats.pieces import Piece, arcs_along, line
 from pinnray.geometry.drawing.formats.svg_tree import NAMESPACE, drawn, svg_scale, tag_of
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
@@ -50,18 +50,17 @@ def read_svg(path: Path, units: str | None = None, tolerance: float | None = Non
         raise UserError("it cannot be read as SVG: it is nested too deeply") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError):  # of svgelements, at what is no SVG
         raise UserError(f"it cannot be read as SVG: {_unsound(tree)}") from None
-    marks, pieces = Marks(), list[Piece]()
+    pieces = list[Piece]()
     for element, label in _shapes(parsed, ""):
         place = _Transformation(element.transform * back, scale.length)
         if not place.is_finite:
             raise UserError(f"the transformation of {_described(element)} is not finite")
         try:
-            if not marks.took(*_mark(element, place), label):
-                pieces += _pieces(element.segments(transformed=False), label, place)
+            pieces += _pieces(element.segments(transformed=False), label, place)
         except TypeError:  # svgelements reads a coordinate that is no number as None
             raise UserError(f"a coordinate of {_described(element)} is no number") from None
     said = {"given": " (given)", "assumed": f" {ASSUMED}"}.get(scale.origin, "")
-    return marks.drawing(pieces, scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
+    return assembled(pieces, [], scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
 
 
 def _unsound(tree: ET.Element | None) -> str:
@@ -113,12 +112,6 @@ class _Transformation:
         """Whether it has neither an infinite number nor none."""
         return bool(np.isfinite(self._matrix).all() and np.isfinite(self._shift).all())
 
-    @property
-    def scale(self) -> float | None:
-        """Length of a unit, mm; None if circles do not stay circles."""
-        low, high = sorted(np.linalg.svd(self._matrix, compute_uv=False))
-        return float(high) if high - low <= 1e-9 * high else None
-
     def __call__(self, point: Any) -> FloatArray:
         """A point in the drawing, shape (2,), mm."""
         return np.asarray(self._matrix @ [float(point[0]), float(point[1])] + self._shift)
@@ -128,26 +121,11 @@ class _Transformation:
         return lambda parameters: np.array([self(segment.point(float(t))) for t in parameters])
 
 
-def _mark(shape: Any, place: _Transformation) -> tuple[FloatArray | None, float]:
-    """Centre and diameter of a circle, mm; None for another shape."""
-    if not isinstance(shape, svgelements.Circle | svgelements.Ellipse) or not place.scale:
-        return None, 0.0
-    if abs(shape.rx - shape.ry) > 1e-9 * shape.rx:
-        return None, 0.0
-    return place((shape.cx, shape.cy)), 2 * float(shape.rx) * place.scale
-
-
 def _pieces(segments: Iterable[Any], label: str, place: _Transformation) -> Iterator[Piece]:
     for segment in segments:
         if isinstance(segment, svgelements.Move) or segment.start is None or segment.end is None:
             continue
-        start, end = place(segment.start), place(segment.end)
-        round_arc = isinstance(segment, svgelements.Arc) and abs(segment.rx - segment.ry) <= 1e-9 * segment.rx
         if isinstance(segment, svgelements.Line | svgelements.Close):
-            yield line(start, end, label)
-        elif not (round_arc and place.scale):
-            yield from arcs_along(place.along(segment), 0.0, 1.0, label)
-        elif abs(segment.sweep) > 2 * np.pi - 1e-9:
-            yield from full_circle(place(segment.center), float(segment.rx) * place.scale, label)
+            yield line(place(segment.start), place(segment.end), label)
         else:
-            yield arc_through(start, place(segment.point(0.5)), end, label)
+            yield from arcs_along(place.along(segment), 0.0, 1.0, label)
