@@ -231,9 +231,10 @@ class DrawnFinger:
 
     def plot(self) -> "Figure":
         """The section with clamp, contact and numbered markers in the file's axes, as a matplotlib figure."""
-        from pinnray.geometry.drawing.picture import plot_drawing
+        from pinnray.geometry.finger.picture import plot_finger
 
-        return plot_drawing(self, self.placement)
+        place = self.placement.inverse
+        return plot_finger(self, place.section(self.section), place)
 
     def _source(self, key: str) -> str:
         source = self.sources.get(key)

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import model_validator
 
 from pinnray.geometry.finger.markers import marker_positions
@@ -76,10 +77,10 @@ class Design(Parameters):
         return [*rows, ("Abscissa of the contact's middle", "", _in_words(self.contact_abscissa, "mm"))]
 
     def plot(self) -> "Figure":
-        """The section to scale, with its markers and the contact, as a matplotlib figure."""
+        """The section with clamp, contact and numbered markers, as a matplotlib figure."""
         from pinnray.geometry.finger.picture import plot_finger
 
-        return plot_finger(self)
+        return plot_finger(self, self.section, np.asarray)
 
     def _repr_html_(self) -> str:
         """The section and the paper's nine parameters, in a notebook."""
