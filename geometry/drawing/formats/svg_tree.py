@@ -1,7 +1,8 @@
 """Prepares the elements of an SVG file: what is drawn, and in which unit."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import count
 from math import inf
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
@@ -19,10 +20,10 @@ LENGTHS |= {"": UNITS["px"], **{name: UNITS[name] for name in ("um", "m")}}
 LENGTH = re.compile(r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([a-zA-Z%]*)")
 """A number with or without a unit."""
 
-SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon", "use", "image", "text"}
-GROUPS = {"g", "a", "defs", "style"}
-UNDRAWN = {"mask", "marker", "symbol", "clipPath", "pattern"}
-"""Elements whose content is not drawn where it stands, but may be used elsewhere."""
+SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon", "image", "text"}
+GROUPS = {"g", "a", "use", "switch", "defs", "style"}
+MOST = 100_000
+"""Largest number of elements with all copies."""
 
 
 class ViewBox(NamedTuple):
@@ -35,21 +36,18 @@ class ViewBox(NamedTuple):
 
 
 def drawn(root: ET.Element) -> ET.Element:
-    """A copy of the tree without what is not drawn.
+    """A copy of the tree without what is not drawn, with the elements that a `use` shows in its place.
 
     Raises:
-        UserError: If an element contains itself, copies grow without limit, or a symbol or an inner `svg` is
-            shown, which svgelements would place without its size.
+        UserError: If copies grow without limit, or a symbol or an inner `svg` is shown.
     """
-    by_id = {element.get("id"): element for element in root.iter()}
-    _check_copies(root, by_id)
     box = view_box(root)
     copy = ET.Element(root.tag, root.attrib)
     for name in ("width", "height"):
         copy.attrib.pop(name, None)
         if box:
             copy.set(name, repr(getattr(box, name)))
-    copy.extend(list(_copies(root, by_id)))
+    copy.extend(list(_copies(root, {element.get("id"): element for element in root.iter()}, count())))
     return copy
 
 
@@ -106,48 +104,28 @@ def svg_scale(root: ET.Element, units: str | None) -> Scale:
     )
 
 
-def _check_copies(root: ET.Element, by_id: Mapping[str | None, ET.Element]) -> None:
-    """Refuse elements that contain themselves, and copies of copies whose number grows without limit."""
-    sizes: dict[ET.Element, float] = {}
-
-    def size(element: ET.Element) -> float:
-        if element not in sizes:
-            sizes[element] = inf  # while it is open, that is, if it contains itself
-            copied = by_id.get(_link(element)) if tag_of(element) == "use" else None
-            sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
-        return sizes[element]
-
-    if (count := size(root)) > 100_000:  # a copy counts as often as it is made
-        what = "an element contains itself" if count == inf else f"its copies make {count:.0f} elements"
-        raise UserError(f"{what}; draw each curve once")
-
-
-def _link(element: ET.Element) -> str:
-    """Id of the element that a `use` shows; svgelements, too, takes any sign in place of the #."""
-    return element.get("href", element.get(LINK, ""))[1:]
-
-
-def _copies(parent: ET.Element, by_id: Mapping[str | None, ET.Element]) -> Iterator[ET.Element]:
-    """Copies of an element's children as they are drawn."""
-    for child in parent:
-        tag = tag_of(child)
-        target = by_id.get(_link(child)) if tag == "use" else None
-        shown = tag if target is None else tag_of(target)
-        if shown == "svg" or (tag == "use" and shown == "symbol"):
-            raise UserError(
-                f"it shows {'a symbol' if shown == 'symbol' else 'an inner svg'}; put it in a group"
-            )
-        if tag == "path" and child.get("d", "").strip() in ("", "none"):
-            continue  # it is empty
-        if tag == "switch":
-            tag, children = "g", list(_copies(child, by_id))[:1]
-        elif tag in UNDRAWN:
-            tag, children = "defs", list(_copies(child, by_id))
-        elif tag in SHAPES | GROUPS and not child.get("requiredExtensions"):
-            children = list(_copies(child, by_id))
-        else:
+def _copies(
+    elements: Iterable[ET.Element], by_id: Mapping[str | None, ET.Element], counter: Iterator[int]
+) -> Iterator[ET.Element]:
+    """Copies of elements as they are drawn."""
+    for element in elements:
+        if next(counter) > MOST:
+            raise UserError(f"its copies make more than {MOST} elements; draw each curve once")
+        tag, kept, children = tag_of(element), dict(element.attrib), list(element)
+        if tag == "use":
+            shown = by_id.get(element.get("href", element.get(LINK, "")).removeprefix("#"))
+            children = [] if shown is None else [shown]
+            x, y = kept.pop("x", 0), kept.pop("y", 0)
+            kept["transform"] = f"{kept.get('transform', '')} translate({x},{y})"
+        if tag == "svg" or (tag == "use" and any(tag_of(child) == "symbol" for child in children)):
+            what = "a symbol" if tag == "use" else "an inner svg"
+            raise UserError(f"it shows {what}, which is not read; make it a group")
+        if tag not in SHAPES | GROUPS or element.get("requiredExtensions"):
             continue
-        copy = ET.Element(NAMESPACE + tag, child.attrib)
-        copy.text, copy.tail = child.text, child.tail
-        copy.extend(children)
+        if tag == "path" and element.get("d", "").strip() in ("", "none"):
+            continue  # it is empty
+        copies = list(_copies(children, by_id, counter))
+        copy = ET.Element(NAMESPACE + ("g" if tag in ("use", "switch") else tag), kept)
+        copy.text = element.text
+        copy.extend(copies[:1] if tag == "switch" else copies)
         yield copy
