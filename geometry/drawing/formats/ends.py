@@ -1,6 +1,6 @@
 """Finds out which ends of pieces are one, and says where a boundary is open, forks or is drawn twice."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +68,7 @@ def _clusters(points: FloatArray, pairs: IntArray) -> IntArray:
 def _matches(
     pieces: Sequence[Piece], nodes: IntArray, places: FloatArray, tolerance: float
 ) -> tuple[IntArray, FloatArray]:
-    """Pairs of nodes (k, 2) that are one: loose ends, with their distances, mm, then forks at loose ends."""
+    """Pairs of loose ends (k, 2) that are one, with their distances, mm."""
     loose = np.bincount(nodes.ravel(), minlength=len(places)) == 1
     own = {
         tuple(sorted(ends))
@@ -76,23 +76,16 @@ def _matches(
         if abs(piece.bulge) < 1
     }
     links, gaps, matched = list[IntArray](), list[float](), np.zeros(len(places), dtype=bool)
-    for pair, gap in _near(places, np.flatnonzero(loose), tolerance):
+    ends = np.flatnonzero(loose)
+    pairs = np.sort(ends[cKDTree(places[ends]).query_pairs(tolerance, output_type="ndarray")], axis=1)
+    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+    for which in np.argsort(apart, kind="stable"):  # the nearest first
+        pair, gap = pairs[which], float(apart[which])
         if not matched[pair].any() and tuple(pair.tolist()) not in own:
             links.append(pair)
             gaps.append(gap)
             matched[pair] = True
-    lengths = np.linalg.norm(places[nodes[:, 0]] - places[nodes[:, 1]], axis=1)
-    stray = loose & ~matched & np.isin(np.arange(len(places)), nodes[lengths > 10 * JOIN])
-    links += [pair for pair, _ in _near(places, np.arange(len(places)), JOIN) if stray[pair].any()]
     return np.array(links, dtype=np.int64).reshape(-1, 2), np.array(gaps)
-
-
-def _near(places: FloatArray, numbers: IntArray, reach: float) -> Iterator[tuple[IntArray, float]]:
-    """Pairs (2,) of nodes of some numbers within a distance, and their distances, mm; the nearest first."""
-    pairs = np.sort(numbers[cKDTree(places[numbers]).query_pairs(reach, output_type="ndarray")], axis=1)
-    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
-    for which in np.argsort(apart, kind="stable"):
-        yield pairs[which], float(apart[which])
 
 
 def check_extent(pieces: Sequence[Piece], scale: Scale) -> None:
@@ -146,16 +139,8 @@ def check_ends(found: Joined, tolerance: float) -> None:
     gaps = apart.min(axis=1)
     one = int(gaps.argmin())
     other = int(apart[one].argmin())
-    remedy = ""
-    if tolerance < gaps.max() <= LARGEST_TOLERANCE:
-        remedy = f"; tolerance = {_above(float(gaps.max())):g} (mm) closes it"
+    remedy = f", or give tolerance = {1.1 * gaps.max():.2g}" if gaps.max() <= LARGEST_TOLERANCE else ""
     raise UserError(
         f"the boundary is open at {place(loose[one])}: a gap of {gaps[one]:.4g} mm to the next end at "
-        f"{place(loose[other])}; ends join within {tolerance:.4g} mm{remedy}"
+        f"{place(loose[other])}; ends join within {tolerance:.4g} mm; close it{remedy}"
     )
-
-
-def _above(length: float) -> float:
-    """A round number a little above a length."""
-    step = 10.0 ** np.floor(np.log10(length) - 1)
-    return float(np.ceil(1.1 * length / step) * step)
