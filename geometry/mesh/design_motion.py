@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pinnray.geometry.finger.finger import Finger, outline_with_contact
-from pinnray.geometry.mesh.elastic_motion import ElasticMotion
+from pinnray.geometry.mesh.extension import elastic
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.loop import Loop
 from pinnray.runtime.arrays import FloatArray, IntArray
@@ -32,7 +32,7 @@ class MovingMesh:
 
     def __init__(self, mesh: TriangleMesh, finger: Finger) -> None:
         self._mesh, self._loops = mesh, _loops(finger)
-        self._motion = ElasticMotion(mesh)
+        self._motion = elastic(mesh)
         self._nodes = np.unique(mesh.boundary_edges)
         points = mesh.points[self._nodes]
         self._loop = np.zeros(len(points), dtype=np.int64)
@@ -64,9 +64,9 @@ class MovingMesh:
             own = self._loop == number
             places = _at(loop, self._piece[own], self._share[own])
             moved[self._nodes[own]] = places - self._mesh.points[self._nodes[own]]
-        mesh = replace(self._mesh, points=self._mesh.points + self._motion.extended(moved / steps))
+        mesh = replace(self._mesh, points=self._mesh.points + self._motion.of(moved / steps))
         for _ in range(steps - 1):
-            mesh = replace(mesh, points=mesh.points + ElasticMotion(mesh).extended(moved / steps))
+            mesh = replace(mesh, points=mesh.points + elastic(mesh).of(moved / steps))
         return replace(mesh, depth=finger.depth)
 
 
