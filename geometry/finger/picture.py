@@ -1,6 +1,7 @@
 """A finger's section as a picture: what is held, touched and marked."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -37,7 +38,12 @@ def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], 
         touched = place(np.array([finger.section.front_point(x) for x in front]))
         axes.plot(*touched.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=4)
         axes.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 1.4}, zorder=5)
-        text = {"textcoords": "offset points", "fontsize": SMALL, "color": MEASURED, "zorder": 6}
+        text: dict[str, Any] = {
+            "textcoords": "offset points",
+            "fontsize": SMALL,
+            "color": MEASURED,
+            "zorder": 6,
+        }
         for number, centre in enumerate(place(finger.markers), start=1):
             axes.add_patch(Circle(tuple(centre), finger.marker_radius, fc=MEASURED, ec="none", zorder=4))
             axes.annotate(str(number), centre, xytext=(3, 3), **text)

@@ -87,7 +87,8 @@ def _pieces(entity: Any, layer: str, unit: float) -> Iterator[Piece]:
     """The lines and arcs of an entity, whose coordinates are in `unit` mm."""
     kind = entity.dxftype()
     if kind == "LINE":
-        yield line(*unit * _flat([entity.dxf.start, entity.dxf.end]), layer)
+        start, end = unit * _flat([entity.dxf.start, entity.dxf.end])
+        yield line(start, end, layer)
         return
     if kind == "CIRCLE":
         points, cuts = entity.vertices, [0.0, 360.0]

@@ -212,7 +212,8 @@ def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
         return unit * (np.array(points) @ axes.T)
 
     if edge.geomType() == "LINE":
-        yield line(*on_edge(np.array([first, last])), "")
+        start, end = on_edge(np.array([first, last]))
+        yield line(start, end, "")
     else:
         yield from arcs_along(on_edge, first, last, "")
 

@@ -87,7 +87,8 @@ def _pieces(segments: Iterable[Any], label: str, matrix: Any) -> Iterator[Piece]
         if isinstance(segment, svgelements.Move) or segment.start is None or segment.end is None:
             continue
         if isinstance(segment, svgelements.Line | svgelements.Close):
-            yield line(*_placed(matrix, [segment.start, segment.end]), label)
+            start, end = _placed(matrix, [segment.start, segment.end])
+            yield line(start, end, label)
         else:
             yield from arcs_along(partial(_along, segment, matrix), 0.0, 1.0, label)
 
