@@ -54,14 +54,12 @@ class Placement:
         return Section(_rounded(placed.outline), tuple(_rounded(cavity) for cavity in placed.cavities))
 
     def __str__(self) -> str:
-        """In words, such as `turned by 90 degrees, mirrored, shifted by (3, 4) mm`."""
+        """In words, such as `mirrored in x, turned by 90 degrees, shifted by (3, 4) mm`."""
         turn = self.matrix @ np.diag([-1.0 if self.mirrored else 1.0, 1.0])
         angle = float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
-        words = ["mirrored in x"] if self.mirrored else []
-        words += [f"turned by {angle:.6g} degrees"] if abs(angle) > 1e-9 else []
-        x, y = (float(value) + 0.0 for value in np.round(self.shift, 9))
-        words += [f"shifted by ({x:.6g}, {y:.6g}) mm"] if x or y else []
-        return ", ".join(words) or "none"
+        x, y = self.shift.round(9) + 0.0
+        mirrored = "mirrored in x, " if self.mirrored else ""
+        return f"{mirrored}turned by {round(angle, 9) + 0.0:.6g} degrees, shifted by ({x:.6g}, {y:.6g}) mm"
 
 
 def placed(section: Section, which: int, fraction: float) -> tuple[Section, Placement]:

@@ -96,8 +96,6 @@ def _loop_motion(
     first = int(np.flatnonzero(breaks & ~np.roll(breaks, 1))[0]) if not breaks.all() else 0
     order = np.roll(np.arange(len(loop)), -first)
     faces = _faces(order, breaks)
-    if not faces:
-        return _node_mean(normals * (share * owned)[:, None])
     speeds = [share * (lengths[face] @ owned[face] > 0.5 * lengths[face].sum()) for face in faces]
     motion = np.zeros((len(loop), 2))
     corners = [
