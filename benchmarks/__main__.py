@@ -10,7 +10,6 @@ from pinnray.runtime.errors import UserError
 
 BENCHMARKS = {
     "results": "results.default_run:main",
-    "default": "results.default_time:main",
     "fields": "results.fields:loads",
     "friction": "results.fields:friction",
     "fingers": "results.fields:fingers",
@@ -22,8 +21,8 @@ BENCHMARKS = {
     "trained": "networks.graded:trained",
     "scenes": "tracker.scenes:main",
     "stress": "tracker.stress:main",
+    "verification": "verification.document:main",
     "validation": "validation.document:main",
-    "posterior": "validation.posterior:main",
     "reliability": "reliability.faults:main",
 }
 """Names, and functions that return a table; the modules' docstrings have descriptions and times."""
@@ -47,6 +46,8 @@ SETTLED = (
     "optimise",
     "live",
     "growth",
+    "default",
+    "posterior",
 )
 """Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
 
@@ -83,7 +84,7 @@ def main() -> int:
         try:
             show(getattr(importlib.import_module(f"benchmarks.{module}"), function)(**options))
         except ModuleNotFoundError as error:
-            print(f"error: {name} needs {error.name}; pip install 'pinn-ray[bench]'", file=sys.stderr)
+            print(f"error: {name} needs {error.name}; pip install 'pinn-ray[dev]'", file=sys.stderr)
             return 2
         except UserError as error:
             print(f"error: {error}", file=sys.stderr)
