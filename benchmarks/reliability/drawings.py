@@ -69,14 +69,14 @@ def straight(*points: tuple[float, float]) -> Curve:
 def sketch(random: np.random.Generator, fine: bool = True) -> Sketch:
     """A section with up to five cavities and four markers; `fine` lets its corners be of short lines."""
     x, y = random.uniform(40, 120), random.uniform(12, 30)
-    shape, r = random.integers(3 if fine else 2), random.uniform(0.2, 2.0)
+    shape, r = random.integers(3 if fine else 2), 0.02 * 100 ** random.random()
     if shape == 0:
         outline = straight((0, 0), (x, y - 11), (x, y), (0, y))
     elif shape == 1:
         corners = [[r, 0], [x - r, 0], [x, r], [x, y - r], [x - r, y], [r, y], [0, y - r], [0, r]]
         outline = Curve(np.array(corners), np.tile([0.0, np.tan(np.pi / 8)], 4))
     else:
-        smooth = shapely.box(1, 1, x - 1, y - 1).buffer(1, quad_segs=int(random.choice([20, 200, 2000])))
+        smooth = shapely.box(r, r, x - r, y - r).buffer(r, quad_segs=100)
         outline = straight(*np.array(smooth.normalize().reverse().exterior.coords)[:-1])
     count = int(random.integers(6))
     room = min(4.0, 0.3 * x / max(count, 1))

@@ -16,8 +16,8 @@ def test_random_input_gives_a_result_or_one_line() -> None:
 @pytest.mark.slow
 def test_random_drawings_are_read_as_they_were_drawn() -> None:
     """To 1e-6 of their area."""
-    counts, wrong = drawings.tried(18)
+    counts, wrong = drawings.tried(12)
     assert not wrong
     read = sum(number for (_, state), number in counts.items() if state.startswith("read"))
-    assert read >= 16
+    assert read >= 10
     assert {suffix for suffix, state in counts if state == "read"} == {"dxf", "svg", "step"}
