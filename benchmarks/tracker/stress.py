@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.table import Table
 
-from benchmarks.tables import DOCS, fill, markdown, table_of
+from benchmarks.tables import DOCS, cells_of, fill, markdown
 from benchmarks.tracker.films import HIDDEN, Finger, Score, coverage, film_of, one_thread
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
@@ -192,8 +192,7 @@ def main(rows: str = "") -> Table:
 
 def reported() -> dict[tuple[str, str], list[str]]:
     """Rows of the page by the names of their cases."""
-    lines = [line.strip("|\n").split("|") for line in table_of(REPORT, "figures").splitlines()]
-    rows = [[cell.strip() for cell in line] for line in lines]
+    rows = cells_of(REPORT, "figures")
     return {(row[0], row[1]): row for row in rows if (row[0], row[1]) in CASES}
 
 
