@@ -153,7 +153,7 @@ def fit_disc_model(
             most = most + 1e3
         noise = np.minimum(SCALE * median_where(np.abs(residuals), counted), most)
         noise = np.maximum(noise, QUANTISATION**0.5)
-        agreement = robust_weights(residuals / noise[:, None].astype(np.float32), allowed)
+        agreement = robust_weights(residuals / noise[:, None], allowed)
         weights = agreement * counted
         squares = (weights * residuals**2).sum(axis=1)
         variance = np.maximum(squares / np.maximum(weights.sum(axis=1) - width, 1), QUANTISATION)
@@ -184,7 +184,7 @@ def fit_disc_model(
     return result, all_residuals
 
 
-def robust_weights(ratios: Array, allowed: BoolArray) -> Array:
+def robust_weights(ratios: Array | FloatArray, allowed: BoolArray) -> Array:
     """Weights of residuals over their noise, shape (n, p); zero where a pixel is not allowed."""
     return np.asarray(np.clip((NONE - np.abs(ratios)) / (NONE - FULL), 0, 1) * allowed, dtype=np.float32)
 
