@@ -40,11 +40,9 @@ class FittedDiscs:
     Attributes:
         centres: x, y, shape (n, 2), pixels.
         covariances: Of the centres, shape (n, 2, 2), pixels², with correlated noise, such as a codec's,
-            by its median over the discs of about one size.
+            at least its median over the discs of about one size.
         radii: Square root of the product of the semi-axes, shape (n,), pixels.
-        shapes: Stretch and slant as in `vision.discs.disc_image_model`, shape (n, 2); zero for circles.
         contrast: Level around the disc less level within, shape (n,), grey levels; negative for light discs.
-        blur: Width of the edge, with the pixels' own width, shape (n,), pixels.
         seen: Share of the edge that supports the fit, shape (n,).
         found: Shape (n,).
     """
@@ -52,9 +50,7 @@ class FittedDiscs:
     centres: FloatArray
     covariances: FloatArray
     radii: FloatArray
-    shapes: FloatArray
     contrast: FloatArray
-    blur: FloatArray
     seen: FloatArray
     found: BoolArray
 
@@ -137,9 +133,7 @@ def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDis
         centres=centres * kept[:, None],
         covariances=fit.covariances * kept[:, None, None],
         radii=radii * kept,
-        shapes=parameters[:, [model.STRETCH, model.SLANT]] * kept[:, None],
         contrast=contrast * kept,
-        blur=blur * kept,
         seen=fit.seen,
         found=found,
     )
