@@ -59,7 +59,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|(.*\.)?T|.*Options)"),
     ("py:.*", r"pinnray\.comparison\.(figures|evaluation\.truths)\..*"),
     ("py:.*", r"pinnray\.geometry\.(finger\.(rules|parameters)|drawing\.placement)\..*"),
-    ("py:.*", r"pinnray\.(film|observations|robots|runtime|studies|vision)\..*"),
+    ("py:.*", r"pinnray\.(film|measurements|robots|runtime|studies|vision)\..*"),
     ("py:.*", r"pinnray\.solvers\.fem\.adaptive_refinement\..*"),
 ]
 

@@ -5,7 +5,6 @@ import hashlib
 import os
 import pickle
 import resource
-import shutil
 import signal
 import subprocess
 import sys
@@ -20,7 +19,6 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.processes.pool import child_environment
 
 os.environ["PETSC_OPTIONS"] = (
     "-no_signal_handler"  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
@@ -91,29 +89,6 @@ def few_elements_throughout() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(finger_mesh.__kwdefaults__, "across", 1)
         yield
-
-
-@pytest.fixture(scope="session")
-def start_ranks() -> Callable[..., subprocess.Popen[str]]:
-    """`start_ranks(count, *arguments)`: Python with arguments on so many MPI ranks, as one process."""
-    launcher = shutil.which("mpirun")
-    assert launcher, "mpirun comes with DOLFINx"
-
-    def start(count: int, *arguments: str) -> subprocess.Popen[str]:
-        # This process may have initialised MPI itself, and what that left in the environment would confuse
-        # the launcher.
-        return subprocess.Popen(
-            [
-                *(launcher, "--allow-run-as-root", "--oversubscribe", "-n", str(count)),
-                *(sys.executable, *arguments),
-            ],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=child_environment(os.environ),
-        )
-
-    return start
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pinnray.comparison.evaluation.evaluation import field_difference
+from pinnray.comparison.evaluation.differences import FieldDifference
 from pinnray.comparison.evaluation.truths import Truth, simulate
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.point_location import LocatedPoints
@@ -77,7 +77,7 @@ class SampledField:
             "von_mises": (state.von_mises, true.von_mises),
             "von_mises_true_law": (with_true_law.von_mises, true.von_mises),
         }
-        return {name: field_difference(*pair, weights).rel_l2 for name, pair in pairs.items()}
+        return {name: FieldDifference.of(*pair, weights).rel_l2 for name, pair in pairs.items()}
 
 
 @dataclass(frozen=True, eq=False)

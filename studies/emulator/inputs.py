@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters
+from pinnray.geometry.finger.rules import broken_rule
 from pinnray.geometry.finger.section import cavity_ends, rib_feet, rib_pitch
-from pinnray.geometry.finger.validation import broken_rule
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures import QUANTITIES

@@ -8,7 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from pinnray.geometry.finger.parameters import Parameters
-from pinnray.geometry.finger.validation import broken_rule
+from pinnray.geometry.finger.rules import broken_rule
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError

@@ -10,7 +10,7 @@ import numpy as np
 from pinnray.comparison.evaluation.deformed_body import THROUGH_ITSELF, DeformedBody
 from pinnray.comparison.evaluation.plausibility import problem_remarks
 from pinnray.geometry.finger.parameters import Parameters
-from pinnray.geometry.finger.validation import broken_rule
+from pinnray.geometry.finger.rules import broken_rule
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures import FRACTIONS
 from pinnray.solvers.solver import TrainedSolver, TrainingContext, TrainingDiverged

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.comparison.evaluation.evaluation import field_difference
+from pinnray.comparison.evaluation.differences import FieldDifference
 from pinnray.geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.finger_figures import Quantity, figures_at_rest, figures_of
@@ -64,7 +64,7 @@ def training(solution: Solution) -> dict[str, float]:
     own, reference = (each.displacement(rule.location) for each in (solution, fem))
     base, load = boundary_violations(solution)
     return {
-        "rel_l2_displacement": field_difference(own, reference, rule.weights).rel_l2,
+        "rel_l2_displacement": FieldDifference.of(own, reference, rule.weights).rel_l2,
         "rel_energy": float(solution.energy) / float(fem.energy) - 1,
         "boundary_violation": max(base, load) / float(np.linalg.norm(problem.load.values)),
         "base_violation": base,

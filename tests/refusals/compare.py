@@ -25,9 +25,7 @@ from tests.fingers import beam
 FILES = {
     "empty/notes.txt": "mine",
     "damaged/metrics.json": "{",
-    "damaged/run.json": "{}",
     "foreign/metrics.json": '{"schema": 99}',
-    "foreign/run.json": "{}",
 }
 truth = partial(Truth, name="mine", description="pressed in by {:.4g} mm")
 MESH = build_mesh(Design(), MeshSettings(size=2.0), across=1)

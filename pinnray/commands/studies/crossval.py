@@ -30,10 +30,10 @@ TEXTS = ("solver", "held out")
 
 @quietable
 def command(
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    *,
     solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
     schemes: str = "one-out,tip-out,random,load-out",
     truth: str = "sliding",

@@ -11,6 +11,7 @@ from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 @quietable
 def command(
     question: Path,
+    *,
     options: StudyOptions = StudyOptions(),
 ) -> int:
     """Find the fingers that no other finger beats: the Pareto front of two or three quantities.

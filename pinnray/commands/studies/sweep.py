@@ -12,6 +12,7 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 @quietable
 def command(
     study: Path,
+    *,
     options: StudyOptions = StudyOptions(),
 ) -> int:
     """Solve many fingers: the samples of a study over parameters of design, material and load.

@@ -1,12 +1,11 @@
 """A comparison that draws, reports and shows itself."""
 
 from collections.abc import Collection
-from dataclasses import fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
-from pinnray.comparison.evaluation import comparison
+from pinnray.comparison.evaluation.comparison import Results
 from pinnray.runtime.notebook import fact_table
 from pinnray.runtime.text_files import as_path
 
@@ -25,23 +24,18 @@ SHOWN = {
 """Columns of `table` that a notebook shows, with their headings."""
 
 
-class Comparison(comparison.Results):
+class Comparison(Results):
     """The results of several solvers for one finger, with `table`, `plot` and `report`.
 
     `comparison["fem"]` is the result of one solver.
     """
-
-    @classmethod
-    def of(cls, finished: comparison.Results) -> Self:
-        """Give a finished comparison its pictures and report."""
-        return cls(**{each.name: getattr(finished, each.name) for each in fields(finished)})
 
     def plot(self, picture: str = "overlay", solvers: Collection[str] = ()) -> "Figure":
         """A picture of the report, as a figure that a notebook shows; `figure.save(path)` keeps it.
 
         Args:
             picture: `overlay`, `marker_errors`, `von_mises`, `strain_principal`, `strain_xx`, `strain_yy`,
-                `strain_xy`, `differences`, `force_displacement`, `excess`, `energy`, `convergence`, `losses`,
+                `strain_xy`, `force_displacement`, `convergence`, `losses`,
                 `design` or `mesh`.
             solvers: Names of those whose fields are drawn, for a picture of fields; all that a page has room
                 for if empty.
