@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import Scores
+from pinnray.comparison.evaluation.metrics import scores_of
+from pinnray.comparison.evaluation.scores import Scores
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -47,7 +48,7 @@ class Results:
     @cached_property
     def scores(self) -> Scores:
         """Every number of the run, computed once."""
-        return Scores.of(self)
+        return scores_of(self)
 
     def __repr__(self) -> str:
         solvers, seen = ", ".join(each.solver for each in self.evaluations), self.observations

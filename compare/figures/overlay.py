@@ -10,7 +10,7 @@ from matplotlib.patches import Circle
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import SolverScores
+from pinnray.comparison.evaluation.scores import SolverScores
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.body import ColourScale
 from pinnray.comparison.figures.canvas import Canvas, Extent

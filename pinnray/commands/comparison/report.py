@@ -16,7 +16,7 @@ def command(run: Path, *more: Path) -> int:
         run: Output folder of `compare`.
         more: Further runs, one after another.
     """
-    from pinnray.comparison.evaluation.metrics import Scores
+    from pinnray.comparison.evaluation.scores import Scores
     from pinnray.comparison.report.summary import answers
 
     for folder in (run, *more):
