@@ -36,7 +36,7 @@ LIBRARIES = ("scipy.sparse.linalg", "dolfinx", "torch", "pyvista", "matplotlib.f
 PRODUCTS = "GFlop of products"
 NEEDED = {
     "factorisations": (
-        "pinnray.solvers.fem.linear_solvers:Factorisation.update",
+        "pinnray.solvers.fem.factorisation:Factorisation.update",
         "pinnray.solvers.pinn.finite_basis.sparse_cholesky:BlockMatrix.factorised",
     ),
     PRODUCTS: ("pinnray.solvers.pinn.finite_basis.energy:NetworkEnergy.hessian",),

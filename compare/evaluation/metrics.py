@@ -10,7 +10,6 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.scores import (
     MEANS,
     FigureScores,
-    ForceScore,
     MarkerErrors,
     Means,
     Measurements,
@@ -23,7 +22,6 @@ from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.finger_figures import FingerFigures
-from pinnray.solvers.solution import IdentifiedForce
 
 if TYPE_CHECKING:
     from pinnray.comparison.evaluation.comparison import Results
@@ -58,7 +56,7 @@ def _solver_scores(evaluation: Evaluation, comparison: "Results") -> SolverScore
     numbers: dict[str, Any] = {name: getattr(evaluation, name) for name in plain} | {
         "status": "converged" if evaluation.converged else "not converged",
         "seconds": evaluation.stats.get("seconds"),
-        "force": evaluation.identified and _force(evaluation.identified),
+        "force": evaluation.identified,
         "figures": evaluation.figures and _figures(evaluation.figures),
         "markers": dict(markers) | {"in_sample": evaluation.in_sample},
         "held_out": _held_out(evaluation, observations),
@@ -123,11 +121,6 @@ def force_error(evaluation: Evaluation, truth: Evaluation) -> float:
     """Relative error of the size of the indenter's force; positive where it is too large."""
     size, true = (float(np.linalg.norm(each.reaction)) for each in (evaluation, truth))
     return size / true - 1
-
-
-def _force(force: IdentifiedForce) -> ForceScore:
-    path = [{"share_of_travel": share, "size": size} for share, size in force.path]
-    return ForceScore.model_validate({"size": force.size, "position": force.position, "path": path or None})
 
 
 def _figures(figures: FingerFigures) -> FigureScores:

@@ -59,19 +59,11 @@ class Interval(Numbers):
     high: Number
 
 
-class PathForce(Numbers):
-    """Force at a lesser load, N/mm."""
-
-    share_of_travel: Number
-    size: Number
-
-
 class ForceScore(Numbers):
     """Force of the indenter that was found from the markers."""
 
     size: Interval  #: N/mm.
     position: Interval | None  #: Abscissa where it acts, mm; None where it was no unknown.
-    path: tuple[PathForce, ...] | None  #: Force at lesser loads, where it is known.
 
 
 class FigureScores(Numbers):

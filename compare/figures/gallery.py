@@ -122,8 +122,6 @@ def _force_displacement(comparison: Results) -> Illustration | None:
         cross = " Pink: the force on the simulated finger, the truth that the solvers should reach."
     found = {n: each for n, each in enumerate(comparison.evaluations) if each.identified}
     squares = " Squares: forces identified from the markers, with intervals of 95 %." if found else ""
-    if any(each.identified and each.identified.path for each in found.values()):
-        squares += " Dotted: the force on the finger that was found, at lesser loads."
     return Illustration(
         draw_force_displacement(curves, depth=depth, truth=truth, identified=found),
         "Force over displacement",

@@ -45,8 +45,6 @@ FIGURES = (
     ("wrap_deg", "wrap of the front face", "deg"),
     ("compliance_across_mm_per_N", "compliance across, at rest", "mm/N"),
     ("compliance_along_mm_per_N", "compliance along, at rest", "mm/N"),
-    ("sideways_stiffness_N_per_mm", "sideways stiffness, at rest", "N/mm"),
-    ("torsional_stiffness_N_mm_per_rad", "torsional stiffness, at rest", "N mm/rad"),
     ("von_mises_MPa", "largest von Mises stress *", "MPa"),
     ("principal_strain", "largest principal strain *", ""),
     ("strain_energy_mJ", "strain energy", "mJ"),

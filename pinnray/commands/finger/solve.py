@@ -20,10 +20,10 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 @quietable
 def command(
     solver: str | None = None,
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    *,
     adapt: Adapt = None,
     measurements: Path | None = None,
     strokes: str | None = None,

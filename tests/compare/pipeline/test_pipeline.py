@@ -108,7 +108,7 @@ def test_run_json_tells_where_the_result_comes_from(finished):
     assert told["problem_sha256"] == Problem(mesh).digest
     assert told["measurements_sha256"] == told["files_sha256"]["observations.csv"]
     assert told["mesh"] == COARSE.model_dump()
-    assert told["solvers"]["fem"] == {"degree": 2, "estimate": True, "linear_solver": "auto"}
+    assert told["solvers"]["fem"] == {"degree": 2, "estimate": True}
     assert told["versions"] == package_versions()
     assert told["machine"]["cores"] > 0
     stages = "mesh measurements fem fem-nonlinear certificate checks fields tables pictures"
