@@ -14,7 +14,7 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.tables import Cell, terminal_table, write_csv
-from pinnray.solvers.identification.tracker import ForceReading, LawTracker
+from pinnray.solvers.identification.tracker import ForceReading, ForceTracker
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Progress
@@ -97,12 +97,12 @@ class FrameForce(NamedTuple):
     delay: float
 
 
-def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, radius: float) -> LawTracker:
+def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, radius: float) -> ForceTracker:
     """The force tracker of a finger.
 
     Args:
         mesh: Of the finger.
-        material: If its law is the linear one, the law of finite strain that the markers tell is taken.
+        material: If its law is the linear one, the neo-Hookean one is taken.
         points: Markers at rest, shape (m, 2), mm.
         radius: Of the markers, mm.
 
@@ -110,15 +110,14 @@ def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, ra
         UserError: If DOLFINx is missing.
     """
     make_solver("fem-id")  # or says which library is missing
-    from pinnray.solvers.fem.identification import fem_law_tracker
+    from pinnray.solvers.fem.identification import fem_force_tracker
 
-    problem = Problem(mesh, material)
-    if material.law == "linear":
-        return fem_law_tracker(problem, points, radius)
-    return fem_law_tracker(problem, points, radius, [material.law])
+    law = "neo-hookean" if material.law == "linear" else material.law
+    problem = Problem(mesh, material.model_copy(update={"law": law}))
+    return fem_force_tracker(problem, points, radius)
 
 
-def forces_of(tracking: Tracking, tracker: LawTracker, progress: Progress) -> list[FrameForce]:
+def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> list[FrameForce]:
     """The force in every frame of a track, against the mean of its frames at rest.
 
     Args:
@@ -157,7 +156,7 @@ class LiveRate(NamedTuple):
 
 
 class _Markers(NamedTuple):
-    """The markers of a live frame: what `LawTracker.update` takes, and when they were tracked, s."""
+    """The markers of a live frame: what `ForceTracker.update` takes, and when they were tracked, s."""
 
     frame: int
     time: float
@@ -181,7 +180,7 @@ class LiveForce(NewestOnly[_Markers]):
         forces: What was found so far.
     """
 
-    def __init__(self, tracker: LawTracker, depth: float) -> None:
+    def __init__(self, tracker: ForceTracker, depth: float) -> None:
         super().__init__(self._answer)
         self._tracker, self._depth = tracker, depth
         self.forces: list[FrameForce] = []

@@ -165,10 +165,10 @@ def predict(
     if not isinstance(several, Sequence) or not all(isinstance(each, Mapping) for each in several):
         raise UserError(f"the fingers are dictionaries such as {{'rib_count': 5}}, not {fingers!r}")
     emulator = emulator_of(as_path(sweep, "the sweep"))
-    read = [emulator.inputs.read({name: str(value) for name, value in each.items()}) for each in several]
-    for place, finger in enumerate(read):
-        if fault := emulator.inputs.fault(finger):
-            raise UserError(f"finger {place}: {fault}")
+    read = [
+        emulator.inputs.finger({name: str(value) for name, value in each.items()}, f"finger {place}: ")
+        for place, each in enumerate(several)
+    ]
     return prediction_table(emulator, read, emulator.predict(read))
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from pinnray.arguments import given_drawing, mesh_settings, read_job, read_solver, read_solvers, taken
 from pinnray.camera import read_observations
-from pinnray.compared import Comparison
+from pinnray.comparison.report.comparison import Comparison
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.finger import Finger
@@ -31,7 +31,7 @@ from pinnray.solvers.solver import Solver, Traits, solved, with_law
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pinnray.comparison.crossval.result import CrossvalResult
+    from pinnray.studies.crossval.result import CrossvalResult
 
 
 def mesh(design: str | Path | Finger = "default", **given: Any) -> TriangleMesh:
@@ -215,9 +215,9 @@ def compare(
     )
     with shown_stages(progress) as stages:
         if out is not None:
-            return Comparison.of(run(replace(job, out=as_path(out, "out")), stages))
+            return run(replace(job, out=as_path(out, "out")), stages)
         with TemporaryDirectory() as folder:
-            return Comparison.of(compute(checked(job), stages, Path(folder)))
+            return compute(checked(job), stages, Path(folder))
 
 
 def crossval(
@@ -243,18 +243,18 @@ def crossval(
         material: The elastic constants.
         load: Motion of the indenter, or its kind alone.
         progress: Whether to show the stages; if None in a notebook only.
-        study: Further attributes of `comparison.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
+        study: Further attributes of `studies.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
             `seeds`, `noise`; and parameters of finger, material and load, as for `solve`.
 
     Returns:
-        The scores; `table()` has them by truth, layout, solver and scheme.
+        The scores; `table()` has them by truth, layout, solver, scheme and score.
 
     Raises:
         UserError: If the study cannot be made, or the folder holds another one.
     """
-    from pinnray.comparison.crossval.cross_validation import cross_validate
-    from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
     from pinnray.runtime.stages import shown_stages
+    from pinnray.studies.crossval.cross_validation import cross_validate
+    from pinnray.studies.crossval.study import CrossvalStudy, solver_variants
 
     own = [each.name for each in fields(CrossvalStudy)]
     words = {name: study.pop(name) for name in list(study) if name not in own}

@@ -14,7 +14,7 @@ COMMANDS = (
     *("comparison.compare", "comparison.report"),
     *("finger.design", "finger.mesh", "finger.material", "finger.solve", "finger.sensitivity"),
     *("finger.export", "studies.sweep", "studies.predict", "studies.explore", "studies.app"),
-    *("studies.optimise", "studies.gridsearch", "comparison.crossval", "comparison.solvers"),
+    *("studies.optimise", "studies.crossval", "comparison.solvers"),
     *("camera.fiducials", "camera.calibrate", "camera.pick", "camera.points", "camera.rig", "camera.track"),
 )
 """Modules of this package with a function `command`; each is imported when its command is asked for."""

@@ -1,4 +1,4 @@
-"""Runs a command, in one process or on the ranks of `mpirun`, and turns errors into exit codes."""
+"""Runs a command and turns errors into exit codes."""
 
 import logging
 import os
@@ -22,21 +22,13 @@ EXIT_CODES = (
     "130 interrupted; 141 the output went into a pipe that nobody reads any more."
 )
 
-SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
-"""Variables in which Open MPI and the relatives of MPICH give the number of ranks."""
-
 
 def launched(command: Callable[[], Any]) -> int:
-    """Run a command and return its exit code; of several ranks one runs it, the others serve its solves."""
+    """Run a command and return its exit code."""
     _write_any_letter()
     _give_libraries_a_cache()
     _leave_signals_alone()
-    return guarded(lambda: _on_ranks(command) if on_ranks() else command())
-
-
-def on_ranks() -> bool:
-    """Whether `mpirun` started the program on more than one rank."""
-    return any(os.environ.get(name, "1") != "1" for name in SIZES)
+    return guarded(command)
 
 
 def guarded(command: Callable[[], Any]) -> int:
@@ -132,12 +124,3 @@ def _leave_signals_alone() -> None:
     options = os.environ.get("PETSC_OPTIONS", "")
     if "-no_signal_handler" not in options:
         os.environ["PETSC_OPTIONS"] = f"{options} -no_signal_handler".strip()
-
-
-def _on_ranks(command: Callable[[], Any]) -> int:
-    from pinnray.solvers.registry import make_solver
-
-    make_solver("fem")  # or says which library is missing
-    from pinnray.solvers.fem.ranks import lead
-
-    return lead(command, guarded)

@@ -107,8 +107,7 @@ def command(
         if tracker is not None and material:
             write_forces(folder, forces, design.depth)
             provenance["force"] = {
-                "material": material.model_dump() | {"law": tracker.laws[0]},
-                "laws_not_excluded": tracker.laws,
+                "material": material.model_dump() | {"law": tracker.law},
                 "mesh": settings and settings.model_dump(),
                 "frames": len(forces),
                 "live": pace and pace._asdict(),

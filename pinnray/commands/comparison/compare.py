@@ -77,7 +77,6 @@ def command(
         quiet: Show no progress and no table.
         json_: Print metrics.json and nothing else.
     """
-    from pinnray.commands.launch import on_ranks
     from pinnray.comparison.pipeline.job import Job
     from pinnray.comparison.pipeline.pipeline import run
     from pinnray.comparison.pipeline.shared_mesh import tolerance_reached
@@ -94,7 +93,7 @@ def command(
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
     names = job_defaults(options.preset).solvers if solvers is None else solvers
-    with nullcontext() if on_ranks() or cores() < 2 else second_process(comma_list(names)) as pool:
+    with nullcontext() if cores() < 2 else second_process(comma_list(names)) as pool:
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
         made, set_up = options.read(names), {text.partition(".")[0] for text in options.solver_set}
