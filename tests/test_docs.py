@@ -116,7 +116,7 @@ def run_folder(tmp_path_factory) -> Path:
     """The output of a small comparison, of a solver that follows the load and one that is trained too."""
     out = tmp_path_factory.mktemp("docs") / "run"
     options = (
-        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 1 --adapt 0.008 --solver-set pinn-std.preset=paper "
+        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 2 --adapt 0.03 --solver-set pinn-std.preset=paper "
         "--solver-set pinn-std.epochs=2 --solver-set pinn-std.width=4 --quiet"
     )
     code = compare_main([*options.split(), "--out", str(out)])
