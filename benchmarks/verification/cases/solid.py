@@ -16,9 +16,9 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import energy_density_of
 from pinnray.solvers.extrusion import ExtrudedSpace
-from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
+from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace
+from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.fem.linear_solvers import Factorisation
 from pinnray.solvers.fem.solid import Fem3dSolver
 from pinnray.solvers.problem import Load, Material, Problem
 
@@ -115,9 +115,9 @@ def harmonic_errors(cells: int) -> tuple[float, float]:
 
 def solved(
     space: ExtrudedSpace, material: Material, given: FloatArray, held: np.ndarray
-) -> tuple[DistributedSpace[ExtrudedSpace], FloatArray]:
+) -> tuple[DolfinxSpace[ExtrudedSpace], FloatArray]:
     """The elements, and nodal displacements, (N, 3), mm: those given where a mask (N, 3) holds them."""
-    distributed = DistributedSpace(space)
+    distributed = DolfinxSpace(space)
     moduli = distributed.moduli(material.solid_lame)
     energy = energy_density_of("linear", ufl.grad(distributed.function), moduli) * ufl.dx
     force, stiffness = distributed.derivatives(energy)
