@@ -10,6 +10,7 @@ import pytest
 from benchmarks.reliability.faults import JOBS, faults, filled, plain, trials
 from benchmarks.reliability.folders import CUT, numbers
 from benchmarks.reliability.supervision import KINDS, Fault, Point, supervised
+from pinnray.commands.app import pinnray
 from pinnray.runtime.atomic import write_text
 from pinnray.runtime.errors import UserError
 
@@ -107,6 +108,13 @@ def test_half_a_file_is_seen_and_times_are_not_compared(tmp_path: Path) -> None:
     for name, text in (("a.json", '{"seconds": 1.0, "fo'), ("b.csv", "force,time\n1,"), ("c.html", "<html>")):
         (tmp_path / name).write_text(text)
     assert set(numbers(tmp_path).values()) == {CUT}
+
+
+@pytest.mark.parametrize("line", sorted({line for lines in JOBS.values() for line in lines}))
+def test_every_job_is_a_command_of_the_program(line: str) -> None:
+    command, bound, _ = pinnray.parse_args(line.split(), exit_on_error=False, print_error=False)
+    assert command is not None
+    assert bound.arguments
 
 
 @pytest.mark.release
