@@ -10,6 +10,7 @@ from pinnray.runtime.errors import UserError
 
 BENCHMARKS = {
     "results": "results.default_run:main",
+    "default": "results.default_time:main",
     "fields": "results.fields:loads",
     "friction": "results.fields:friction",
     "fingers": "results.fields:fingers",
@@ -46,7 +47,6 @@ SETTLED = (
     "optimise",
     "live",
     "growth",
-    "default",
     "posterior",
 )
 """Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
