@@ -129,7 +129,7 @@ def _matrix(content: Mapping[str, Any], name: str, path: Path, *, sizes: tuple[i
     if name not in content:
         raise UserError(f"{path}: {name} is missing; it must be {what}")
     data = content[name].get("data") if isinstance(content[name], dict) else None
-    numbers = isinstance(data, list) and all(isinstance(value, int | float) for value in data)
-    if not numbers or len(data) not in sizes:
+    numbers = data if isinstance(data, list) else []
+    if len(numbers) not in sizes or not all(isinstance(value, int | float) for value in numbers):
         raise UserError(f"{path}: {name} is not {what}")
-    return np.asarray(data, dtype=np.float64)
+    return np.asarray(numbers, dtype=np.float64)
