@@ -144,11 +144,14 @@ def test_examples_pin_a_number():
     assert [path for path in EXAMPLES if not pinned.search(path.read_text(encoding="utf-8"))] == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("block", TO_RUN, ids=id_of)
-def test_python_in_the_docs_runs(block, tmp_path, monkeypatch, without_pictures, request):
-    if block.page.name == "gallery.md":  # of which no number is kept
-        request.getfixturevalue("few_elements")
+def marked(block: Block):
+    """The code of the gallery's pictures waits for a release: its subjects have tests of their own."""
+    mark = pytest.mark.release if block.page.name == "gallery.md" else pytest.mark.slow
+    return pytest.param(block, marks=mark, id=id_of(block))
+
+
+@pytest.mark.parametrize("block", map(marked, TO_RUN))
+def test_python_in_the_docs_runs(block, tmp_path, monkeypatch, without_pictures):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(JOBS, "", JobDefaults(solvers="fem,gp"))  # all have a test of the benchmark `default`
     padded = "\n" * block.line + block.text  # so that a traceback names the page's own line

@@ -122,6 +122,6 @@ def test_commands_go_on_after_some_of_the_faults(tmp_path: Path, capsys: pytest.
     """What a forked process says is read from its own standard error."""
     with supervisable(), capsys.disabled(), filled(tmp_path) as cache:
         for name in ("compare over an older result", "sweep"):
-            tried = trials(JOBS[name], tmp_path / "job", cache, every=53)
+            tried = trials(JOBS[name], tmp_path / "job", cache, every=71)
             assert len(tried) > 2
             assert not any(tried.values())
