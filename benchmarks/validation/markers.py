@@ -62,10 +62,10 @@ def read_runs(path: Path = FILE) -> list[Run]:
     """The runs of a file as `markers.csv`, in its order."""
     table = pd.read_csv(path, comment="#", index_col="marker")
     runs = []
-    for key, rows in table.groupby(["case", "repeat"], sort=False):
+    for (case, repeat), rows in table.groupby(["case", "repeat"], sort=False):
         named = rows.loc[list(NAMES)]
         held, rest = (named[[f"{axis}{when}_mm" for axis in "xyz"]].to_numpy() for when in (0, 1))
-        runs.append(Run(*key, held, rest))
+        runs.append(Run(str(case), str(repeat), held, rest))
     return runs
 
 
