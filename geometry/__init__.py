@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from pinnray.geometry.finger.presets import parse_overrides as parse_overrides
     from pinnray.geometry.finger.presets import preset_names as preset_names
     from pinnray.geometry.finger.section import finger_section as finger_section
-    from pinnray.geometry.finger.validation import allowed_range as allowed_range
     from pinnray.geometry.mesh.boundary import elements_through_thickness as elements_through_thickness
     from pinnray.geometry.mesh.point_location import LocatedPoints as LocatedPoints
     from pinnray.geometry.mesh.quadrature import Quadrature as Quadrature

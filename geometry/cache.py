@@ -1,19 +1,19 @@
 """Cache of meshes and CAD files, keyed by a hash of everything they depend on."""
 
 import importlib.metadata
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.atomic import write_bytes
+from pinnray.runtime.atomic import write_arrays, write_bytes
 from pinnray.runtime.cache import Result, cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
 from pinnray.runtime.errors import UserError
@@ -132,8 +132,8 @@ def cad_files(
         raise UserError(f"unknown CAD format {unknown[0]!r}; there are {', '.join(CAD_FORMATS)}")
     wanted = sorted(set(formats))
     task = Task(f"CAD of design {finger.name!r}", _cad_writer, (finger.definition(), wanted))
-    entry = _entry("cad", finger.digest, wanted, ".zip", cache_dir)
-    contents = _made(entry, task, timeout_s, _unpack, _pack)
+    entry = _entry("cad", finger.digest, wanted, ".npz", cache_dir)
+    contents = _made(entry, task, timeout_s, _load_files, _save_files)
     for name, content in contents.items():
         write_bytes(folder / name, content)
     return [folder / name for name in contents]
@@ -189,19 +189,15 @@ def _cad_writer() -> Callable[..., dict[str, bytes]]:
     return lambda definition, formats: cad_contents(finger_from(definition), formats)
 
 
-def _pack(contents: dict[str, bytes], path: Path) -> None:
-    buffer = BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in contents.items():
-            archive.writestr(name, content)
-    write_bytes(path, buffer.getvalue())
+def _save_files(contents: dict[str, bytes], path: Path) -> None:
+    write_arrays(path, {name: np.frombuffer(content, np.uint8) for name, content in contents.items()})
 
 
-def _unpack(path: Path) -> dict[str, bytes]:
-    with zipfile.ZipFile(path) as archive:
-        if any(Path(name).name != name for name in archive.namelist()):
+def _load_files(path: Path) -> dict[str, bytes]:
+    with np.load(path) as archive:
+        if any(Path(name).name != name for name in archive.files):
             raise ValueError("a file of another folder")
-        return {name: archive.read(name) for name in archive.namelist()}
+        return {name: archive[name].tobytes() for name in archive.files}
 
 
 def _version(package: str) -> str:

@@ -20,12 +20,6 @@ LABELLED = {"base": 5, "contact": 30}
 """Layers of a DXF file that name parts of the outline, with their colours' numbers."""
 
 
-def section_face(finger: Finger) -> cq.Face:
-    """The section as one planar face at z = 0 with the cavities as holes."""
-    outer, cavities = _wires(finger)
-    return cq.Face.makeFromWires(outer, cavities)
-
-
 def solids(finger: Finger) -> tuple[cq.Shape, tuple[cq.Solid, ...]]:
     """The body with a pocket for every marker, and the markers that fill them, ordered from base to tip.
 

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Generator, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -96,10 +97,16 @@ def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.draw_all", lambda *_: [])
 
 
-def inline(_: object, work: Callable, tasks: Mapping[str, object], **__: object) -> Generator:
+def inline(
+    _: object,
+    work: Callable,
+    tasks: Mapping[str, object],
+    report: Callable[..., None] = lambda *_: None,
+    **__: object,
+) -> Generator:
     """Stands for `Pool.answers`: tasks run one after the other in this process."""
     for name, each in tasks.items():
-        yield name, work(each, lambda *_: None)
+        yield name, work(each, partial(report, name))
 
 
 @pytest.fixture

@@ -34,11 +34,10 @@ def test_every_kind_of_cached_result_has_a_key():
         "pinnray.geometry",  # meshes, CAD, drawings
         "pinnray.comparison.evaluation",  # simulated truths
         "pinnray.comparison.pipeline",  # solutions that a resumed run takes over
-        "pinnray.comparison.crossval",  # truths, folds
+        "pinnray.studies.crossval",  # truths, folds
         "pinnray.studies.sweep",
         "pinnray.studies.emulator",
         "pinnray.studies.fields",
-        "pinnray.studies.gridsearch",
         "pinnray.studies.optimum",
     }
 

@@ -283,10 +283,8 @@ def test_the_docs_have_every_field_of_a_model_as_it_is(page, column, model):
     assert names(table(page, column)) == list(model.model_fields)
 
 
-RIG_LINE = "rig --size 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
-SEARCH_LINE = "gridsearch --learning-rates 1e-3 --bc-weights 10 --epochs 2 --solver-set pinn-std.width=4"
+RIG_LINE = "rig --frame 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
 FOLDS_LINE = "crossval --solvers fem,fem-asm --schemes one-out --seeds 1"
-FOLDS_NAMES = {"SEED": "seed-NAME", "LAYOUT": "joints", "TRUTH": "sliding"}
 
 
 @pytest.mark.slow
@@ -294,8 +292,7 @@ FOLDS_NAMES = {"SEED": "seed-NAME", "LAYOUT": "joints", "TRUTH": "sliding"}
     ("line", "page", "column", "words"),
     [
         (RIG_LINE, RIG, "file of a film", {"NUMBER": "NAME"}),
-        (SEARCH_LINE, TRAIN, "file of a search", {"NAME": "learning_rate-0.001_bc_weight-10.0"}),
-        (FOLDS_LINE, OWN_TRUTH, "file of a cross-validation", FOLDS_NAMES),
+        (FOLDS_LINE, OWN_TRUTH, "file of a cross-validation", {}),
     ],
 )
 def test_the_docs_have_every_file_of_a_command(line, page, column, words, tmp_path, in_line, few_elements):
@@ -425,7 +422,7 @@ def test_the_measurements_in_the_docs_can_be_read(tmp_path):
     ("page", "column", "listed"),
     [
         (FORCE, "parameter that can be found", "pinnray.solvers.identification.unknowns:NAMES"),
-        (OWN_TRUTH, "scheme", "pinnray.comparison.crossval.folds:SCHEMES"),
+        (OWN_TRUTH, "scheme", "pinnray.studies.crossval.folds:SCHEMES"),
         (OWN_TRUTH, "truth", "pinnray.comparison.evaluation.truths:TRUTHS"),
     ],
 )
@@ -434,14 +431,15 @@ def test_the_docs_have_every_name_of_a_list(page, column, listed):
 
 
 def test_the_docs_have_every_key_of_a_published_line():
-    from pinnray.film.publication import FrameLine, PublishedForce
+    from pinnray.film.publication import FrameLine
 
     page = HOW_TO / "force-from-film.md"
-    for heading, model in (("key of a line", FrameLine), ("key of a line's force", PublishedForce)):
-        said = {name for row in table(page, heading) for name in re.findall(r"`(\w+)`", row[0])}
-        assert said == set(model.model_json_schema()["properties"])
     (example,) = (block.text for block in blocks(page) if block.language == "json")
-    assert FrameLine.model_validate_json(example).force is not None
+    line = FrameLine.model_validate_json(example)
+    assert line.force is not None
+    for heading, keys in (("key of a line", line.model_dump()), ("column of `force.csv`", line.force)):
+        said = {name for row in table(page, heading) for name in re.findall(r"`(\w+)`", row[0])}
+        assert said == set(keys)
 
 
 def test_the_docs_have_every_exit_code():

@@ -17,7 +17,8 @@ import pinnray as pr
 
 import pinnray.comparison.evaluation.metrics
 
-assert pr.solve("default", "fem", size=2.0).force > 0
+assert len(pr.mesh(size=2.0).points) > 0
+assert "fem" in pr.solver_names()
 assert callable(pr.compare)
 print(pr.__file__)
 """

@@ -32,7 +32,7 @@ FEM, THREE, TWO = (
     _words(f"compare --design default --mesh-size 4 --solvers {solvers}")
     for solvers in ("fem", "fem,gp,statfem", "fem,fem-nonlinear")
 )
-RIG = "rig --mesh-size 4 --size 320x240 --rest 4 --moving 2 --held 4 --codec png"
+RIG = "rig --mesh-size 4 --frame 320x240 --rest 4 --moving 2 --held 4 --codec png"
 TRACK = _words("track FOLDER/film/frames --camera FOLDER/film/camera.json")
 CROSSVAL = _words("crossval --solvers fem --schemes one-out --seeds 1 --mesh-size 4 --processes 1")
 GRIDSEARCH = _words(

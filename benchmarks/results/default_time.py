@@ -40,7 +40,7 @@ NEEDED = {
         "pinnray.solvers.pinn.finite_basis.sparse_cholesky:BlockMatrix.factorised",
     ),
     PRODUCTS: ("pinnray.solvers.pinn.finite_basis.energy:NetworkEnergy.hessian",),
-    "renders": ("pinnray.comparison.figures.pyvista_canvas:Canvas._cover",),
+    "renders": ("pinnray.comparison.figures.canvas:Canvas._cover",),
     "fields written": ("pinnray.comparison.report.output_files:_write",),
     "pictures encoded": ("PIL.Image:Image.save",),
 }

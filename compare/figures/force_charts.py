@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import ForceCurve, follows_load
+from pinnray.comparison.evaluation.force_curves import ForceCurve, follows_load
 from pinnray.comparison.figures.style import (
     axes_at,
     legend_above,

@@ -1,17 +1,26 @@
 """Clamp, contact and markers of a drawn finger: a small TOML file beside the drawing, or lines of one."""
 
 from collections.abc import Sequence
-from math import isfinite
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+import numpy as np
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import parse_toml, read_toml
 
-Coordinates = tuple[float, float]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Coordinates = tuple[Number, Number]
+Points = Annotated[tuple[Coordinates, ...], Field(min_length=1)]
+
+EXPECTED = {
+    "clamp": "write clamp = [[0, 0], [0, -30]], several such pairs, or a label",
+    "contact": "write contact = [35, 0] or a label of the file",
+    "markers": "write markers = [[10, -1], [20, -1]], their number, 1 to 200, or a label of the file",
+}
+"""Values of the description that may be of several types."""
 
 
 class PartMaterial(CheckedModel):
@@ -39,7 +48,7 @@ class Description(CheckedModel):
         None, 1e-6, 0.5, "", "mm", "Largest gap between two ends of curves that is closed; none means 0.001"
     )
     plane: str | None = Field(default=None, description="Plane in which a solid is cut, such as z = 6")
-    clamp: tuple[tuple[Coordinates, Coordinates], ...] | str | None = Field(
+    clamp: Annotated[tuple[tuple[Coordinates, Coordinates], ...], Field(min_length=1)] | str | None = Field(
         default=None,
         description="Two points of the outline, or several such pairs: the boundary between them, the "
         "shorter way, is clamped; or a label of the file",
@@ -50,7 +59,7 @@ class Description(CheckedModel):
     contact_width: float | None = bounded(
         None, 1e-6, 2000, "", "", "Length of front face that the indenter touches, in the file's unit"
     )
-    markers: tuple[Coordinates, ...] | int | str | None = Field(
+    markers: Points | Annotated[int, Field(strict=True, ge=1, le=200)] | str | None = Field(
         default=None, description="Centres of the markers, or their number, or a label of the file"
     )
     marker_diameter: float | None = bounded(
@@ -67,33 +76,21 @@ class Description(CheckedModel):
 
     @field_validator("clamp", mode="before")
     @classmethod
-    def _read_clamp(cls, value: Any) -> Any:
-        if value is None or isinstance(value, str):
+    def _as_pairs(cls, value: Any) -> Any:
+        """One pair of points as several."""
+        try:
+            return [value] if np.shape(value) == (2, 2) else value
+        except ValueError:  # of rows of different lengths
             return value
-        pairs = [value] if _are_points(value, 2) else value
-        if not (isinstance(pairs, list | tuple) and pairs and all(_are_points(pair, 2) for pair in pairs)):
-            raise ValueError(
-                "no pair of points; write clamp = [[0, 0], [0, -30]], several such pairs, or a label"
-            )
-        return tuple(tuple((float(x), float(y)) for x, y in pair) for pair in pairs)
 
-    @field_validator("contact", mode="before")
+    @field_validator("clamp", "contact", "markers", mode="wrap")
     @classmethod
-    def _read_contact(cls, value: Any) -> Any:
-        if not (value is None or isinstance(value, str) or _are_points([value])):
-            raise ValueError("no point; write contact = [35, 0] or a label of the file")
-        return value
-
-    @field_validator("markers", mode="before")
-    @classmethod
-    def _read_markers(cls, value: Any) -> Any:
-        if isinstance(value, int) and not isinstance(value, bool) and not 1 <= value <= 200:
-            raise ValueError("outside its range, 1 to 200")
-        if value is None or type(value) in (str, int) or _are_points(value):
-            return value
-        raise ValueError(
-            "no points; write markers = [[10, -1], [20, -1]], their number, or a label of the file"
-        )
+    def _in_one_line(cls, value: Any, check: Any, info: ValidationInfo) -> Any:
+        """The value, or what is expected instead of the message for each type that it might have."""
+        try:
+            return None if value is None else check(value)
+        except ValidationError:
+            raise ValueError(EXPECTED[str(info.field_name)]) from None
 
 
 def description_beside(drawing: Path) -> Path | None:
@@ -122,14 +119,3 @@ def load_description(path: Path | None, lines: Sequence[str] = ()) -> Descriptio
         return Description(**values)
     except UserError as error:
         raise UserError(f"description {path.name}: {error}" if path else str(error)) from None
-
-
-def _are_points(value: Any, count: int | None = None) -> bool:
-    """Whether a value is a list of pairs of finite numbers, `count` of them if it is given."""
-    return (
-        isinstance(value, list | tuple)
-        and len(value) > 0
-        and count in (None, len(value))
-        and all(isinstance(point, list | tuple) and len(point) == 2 for point in value)
-        and all(type(number) in (int, float) and isfinite(number) for point in value for number in point)
-    )

@@ -170,15 +170,7 @@ class DrawnFinger:
 
     def _whole(self) -> dict[str, Any]:
         """The definition with the arrays of the file's own mesh."""
-        mesh = self.mesh
-        if mesh is None:
-            return self.definition()
-        arrays = {
-            **{name: getattr(mesh, name).tolist() for name in ("points", "triangles", "marker_nodes")},
-            "boundaries": {name: edges.tolist() for name, edges in mesh.boundaries.items()},
-            "contact_node": mesh.contact_node,
-            "moduli": None if mesh.moduli is None else mesh.moduli.tolist(),
-        }
+        arrays = self.mesh and {name: array.tolist() for name, array in self.mesh.arrays().items()}
         return {**self.definition(), "mesh": arrays}
 
     @classmethod
@@ -197,7 +189,7 @@ class DrawnFinger:
         return cls(
             section=Section(loops[0], tuple(loops[1:])),
             placement=Placement(**values.pop("placement")),
-            mesh=TriangleMesh(**mesh) if isinstance(mesh, Mapping) else None,
+            mesh=TriangleMesh.from_arrays(mesh) if isinstance(mesh, Mapping) else None,
             **values,
         )
 
@@ -231,9 +223,10 @@ class DrawnFinger:
 
     def plot(self) -> "Figure":
         """The section with clamp, contact and numbered markers in the file's axes, as a matplotlib figure."""
-        from pinnray.geometry.drawing.picture import plot_drawing
+        from pinnray.geometry.finger.picture import plot_finger
 
-        return plot_drawing(self, self.placement)
+        place = self.placement.inverse
+        return plot_finger(self, place.section(self.section), place)
 
     def _source(self, key: str) -> str:
         source = self.sources.get(key)

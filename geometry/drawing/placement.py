@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.drawing.formats.closed_loops import corner_at, cut_at, nearest_piece, run_between
+from pinnray.geometry.drawing.formats.closed_loops import corner_at, cut_at, run_between
 from pinnray.geometry.drawing.formats.drawing import place
 from pinnray.geometry.section.loop import STRAIGHT, Loop
 from pinnray.geometry.section.section import Section
@@ -54,14 +54,12 @@ class Placement:
         return Section(_rounded(placed.outline), tuple(_rounded(cavity) for cavity in placed.cavities))
 
     def __str__(self) -> str:
-        """In words, such as `turned by 90 degrees, mirrored, shifted by (3, 4) mm`."""
+        """In words, such as `mirrored in x, turned by 90 degrees, shifted by (3, 4) mm`."""
         turn = self.matrix @ np.diag([-1.0 if self.mirrored else 1.0, 1.0])
         angle = float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
-        words = ["mirrored in x"] if self.mirrored else []
-        words += [f"turned by {angle:.6g} degrees"] if abs(angle) > 1e-9 else []
-        x, y = (float(value) + 0.0 for value in np.round(self.shift, 9))
-        words += [f"shifted by ({x:.6g}, {y:.6g}) mm"] if x or y else []
-        return ", ".join(words) or "none"
+        x, y = self.shift.round(9) + 0.0
+        mirrored = "mirrored in x, " if self.mirrored else ""
+        return f"{mirrored}turned by {round(angle, 9) + 0.0:.6g} degrees, shifted by ({x:.6g}, {y:.6g}) mm"
 
 
 def placed(section: Section, which: int, fraction: float) -> tuple[Section, Placement]:
@@ -116,14 +114,14 @@ def with_part(loop: Loop, ends: Sequence[FloatArray], name: str) -> Loop:
 
 def on_curve(loop: Loop, point: FloatArray, name: str) -> tuple[int, float]:
     """Piece and fraction of its length at a given point of the outline, at most 0.1 mm off the curve."""
-    _, which, fraction, distance = nearest_piece([loop], point)
+    (which,), (fraction,), (distance,) = loop.places(np.asarray(point)[None])
     if distance > 0.1:
         nearest = loop.along(which, fraction)[0]
         raise UserError(
             f"the {name} at {place(point)} is {distance:.3g} mm off the outline; its nearest point is "
             f"{place(nearest)}"
         )
-    return which, fraction
+    return int(which), float(fraction)
 
 
 def with_front(loop: Loop, contact: FloatArray) -> Loop:
@@ -132,7 +130,7 @@ def with_front(loop: Loop, contact: FloatArray) -> Loop:
     Normals of up to `STEEPEST` from +y count, so that x falls along the part; arcs are cut there. It ends
     at a clamped piece.
     """
-    _, which, _, _ = nearest_piece([loop], contact)
+    which = int(loop.places(contact[None]).pieces[0])
     for step in (1, -1):
         current = which
         for _ in range(len(loop.points)):
@@ -144,7 +142,7 @@ def with_front(loop: Loop, contact: FloatArray) -> Loop:
             if not _faces(loop, current) or loop.names[following] == "base":
                 break
             current = following
-        _, which, _, _ = nearest_piece([loop], contact)
+        which = int(loop.places(contact[None]).pieces[0])
     run = {which}
     for step in (1, -1):
         current = (which + step) % len(loop.points)

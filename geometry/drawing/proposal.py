@@ -2,12 +2,11 @@
 
 Clamp: the flat end. Straight pieces on the convex hull that face along the outline's principal axis, within
 45 degrees, are ends; of those that are at least 0.8 as wide as the widest the one in most pieces (two feet
-beside a slot), then the widest, then the one at smaller x. A body without one is held at the sixth of its
-outline around its lowest point.
+beside a slot), then the widest, then the one at smaller x.
 Contact: on the longest straight piece of the hull that looks sideways from the clamp, where those within 1 %
 count as equal and the upper one is taken; halfway between its end at the clamp and the last cavity beneath
-it, or its own end. A body without such a piece is touched halfway along its upper side, or, if less than
-1.5 times as long as wide, at its point farthest from the clamp.
+it, or its own end.
+A body without such a piece has to be given its clamp or contact.
 Markers: evenly along the longest unclamped runs of the outline, front, tip and back, each as deep in as
 leaves most material around it, at most 2 mm and in a solid part a quarter of the way through. Where that
 would put one into a sharp tip, with less than a quarter of the others' room, they are spread over the rest.
@@ -17,11 +16,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import inner_normals, through
 from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 
 MARKERS = 9
 SIDEWAYS = np.cos(np.radians(45))
@@ -45,7 +46,9 @@ def with_clamp(outline: Loop) -> Loop:
     extent = float(np.ptp(outline.points @ np.array([-axis[1], axis[0]])))
     ends = [end for end in ends if end.width >= 0.2 * extent]
     if not ends:
-        return _with_lowest_part(outline)
+        raise UserError(
+            "it has no flat end to be clamped; give clamp = [[x, y], [x, y]], two points of the outline"
+        )
     widest = max(end.width for end in ends)
     best = max(
         (end for end in ends if end.width >= 0.8 * widest),
@@ -69,7 +72,9 @@ def contact_point(section: Section) -> FloatArray:
     extent = float(np.ptp(section.bounds, axis=0).max())
     free = [which for which in free if outline.lengths[which] >= 0.3 * extent]
     if not free:
-        return _contact_on_curve(outline, middle, normal)
+        raise UserError(
+            "it has no straight side to be touched; give contact = [x, y], a point of the outline"
+        )
     scores = {
         which: outline.lengths[which] * (1 - (inner_normals(outline, which, 0.5)[0] @ normal) ** 2)
         for which in free
@@ -137,7 +142,9 @@ def contact_width(outline: Loop, middle: float) -> float:
 
 
 def _principal_axis(outline: Loop) -> FloatArray:
-    values, vectors = np.linalg.eigh(np.cov(_samples(outline)[0].T))
+    ring = shapely.LinearRing(outline.flattened()[0])
+    points = shapely.get_coordinates(shapely.segmentize(ring, ring.length / 1000))
+    values, vectors = np.linalg.eigh(np.cov(points.T))
     return np.array([1.0, 0.0]) if values[0] > 0.9 * values[1] else np.asarray(vectors[:, 1])
 
 
@@ -164,21 +171,6 @@ def _flat_sides(outline: Loop) -> Iterator[FlatSide]:
         left = {which: other for which, other in left.items() if which not in group}
 
 
-def _with_lowest_part(outline: Loop) -> Loop:
-    total = float(outline.lengths.sum())
-    points, _, along = _samples(outline)
-    middle = along[int(np.round(points[:, 1], 6).argmin())]
-    for along in ((middle - total / 12) % total, (middle + total / 12) % total):
-        piece, fraction = outline.place_in(range(len(outline.points)), along)
-        if 1e-9 < fraction < 1 - 1e-9:
-            outline = outline.split(piece, [fraction])
-    ends = np.cumsum(outline.lengths)
-    away = (ends - outline.lengths / 2 - middle + total / 2) % total - total / 2
-    return outline.renamed(
-        "base" if abs(far) < total / 12 else name for far, name in zip(away, outline.names, strict=True)
-    )
-
-
 def _clamp_frame(outline: Loop) -> tuple[FloatArray, FloatArray]:
     """Middle of the clamp and its mean outer normal."""
     base = list(outline.pieces("base"))
@@ -187,33 +179,6 @@ def _clamp_frame(outline: Loop) -> tuple[FloatArray, FloatArray]:
     normals = np.concatenate([-inner_normals(outline, which, 0.5) for which in base])
     normal = weights @ normals
     return weights @ middles / weights.sum(), normal / max(float(np.linalg.norm(normal)), 1e-12)
-
-
-def _contact_on_curve(outline: Loop, clamp: FloatArray, normal: FloatArray) -> FloatArray:
-    """Halfway along the upper side of a long body, else its point farthest from the clamp."""
-    points, normals, _ = _samples(outline)
-    away = points - clamp
-    along, across = -away @ normal, away @ np.array([-normal[1], normal[0]])
-    if along.max() < 1.5 * np.ptp(across):
-        return np.asarray(points[int(np.round(np.linalg.norm(away, axis=1), 6).argmax())])
-    beside = (np.abs(normals @ normal) <= SIDEWAYS) & (normals[:, 1] < 0)
-    beside = beside if beside.any() else np.ones(len(along), dtype=bool)
-    off = np.where(beside, np.abs(along - 0.5 * along.max()), np.inf)
-    return np.asarray(points[int(np.round(off, 6).argmin())])
-
-
-def _samples(outline: Loop) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points (n, 2) of the outline, also every piece's middle; inner normals (n, 2), arc lengths (n,)."""
-    spacing = float(outline.lengths.sum()) / 1000
-    points, normals, along, start = [], [], [], 0.0
-    for which, length in enumerate(outline.lengths):
-        count = 2 * int(np.ceil(length / spacing / 2)) + 1
-        shares = (np.arange(count) + 0.5) / count
-        points.append(outline.along(which, shares))
-        normals.append(inner_normals(outline, which, shares))
-        along.append(start + shares * length)
-        start += length
-    return np.concatenate(points), np.concatenate(normals), np.concatenate(along)
 
 
 def _mid_span(section: Section, which: int, clamp: FloatArray) -> FloatArray:

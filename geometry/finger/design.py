@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import model_validator
 
 from pinnray.geometry.finger.markers import marker_positions
@@ -13,11 +14,11 @@ from pinnray.geometry.finger.parameters import (
     parameter_info,
     with_unit,
 )
-from pinnray.geometry.finger.rules import fitting_marker
+from pinnray.geometry.finger.rules import broken_rule, fitting_marker
 from pinnray.geometry.finger.section import finger_section
-from pinnray.geometry.finger.validation import check
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import fact_table
 
 if TYPE_CHECKING:
@@ -76,10 +77,10 @@ class Design(Parameters):
         return [*rows, ("Abscissa of the contact's middle", "", _in_words(self.contact_abscissa, "mm"))]
 
     def plot(self) -> "Figure":
-        """The section to scale, with its markers and the contact, as a matplotlib figure."""
+        """The section with clamp, contact and numbered markers, as a matplotlib figure."""
         from pinnray.geometry.finger.picture import plot_finger
 
-        return plot_finger(self)
+        return plot_finger(self, self.section, np.asarray)
 
     def _repr_html_(self) -> str:
         """The section and the paper's nine parameters, in a notebook."""
@@ -103,10 +104,9 @@ class Design(Parameters):
 
     @model_validator(mode="after")
     def _obey_rules(self) -> "Design":
-        check(self)
-        self.__dict__["marker_diameter"] = fitting_marker(
-            self
-        )  # still unset: a copy shrinks by its own walls
+        if fault := broken_rule(self):
+            raise UserError(fault)
+        self.__dict__["marker_diameter"] = fitting_marker(self)  # still unset: a copy has its own walls
         return self
 
 

@@ -81,7 +81,7 @@ class Finger(Protocol):
         """Rows of the report: meaning, the paper's symbol or an empty text, and value with unit."""
 
     def plot(self) -> "Figure":
-        """The section to scale, with its markers and the contact, as a matplotlib figure."""
+        """The section with clamp, contact and numbered markers, as a matplotlib figure."""
 
 
 def outline_with_contact(finger: Finger) -> Loop:

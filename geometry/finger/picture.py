@@ -1,4 +1,7 @@
-"""A finger's section as a picture."""
+"""A finger's section as a picture: what is held, touched and marked."""
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -6,25 +9,68 @@ from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
 
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
-from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, Figure, body_figure
+from pinnray.geometry.section.thickness import inner_normals
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, SMALL, Figure, body_figure
 
 
-def plot_finger(finger: Finger) -> Figure:
-    """The section to scale, with its markers and the contact."""
-    shape = finger.section
-    with body_figure(shape.bounds, f"Design “{finger.name}”") as (drawn, axes):
-        draw_section(axes, shape)
-        front = np.array([shape.front_point(x) for x in np.linspace(*finger.contact_ends, 9)])
-        axes.plot(*front.T, color=CONTACT, lw=3, solid_capstyle="butt", zorder=3)
-        for place in finger.markers:
-            axes.add_patch(Circle(tuple(place), finger.marker_radius, fc=MEASURED, zorder=4))
+def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], FloatArray]) -> Figure:
+    """The section to scale: the clamp hatched, an arrow at the contact, numbered markers.
+
+    Args:
+        finger: The finger.
+        section: Its section in the frame of the picture.
+        place: From the finger's frame into that of the picture, points of shape (n, 2), mm.
+    """
+    extent = float(np.ptp(section.bounds, axis=0).max())
+    contact = finger.section.front_point(finger.contact_abscissa)
+    tip, tail = place(np.stack([contact, contact + np.array([0.0, 0.09 * extent])]))
+    hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
+    shown = _not_tall(np.concatenate([hatched, tip[None], tail[None]]))
+    with body_figure(shown, f"Finger “{finger.name}”") as (drawn, axes):
+        draw_section(axes, section)
+        for loop, which in section.named("base"):
+            axes.plot(*loop.along(which, np.linspace(0, 1, 60)).T, color=INK, lw=2.2, zorder=3)
+            axes.plot(*_hatches(loop, which, extent / 40), color=INK, lw=0.6, zorder=2)
+        front = np.linspace(*finger.contact_ends, 30)
+        touched = place(np.array([finger.section.front_point(x) for x in front]))
+        axes.plot(*touched.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=4)
+        axes.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 1.4}, zorder=5)
+        text: dict[str, Any] = {
+            "textcoords": "offset points",
+            "fontsize": SMALL,
+            "color": MEASURED,
+            "zorder": 6,
+        }
+        for number, centre in enumerate(place(finger.markers), start=1):
+            axes.add_patch(Circle(tuple(centre), finger.marker_radius, fc=MEASURED, ec="none", zorder=4))
+            axes.annotate(str(number), centre, xytext=(3, 3), **text)
     return drawn
 
 
-def draw_section(axes: Axes, shape: Section, *, deviation: float = 1e-3, width: float = 0.9) -> None:
-    """Draw the section, in mm, with an edge of a width in points; cavities are empty."""
-    rings = [loop.flattened(deviation)[0] for loop in shape.loops]
+def draw_section(axes: Axes, shape: Section) -> None:
+    """Draw the section, in mm, with an edge; cavities are empty."""
+    rings = [loop.flattened()[0] for loop in shape.loops]
     paths = [Outline(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings]
     whole = Outline.make_compound_path(*paths)
-    axes.add_patch(PathPatch(whole, fc=BODY, ec=INK, lw=width, zorder=1))
+    axes.add_patch(PathPatch(whole, fc=BODY, ec=INK, lw=0.9, zorder=1))
+
+
+def _not_tall(points: FloatArray) -> FloatArray:
+    """Points (n, 2) with two more that make their extent at most 0.8 times as high as wide."""
+    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
+    half = max(right - left, (top - bottom) / 0.8) / 2
+    middle = 0.5 * (left + right)
+    return np.concatenate([points, [[middle - half, bottom], [middle + half, top]]])
+
+
+def _hatches(loop: Loop, which: int, step: float) -> FloatArray:
+    """Short strokes on the outer side of a piece, as coordinates (2, k) with gaps."""
+    count = max(int(loop.lengths[which] / step), 2)
+    share = (np.arange(count) + 0.5) / count
+    start, outward = loop.along(which, share), -inner_normals(loop, which, share)
+    turned = outward @ np.array([[1.0, 0.6], [-0.6, 1.0]])
+    strokes = np.stack([start, start + 0.9 * step * turned, np.full_like(start, np.nan)], axis=1)
+    return np.asarray(strokes.reshape(-1, 2).T)

@@ -1,4 +1,4 @@
-"""Rules that a finger has to obey: each gives a margin, a message, and the parameters that can remedy it."""
+"""Rules that a finger has to obey: each gives a margin and the fault in words."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -29,6 +29,9 @@ MIN_DEPTH_LEFT = 0.2  # material below a marker's pocket
 MIN_STRAIGHT = 1e-3  # between two roundings
 MIN_WALL = 0.2  # of the base and around a slot
 
+ROUNDING = -1e-9
+"""Tolerance of the margins, mm."""
+
 
 class RuleResult(NamedTuple):
     """Outcome of a rule."""
@@ -37,11 +40,10 @@ class RuleResult(NamedTuple):
     sentence: str  # the fault if it is not, with the numbers
 
 
-class Rule(NamedTuple):
-    """One condition on a finger."""
-
-    check: Callable[[Parameters], RuleResult]
-    remedies: tuple[str, ...]  # parameters whose change can satisfy it, the likeliest first
+def broken_rule(p: Parameters) -> str | None:
+    """The fault of a finger that breaks a rule, with the numbers; else None."""
+    results = (rule(p) for rule in RULES)
+    return next((result.sentence for result in results if result.margin < ROUNDING), None)
 
 
 def cavity_length(p: Parameters) -> RuleResult:
@@ -226,22 +228,10 @@ def markers_not_through(p: Parameters) -> RuleResult:
     )
 
 
-WALLS = ("front_thickness", "back_thickness", "tip_length", "base_width")
-RIBS = ("rib_count", "rib_thickness", "rib_angle", "rib_pitch", "height")
-RULES: tuple[Rule, ...] = (
-    Rule(cavity_length, ("tip_length", "base_thickness", "height", "base_tilt")),
-    Rule(cavity_open, (*WALLS, "base_tilt")),
-    Rule(base_wall, ("base_thickness", "foot_height", "slot_height")),
-    Rule(slot_fits, ("slot_width", "slot_opening", "slot_height", "lip_thickness", "foot_height")),
-    Rule(tip_rounded, ("tip_radius", "tip_length")),
-    Rule(ribs_apart, RIBS),
-    Rule(ribs_clear_of_base, (*RIBS, "base_width", "rib_start")),
-    Rule(ribs_clear_of_tip, (*RIBS, "tip_length")),
-    Rule(contact_on_front, ("contact_position", "contact_width", "height")),
-    Rule(fillets_fit, ("fillet_radius", "rib_count")),
-    Rule(markers_fit, ("marker_diameter", "marker_count", "front_thickness", "back_thickness")),
-    Rule(markers_apart, ("marker_count", "marker_diameter", "rib_count")),
-    Rule(markers_not_through, ("marker_height", "depth")),
+RULES: tuple[Callable[[Parameters], RuleResult], ...] = (
+    *(cavity_length, cavity_open, base_wall, slot_fits, tip_rounded),
+    *(ribs_apart, ribs_clear_of_base, ribs_clear_of_tip, contact_on_front, fillets_fit),
+    *(markers_fit, markers_apart, markers_not_through),
 )
 """In the order of checking: the later ones presuppose the earlier ones."""
 

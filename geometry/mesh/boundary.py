@@ -30,17 +30,17 @@ def counter_clockwise(points: FloatArray, triangles: IntArray) -> IntArray:
 
 
 def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
-    """The nodes of every closed boundary: the outline first, then the cavities from base to tip."""
-    edges = mesh.boundary_edges
-    nodes, local = np.unique(edges, return_inverse=True)
-    local = local.reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(local)), (local[:, 0], local[:, 1])), shape=(len(nodes), len(nodes)))
-    count, label = connected_components(graph, directed=False)
-    start, end = (mesh.points[edges[:, side]] for side in range(2))
-    area = np.bincount(label[local[:, 0]], weights=_cross(start, end))
-    loops = [(which != area.argmax(), nodes[label == which]) for which in range(count)]
-    loops.sort(key=lambda entry: (entry[0], float(mesh.points[entry[1], 0].min())))
-    return [loop for _, loop in loops]
+    """The nodes of every closed boundary, the body on their left: the outline first, cavities by x."""
+    follows = dict(mesh.boundary_edges.tolist())
+    loops = []
+    for start in sorted(follows):
+        if start in follows:
+            loop = [start]
+            while (after := follows.pop(loop[-1])) != start:
+                loop.append(after)
+            loops.append(np.array(loop))
+    outline = max(loops, key=lambda loop: _cross(mesh.points[loop], mesh.points[np.roll(loop, -1)]).sum())
+    return sorted(loops, key=lambda loop: (loop is not outline, mesh.points[loop, 0].min()))
 
 
 def mean_thickness(mesh: TriangleMesh) -> float:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pinnray.geometry.finger.finger import Finger, outline_with_contact
-from pinnray.geometry.mesh.elastic_motion import ElasticMotion
+from pinnray.geometry.mesh.extension import elastic
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.loop import Loop
 from pinnray.runtime.arrays import FloatArray, IntArray
@@ -32,22 +32,17 @@ class MovingMesh:
 
     def __init__(self, mesh: TriangleMesh, finger: Finger) -> None:
         self._mesh, self._loops = mesh, _loops(finger)
-        self._motion = ElasticMotion(mesh)
+        self._motion = elastic(mesh)
         self._nodes = np.unique(mesh.boundary_edges)
         points = mesh.points[self._nodes]
         self._loop = np.zeros(len(points), dtype=np.int64)
         self._piece, self._share = np.zeros_like(self._loop), np.zeros(len(points))
         nearest = np.full(len(points), np.inf)
         for number, loop in enumerate(self._loops):
-            piece, share = loop.places(points)
-            away = np.linalg.norm(_at(loop, piece, share) - points, axis=1)
-            nearer = away < nearest
-            self._loop[nearer], self._piece[nearer], self._share[nearer] = (
-                number,
-                piece[nearer],
-                share[nearer],
-            )
-            nearest[nearer] = away[nearer]
+            places = loop.places(points)
+            nearer = places.distances < nearest
+            self._loop[nearer], nearest[nearer] = number, places.distances[nearer]
+            self._piece[nearer], self._share[nearer] = places.pieces[nearer], places.shares[nearer]
         if nearest.max() > ON_CURVE:
             raise UserError(f"the mesh is not of the finger {finger.name!r}: its boundary is elsewhere")
 
@@ -69,9 +64,9 @@ class MovingMesh:
             own = self._loop == number
             places = _at(loop, self._piece[own], self._share[own])
             moved[self._nodes[own]] = places - self._mesh.points[self._nodes[own]]
-        mesh = replace(self._mesh, points=self._mesh.points + self._motion.extended(moved / steps))
+        mesh = replace(self._mesh, points=self._mesh.points + self._motion.of(moved / steps))
         for _ in range(steps - 1):
-            mesh = replace(mesh, points=mesh.points + ElasticMotion(mesh).extended(moved / steps))
+            mesh = replace(mesh, points=mesh.points + elastic(mesh).of(moved / steps))
         return replace(mesh, depth=finger.depth)
 
 

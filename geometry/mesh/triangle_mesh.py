@@ -116,7 +116,7 @@ class TriangleMesh:
     @cached_property
     def digest(self) -> str:
         """SHA-256 over every array, in hexadecimal; equal for equal meshes."""
-        return content_hash(self._arrays())
+        return content_hash(self.arrays())
 
     def boundary(self, name: str) -> IntArray:
         """Edges of the boundary called `name`, shape (k, 2).
@@ -213,27 +213,27 @@ class TriangleMesh:
 
     def save(self, path: Path) -> None:
         """Write the mesh as a NumPy archive, atomically."""
-        write_arrays(path, self._arrays())
+        write_arrays(path, self.arrays())
 
     @classmethod
     def load(cls, path: Path) -> "TriangleMesh":
         """Read a mesh that `save` wrote."""
         with np.load(path) as archive:
-            return cls(
-                points=archive["points"],
-                triangles=archive["triangles"],
-                boundaries={
-                    name.removeprefix(BOUNDARY_PREFIX): archive[name]
-                    for name in archive.files
-                    if name.startswith(BOUNDARY_PREFIX)
-                },
-                marker_nodes=archive["marker_nodes"],
-                contact_node=int(archive["contact_node"]),
-                depth=float(archive["depth"]),
-                moduli=archive["moduli"] if "moduli" in archive.files else None,
-            )
+            return cls.from_arrays(archive)
 
-    def _arrays(self) -> dict[str, FloatArray | IntArray]:
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> "TriangleMesh":
+        """The mesh of the arrays that `arrays` gave."""
+        values = {name: arrays[name] for name in arrays if not name.startswith(BOUNDARY_PREFIX)}
+        edges = {
+            name.removeprefix(BOUNDARY_PREFIX): arrays[name]
+            for name in arrays
+            if name.startswith(BOUNDARY_PREFIX)
+        }
+        return cls(**values, boundaries=edges)  # type: ignore[arg-type]
+
+    def arrays(self) -> dict[str, FloatArray | IntArray]:
+        """Every array by name, for a file; `from_arrays` makes the mesh of them."""
         moduli = {} if self.moduli is None else {"moduli": self.moduli}
         return {
             "points": self.points,

@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import splu
 
 from pinnray.geometry.mesh.boundary import (
     CORNER_ANGLE,
@@ -19,6 +18,7 @@ from pinnray.geometry.mesh.boundary import (
     mean_thickness,
     walls_and_ribs,
 )
+from pinnray.geometry.mesh.extension import Extension, barycentric_gradients
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
@@ -41,7 +41,7 @@ class WallMotion:
     def of(cls, mesh: TriangleMesh) -> "WallMotion":
         """The motions of a mesh."""
         parts = {name: mask for name, mask in walls_and_ribs(mesh).items() if mask.any()}
-        loops = _cavities(mesh)
+        loops = boundary_loops(mesh)[1:]
         mean, names, thickness, boundary = mean_thickness(mesh), [], [], []
         for name, mask in parts.items():
             moved = np.zeros((len(mesh.points), 2))
@@ -72,23 +72,11 @@ class WallMotion:
     @cached_property
     def _gradients(self) -> FloatArray:
         corners = self.nodal[:, self.mesh.triangles]
-        return np.asarray(np.einsum("ktci,tcj->ktij", corners, _barycentric_gradients(self.mesh)))
+        return np.asarray(np.einsum("ktci,tcj->ktij", corners, barycentric_gradients(self.mesh)))
 
     def moved(self, changes: FloatArray) -> FloatArray:
         """Nodes of the moved mesh, shape (N, 2), mm."""
         return np.asarray(self.mesh.points + np.einsum("k,knx->nx", changes, self.nodal))
-
-
-def _cavities(mesh: TriangleMesh) -> list[IntArray]:
-    """The nodes of every cavity in order, the body on their left."""
-    follows = dict(mesh.boundary_edges.tolist())
-    loops = []
-    for nodes in boundary_loops(mesh)[1:]:
-        loop = [int(nodes[0])]
-        while (after := follows[loop[-1]]) != loop[0]:
-            loop.append(after)
-        loops.append(np.array(loop))
-    return loops
 
 
 def _loop_motion(
@@ -108,8 +96,6 @@ def _loop_motion(
     first = int(np.flatnonzero(breaks & ~np.roll(breaks, 1))[0]) if not breaks.all() else 0
     order = np.roll(np.arange(len(loop)), -first)
     faces = _faces(order, breaks)
-    if not faces:
-        return _node_mean(normals * (share * owned)[:, None])
     speeds = [share * (lengths[face] @ owned[face] > 0.5 * lengths[face].sum()) for face in faces]
     motion = np.zeros((len(loop), 2))
     corners = [
@@ -207,18 +193,9 @@ def _thickness(mesh: TriangleMesh, name: str, mask: BoolArray, loops: list[IntAr
     return float(np.linalg.norm(offset - share[..., None] * along, axis=2).min())
 
 
-def _barycentric_gradients(mesh: TriangleMesh) -> FloatArray:
-    """Gradients of the barycentric coordinates, shape (t, 3, 2), 1/mm."""
-    corners = mesh.points[mesh.triangles]
-    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-    rotated = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
-    return np.asarray(rotated / (2 * mesh.areas)[:, None, None], dtype=np.float64)
-
-
 def harmonic(mesh: TriangleMesh, boundary: FloatArray) -> FloatArray:
     """Harmonic extension (k, N, 2), by linear elements, of values on the boundary."""
-    count = len(mesh.points)
-    gradients = _barycentric_gradients(mesh)
+    count, gradients = len(mesh.points), barycentric_gradients(mesh)
     columns = mesh.triangles.ravel()
     rows = np.repeat(np.arange(len(mesh.triangles)), 3)
     along = [
@@ -226,12 +203,5 @@ def harmonic(mesh: TriangleMesh, boundary: FloatArray) -> FloatArray:
         for axis in range(2)
     ]
     stiffness = sum(matrix.T @ diags(mesh.areas) @ matrix for matrix in along).tocsr()
-    free = np.ones(count, dtype=bool)
-    free[np.unique(mesh.boundary_edges)] = False
-    found = boundary.copy()
-    if free.any() and len(boundary):
-        flat = boundary.transpose(1, 0, 2).reshape(count, -1)
-        factors = splu(stiffness[free][:, free].tocsc())
-        inner = factors.solve(np.ascontiguousarray(-(stiffness[free] @ flat)))
-        found[:, free] = inner.reshape(-1, len(boundary), 2).transpose(1, 0, 2)
-    return found
+    values = boundary.transpose(1, 0, 2).reshape(count, -1)
+    return Extension(mesh, stiffness).of(values).reshape(count, -1, 2).transpose(1, 0, 2)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -118,10 +118,11 @@ class Loop:
         points[share == 0], points[share == 1] = start, end
         return points
 
-    def places(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The piece nearest to each of k points near the curve, (k, 2), mm, and its fraction: both (k,)."""
-        pieces, shares = np.zeros(len(points), dtype=np.int64), np.zeros(len(points))
-        nearest = np.full(len(points), np.inf)
+    def places(self, points: FloatArray) -> "Places":
+        """The places on the curve that are nearest to k points, (k, 2), mm."""
+        found = Places(
+            np.zeros(len(points), dtype=np.int64), np.zeros(len(points)), np.full(len(points), np.inf)
+        )
         for which, (start, end) in enumerate(self.ends):
             if abs(self.bulges[which]) <= STRAIGHT:
                 along = end - start
@@ -135,9 +136,10 @@ class Loop:
                 share = ((turned - middle + np.pi) % (2 * np.pi) - np.pi + middle) / abs(sweep)
             share = share.clip(0, 1)
             away = np.linalg.norm(self.along(which, share) - points, axis=1)
-            nearer = away < nearest
-            pieces[nearer], shares[nearer], nearest[nearer] = which, share[nearer], away[nearer]
-        return pieces, shares
+            nearer = away < found.distances - 1e-12
+            for values, better in zip(found, (np.full(len(points), which), share, away), strict=True):
+                values[nearer] = better[nearer]
+        return found
 
     def flattened(self, deviation: float = 1e-3) -> tuple[FloatArray, IntArray]:
         """A polygon within `deviation`, mm, of the curve, whose corners lie on it.
@@ -215,6 +217,14 @@ class Loop:
         along, away = end - start, points - start
         right = along[1] * away[:, 0] - along[0] * away[:, 1]
         return np.asarray(np.sign(self.bulges[which]) * right >= -1e-9 * float(along @ along))
+
+
+class Places(NamedTuple):
+    """Places on a curve, k of them."""
+
+    pieces: IntArray  # (k,)
+    shares: FloatArray  # fractions of the pieces' lengths, (k,)
+    distances: FloatArray  # of the points to which they are nearest, (k,), mm
 
 
 def _following(values: FloatArray) -> FloatArray:

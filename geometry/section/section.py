@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from pinnray.geometry.section.loop import Loop
 from pinnray.runtime.arrays import BoolArray, FloatArray
@@ -120,14 +121,8 @@ class Section:
 
 def _fraction_at(loop: Loop, which: int, x: float) -> float:
     """Fraction of the length of a piece, on which x falls or rises throughout, at an abscissa."""
-    start, end = loop.ends[which]
-    share = (x - start[0]) / (end[0] - start[0])
-    if which not in loop.straight:
-        centre, radius = loop.circle(which)
-        sweep = 4 * np.arctan(loop.bulges[which])
-        first = np.arctan2(*(start - centre)[::-1])
-        above = np.sign(0.5 * (start + end)[1] - centre[1]) or 1.0
-        angle = above * np.arccos(np.clip((x - centre[0]) / radius, -1, 1))
-        turned = (angle - first) * np.sign(sweep) % (2 * np.pi)
-        share = (turned if turned < 2 * np.pi - 1e-9 else 0.0) / abs(sweep)
-    return float(np.clip(share, 0.0, 1.0))
+    start, end = loop.ends[which, :, 0]
+    share = np.clip((x - start) / (end - start), 0.0, 1.0)
+    if which in loop.straight or share in (0, 1):
+        return float(share)
+    return float(brentq(lambda along: loop.along(which, along)[0, 0] - x, 0.0, 1.0, xtol=1e-15))

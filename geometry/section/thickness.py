@@ -38,7 +38,7 @@ def wall_thickness(
         Points of the boundary, shape (n, 2), mm, and the thickness there, shape (n,), mm; both empty for a
         triangle without cavities.
     """
-    return _widths(_Pieces.of(section.loops), spacing, corners=corners)
+    return _widths(section.loops, spacing, corners=corners)
 
 
 def cavity_widths(section: Section, spacing: float) -> tuple[FloatArray, FloatArray]:
@@ -49,7 +49,7 @@ def cavity_widths(section: Section, spacing: float) -> tuple[FloatArray, FloatAr
     """
     if not section.cavities:
         return np.empty((0, 2)), np.empty(0)
-    return _widths(_Pieces.of(section.cavities, backward=True), spacing)
+    return _widths([cavity.reversed() for cavity in section.cavities], spacing)
 
 
 def inner_normals(loop: Loop, which: int, fractions: ArrayLike) -> FloatArray:
@@ -77,11 +77,10 @@ class _Pieces(NamedTuple):
     following: IntArray  # number of the next piece of the curve, (p,)
 
     @classmethod
-    def of(cls, loops: Sequence[Loop], *, backward: bool = False) -> "_Pieces":
-        """The pieces of curves, or of the curves run the other way round."""
-        turn = slice(None, None, -1 if backward else 1)
-        ends = np.concatenate([loop.ends[turn, turn] for loop in loops])
-        bulges = np.concatenate([loop.bulges[turn] for loop in loops]) * (-1 if backward else 1)
+    def of(cls, loops: Sequence[Loop]) -> "_Pieces":
+        """The pieces of curves."""
+        ends = np.concatenate([loop.ends for loop in loops])
+        bulges = np.concatenate([loop.bulges for loop in loops])
         start, end = ends[:, 0], ends[:, 1]
         safe = np.where(np.abs(bulges) > STRAIGHT, bulges, np.nan)
         left = np.stack([start[:, 1] - end[:, 1], end[:, 0] - start[:, 0]], axis=1)
@@ -92,9 +91,10 @@ class _Pieces(NamedTuple):
         return cls(start, end, bulges, centres, np.linalg.norm(start - centres, axis=1), following)
 
 
-def _widths(pieces: _Pieces, spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
+def _widths(loops: Sequence[Loop], spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
     """Lengths of the rays to the left of curves up to the next one of them."""
-    points, normals, own = _samples(pieces, spacing)
+    pieces = _Pieces.of(loops)
+    points, normals, own = _samples(loops, spacing)
     crossing = _through(pieces, points, normals)
     kept = np.isfinite(crossing.lengths)
     if not corners:
@@ -102,29 +102,16 @@ def _widths(pieces: _Pieces, spacing: float, *, corners: bool = False) -> tuple[
     return points[kept], crossing.lengths[kept]
 
 
-def _samples(pieces: _Pieces, spacing: float) -> tuple[FloatArray, FloatArray, IntArray]:
+def _samples(loops: Sequence[Loop], spacing: float) -> tuple[FloatArray, FloatArray, IntArray]:
     """Points (n, 2) on every piece, half of `spacing` from its ends, unit vectors to the left, and pieces."""
-    along, quarter = pieces.end - pieces.start, np.arctan(pieces.bulges)
-    chords = np.hypot(*along.T)
-    curved = np.abs(pieces.bulges) > STRAIGHT
-    arcs = np.where(curved, quarter, 1.0)
-    lengths = np.where(curved, chords * 2 * arcs / np.sin(2 * arcs), chords)
-    counts = np.maximum(np.ceil(lengths / spacing), 1).astype(int)
-    own = np.repeat(np.arange(len(counts)), counts)
-    share = (np.arange(len(own)) - (np.cumsum(counts) - counts)[own] + 0.5) / counts[own]
-    points = pieces.start[own] + share[:, None] * along[own]
-    normals = np.stack([-along[:, 1], along[:, 0]], axis=1)[own] / chords[own, None]
-    bent = curved[own]
-    arc, angle = own[bent], 4 * share[bent] * quarter[own[bent]]
-    points[bent] = pieces.centres[arc] + _turned((pieces.start - pieces.centres)[arc], angle)
-    normals[bent] = _turned(normals[bent], angle - 2 * quarter[arc])
-    return points, normals, own
-
-
-def _turned(vectors: FloatArray, angles: FloatArray) -> FloatArray:
-    """Vectors (n, 2) turned by angles (n,), radians."""
-    (x, y), cosine, sine = vectors.T, np.cos(angles), np.sin(angles)
-    return np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=1)
+    points, normals, counts = [], [], []
+    for loop in loops:
+        for which, length in enumerate(loop.lengths):
+            counts.append(max(int(np.ceil(length / spacing)), 1))
+            share = (np.arange(counts[-1]) + 0.5) / counts[-1]
+            points.append(loop.along(which, share))
+            normals.append(inner_normals(loop, which, share))
+    return np.concatenate(points), np.concatenate(normals), np.repeat(np.arange(len(counts)), counts)
 
 
 def _through(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters
+from pinnray.geometry.finger.rules import broken_rule
 from pinnray.geometry.finger.section import cavity_ends, rib_feet, rib_pitch
-from pinnray.geometry.finger.validation import broken_rule
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures import QUANTITIES
@@ -78,6 +78,20 @@ class Inputs:
             name: _read(name, self.study.varied[name], text) if name in self.study.varied else text
             for name, text in named
         }
+
+    def finger(self, settings: Mapping[str, str], where: str = "") -> dict[str, Value]:
+        """A finger from texts that can be predicted.
+
+        Raises:
+            UserError: If it cannot; the message begins with `where`.
+        """
+        try:
+            finger = self.read(settings)
+            if fault := self.fault(finger):
+                raise UserError(fault)
+        except UserError as error:
+            raise UserError(f"{where}{error}") from None
+        return finger
 
     def fault(self, finger: Mapping[str, Value]) -> str | None:
         """The reason why a finger cannot be predicted, or None."""

@@ -158,9 +158,9 @@ def test_cad_files_come_from_the_cache_the_second_time(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["../up", "/tmp/up", "a/b"])
 def test_cad_files_of_a_foreign_cache_stay_in_the_output_folder(name: str, tmp_path: Path) -> None:
     cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
-    (entry,) = (tmp_path / "cache").glob("*.zip")
+    (entry,) = (tmp_path / "cache").glob("*.npz")
     with zipfile.ZipFile(entry, "a") as archive:
-        archive.writestr(name, "written")
+        archive.writestr(f"{name}.npy", "written")
     with pytest.warns(RuntimeWarning, match="the cached file is damaged"):
         cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
     assert not (tmp_path / "up").exists()

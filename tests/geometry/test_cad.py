@@ -11,7 +11,7 @@ from tests.meshes import body_area, body_perimeter
 
 
 def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> None:
-    face = cad.section_face(design)
+    face = cad.cq.Face.makeFromWires(*cad._wires(design))
     assert face.isValid()
     assert face.Area() == pytest.approx(body_area(design), rel=1e-9)
     assert len(face.innerWires()) == design.rib_count + 1
@@ -82,7 +82,7 @@ def test_the_mesh_has_its_boundary_on_the_cad_face(design: Design) -> None:
     import cadquery as cq
 
     mesh = build_mesh(design, MeshSettings(size=2.0))
-    face = cad.section_face(design)
+    face = cad.cq.Face.makeFromWires(*cad._wires(design))
     assert face.Area() == pytest.approx(design.section.area, rel=1e-12)
     wires = cq.Compound.makeCompound([face.outerWire(), *face.innerWires()])
     nodes = mesh.points[np.unique(mesh.boundary_edges)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.certification import with_certificates
-from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.comparison.evaluation.evaluation import evaluated
 from pinnray.geometry.finger.design import Design
 from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.linear import FemSolver

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Scale, place
+from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Mark, Scale, place
 from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, check_twice, joined
 from pinnray.geometry.drawing.formats.pieces import Piece
 from pinnray.geometry.section.loop import STRAIGHT, Loop
@@ -25,76 +25,67 @@ class Closed(NamedTuple):
     note: str = ""
 
 
-class Marks:
-    """Markers and contact, as a reader comes across them."""
+def assembled(
+    pieces: Sequence[Piece],
+    marks: Sequence[Mark],
+    scale: Scale,
+    tolerance: float | None,
+    note: str,
+    **facts: Any,
+) -> Drawing:
+    """The drawing of a file with its curves closed, and its markers and contact sorted out.
 
-    def __init__(self) -> None:
-        self._centres: list[FloatArray] = []
-        self._diameters: list[float] = []
-        self._contact: FloatArray | None = None
+    Args:
+        pieces: Lines and arcs; those called markers form circles, of arcs or short lines.
+        marks: Points; those called markers or contact count.
+        scale: Unit of the file's coordinates.
+        tolerance: Largest gap that is closed, mm; None means `JOIN`.
+        note: How the file was read.
+        facts: Further attributes of the drawing.
 
-    def took(self, centre: FloatArray | None, diameter: float, label: str) -> bool:
-        """Keep a circle or, with no diameter, a point as a mark; False if it is none."""
-        if centre is None:
-            return False
-        if label == "markers":
-            self._centres.append(centre)
-            self._diameters.append(diameter)
-        elif label == "contact":
-            if self._contact is not None:
-                raise UserError(f"two points are called contact, {place(self._contact)} and {place(centre)}")
-            self._contact = centre
-        return label in ("markers", "contact")
-
-    def drawing(
-        self, pieces: Sequence[Piece], scale: Scale, tolerance: float | None, note: str, **facts: Any
-    ) -> Drawing:
-        """The drawing with its curves closed.
-
-        Args:
-            pieces: Lines and arcs, mm.
-            scale: Unit of the file's coordinates.
-            tolerance: Largest gap that is closed, mm; None means `JOIN`.
-            note: How the file was read.
-            facts: Further attributes of the drawing.
-
-        Raises:
-            UserError: If a curve does not close, the markers differ in diameter, or one is no circle.
-        """
-        self._take_round([piece for piece in pieces if piece.label == "markers"])
-        sizes = [diameter for diameter in self._diameters if diameter > 0]
-        if sizes and np.ptp(sizes) > 0.01 * max(sizes):
-            raise UserError(
-                f"the markers have diameters from {min(sizes):.4g} to {max(sizes):.4g} mm; give all the same"
-            )
-        rest = [piece for piece in pieces if piece.label != "markers"]
-        closed = closed_loops(rest, frozenset(LABELS) - {"markers"}, scale, tolerance)  # which may lie on top
-        return Drawing(
-            loops=closed.loops,
-            note=note + closed.note,
-            markers=np.array(self._centres).reshape(-1, 2),
-            marker_diameter=float(np.mean(sizes)) if sizes else None,
-            contact=self._contact,
-            **facts,
+    Raises:
+        UserError: If a curve does not close, the markers differ in diameter, or one is no circle.
+    """
+    discs = _discs([piece for piece in pieces if piece.label == "markers"])
+    diameters = [diameter for _, diameter in discs]
+    if diameters and np.ptp(diameters) > 0.01 * max(diameters):
+        raise UserError(
+            f"the markers have diameters from {min(diameters):.4g} to {max(diameters):.4g} mm; "
+            "give all the same"
         )
+    contacts = [mark.centre for mark in marks if mark.label == "contact"]
+    if len(contacts) > 1:
+        raise UserError(f"two points are called contact, {place(contacts[0])} and {place(contacts[1])}")
+    rest = [piece for piece in pieces if piece.label != "markers"]
+    closed = closed_loops(rest, frozenset(LABELS) - {"markers"}, scale, tolerance)  # which may lie on top
+    points = [mark.centre for mark in marks if mark.label == "markers"]
+    return Drawing(
+        loops=closed.loops,
+        note=note + closed.note,
+        markers=np.array([*points, *(centre for centre, _ in discs)]).reshape(-1, 2),
+        marker_diameter=float(np.mean(diameters)) if diameters else None,
+        contact=contacts[0] if contacts else None,
+        **facts,
+    )
 
-    def _take_round(self, pieces: Sequence[Piece]) -> None:
-        """Keep closed curves of arcs or short lines as markers: circles of their areas."""
-        if not pieces:
-            return
-        no_circle = "the marker at {} is no circle; draw circles or points"
-        try:
-            loops = _chained(pieces, JOIN).loops
-        except UserError:
-            raise UserError(no_circle.format(place(pieces[0].start))) from None
-        for loop in loops:
-            shares = np.linspace(0, 1, 16, endpoint=False)
-            points = np.concatenate([loop.along(which, shares) for which in range(len(loop.points))])
-            centre = np.array(shapely.Polygon(points).centroid.coords[0])
-            radii = np.linalg.norm(points - centre, axis=1)
-            if np.ptp(radii) > ROUND * radii.max():
-                raise UserError(no_circle.format(place(loop.points[0])))
-            self.took(centre, 2 * float(np.sqrt(abs(loop.area) / np.pi)), "markers")
+
+def _discs(pieces: Sequence[Piece]) -> list[tuple[FloatArray, float]]:
+    """Centres (2,) and diameters, mm, of the circles that pieces form: circles of their areas."""
+    found = list[tuple[FloatArray, float]]()
+    no_circle = "the marker at {} is no circle; draw circles or points"
+    try:
+        loops = _chained(pieces, JOIN).loops
+    except UserError:
+        raise UserError(no_circle.format(place(pieces[0].start))) from None
+    for loop in loops:
+        shares = np.linspace(0, 1, 16, endpoint=False)
+        points = np.concatenate([loop.along(which, shares) for which in range(len(loop.points))])
+        centre = np.array(shapely.Polygon(points).centroid.coords[0])
+        radii = np.linalg.norm(points - centre, axis=1)
+        if np.ptp(radii) > ROUND * radii.max():
+            raise UserError(no_circle.format(place(loop.points[0])))
+        found.append((centre, 2 * float(np.sqrt(abs(loop.area) / np.pi))))
+    return found
 
 
 def closed_loops(
@@ -151,31 +142,6 @@ def straightened(loop: Loop, deviation: float = 1e-7) -> Loop:
     return Loop(loop.points[kept], loop.bulges[kept], tuple(loop.names[which] for which in kept))
 
 
-def nearest_piece(loops: Sequence[Loop], point: FloatArray) -> tuple[int, int, float, float]:
-    """The nearest place on curves to a point: loop, piece, fraction of its length, and distance, mm."""
-    best = (0, 0, 0.0, np.inf)
-    for number, loop in enumerate(loops):
-        for which in range(len(loop.points)):
-            fraction = _nearest_fraction(loop, which, point)
-            distance = float(np.linalg.norm(loop.along(which, fraction)[0] - point))
-            if distance < best[3] - 1e-12:
-                best = (number, which, fraction, distance)
-    return best
-
-
-def _nearest_fraction(loop: Loop, which: int, point: FloatArray) -> float:
-    start, end = loop.ends[which]
-    if abs(loop.bulges[which]) <= STRAIGHT:
-        return float(np.clip((point - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1))
-    centre, _ = loop.circle(which)
-    sweep = 4 * np.arctan(loop.bulges[which])
-    first, there = (np.arctan2(*(each - centre)[::-1]) for each in (start, point))
-    share = float(((there - first) * np.sign(sweep)) % (2 * np.pi) / abs(sweep))
-    if share <= 1:
-        return share
-    return 0.0 if np.linalg.norm(point - start) <= np.linalg.norm(point - end) else 1.0
-
-
 def _chained(loose: Sequence[Piece], reach: float) -> Closed:
     """Closed curves of pieces that are all part of one."""
     found = joined(loose, reach)
@@ -210,14 +176,13 @@ def _chained(loose: Sequence[Piece], reach: float) -> Closed:
 
 def _marked(loops: tuple[Loop, ...], mark: Piece) -> tuple[Loop, ...]:
     """The curves with the part under a line or arc named by its label."""
-    middle = Loop(
-        np.array([mark.start, mark.end]), np.array([mark.bulge, 0.0]), (mark.label, "")
-    ).along(0, 0.5)[0]  # fmt: skip
-    number, _, _, distance = nearest_piece(loops, middle)
-    off = [distance]
+    arc = Loop(np.array([mark.start, mark.end]), np.array([mark.bulge, 0.0]), (mark.label, ""))
+    middle = arc.along(0, 0.5)
+    number = int(np.argmin([loop.places(middle).distances[0] for loop in loops]))
     loop = loops[number]
+    off = [loop.places(middle).distances[0]]
     for point in (mark.start, mark.end):
-        _, which, fraction, distance = nearest_piece([loop], point)
+        (which,), (fraction,), (distance,) = loop.places(point[None])
         off.append(distance)
         loop = cut_at(loop, which, fraction)
     if max(off) > 0.01:
@@ -226,7 +191,7 @@ def _marked(loops: tuple[Loop, ...], mark: Piece) -> tuple[Loop, ...]:
             "every boundary; draw it on the boundary"
         )
     first, last = (corner_at(loop, point) for point in (mark.start, mark.end))
-    _, under, _, _ = nearest_piece([loop], middle)
+    under = loop.places(middle).pieces[0]
     names = list(loop.names)
     way = run_between(first, last, len(names))
     for which in way if under in way else run_between(last, first, len(names)):

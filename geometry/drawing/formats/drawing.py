@@ -19,12 +19,6 @@ UNITS = {
 }
 """Units of length, mm."""
 
-WORDS = {
-    **{"um": "micrometres", "mm": "millimetres", "cm": "centimetres", "dm": "decimetres", "m": "metres"},
-    **{"mil": "mils", "in": "inches", "ft": "feet", "yd": "yards"},
-}
-"""Names of units in sentences."""
-
 
 class Scale(NamedTuple):
     """Length of one unit of a file's coordinates, mm, with its name and where it comes from."""
@@ -36,6 +30,13 @@ class Scale(NamedTuple):
     def __str__(self) -> str:
         """In words, such as `mm (assumed)`."""
         return f"{self.name} ({self.origin})"
+
+
+class Mark(NamedTuple):
+    """A point of a file, such as a marker or the contact."""
+
+    label: str
+    centre: FloatArray  # (2,), mm
 
 
 @dataclass(frozen=True, eq=False)

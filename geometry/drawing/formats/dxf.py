@@ -1,21 +1,28 @@
 """Reads the curves of a DXF file. Its layers are the labels."""
 
+import logging
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import ezdxf
 import numpy as np
+from ezdxf import units as dxf_units
+from ezdxf.lldxf.const import DXFError
 
-from pinnray.geometry.drawing.formats.closed_loops import Marks
-from pinnray.geometry.drawing.formats.drawing import Drawing, label_of
+from pinnray.geometry.drawing.formats.closed_loops import assembled
+from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Mark, Scale, label_of
 from pinnray.geometry.drawing.formats.dxf_blocks import Walk, sound
-from pinnray.geometry.drawing.formats.dxf_file import document_of, dxf_scale
-from pinnray.geometry.drawing.formats.pieces import Curve, Piece, arc_through, arcs_along, full_circle, line
+from pinnray.geometry.drawing.formats.pieces import Piece, arcs_along, line
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
+
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else its notes go to the standard error
+
+HEADER_UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 9: "mil", 10: "yd", 13: "um", 14: "dm"}
+"""Units by `$INSUNITS` of the header."""
 
 WITHOUT_GEOMETRY = re.compile("TEXT|MTEXT|DIMENSION|(MULTI)?LEADER|HATCH|IMAGE|ATTDEF|ATTRIB|POINT")
 """Entities that show or annotate and bound nothing."""
@@ -33,74 +40,80 @@ def read_dxf(path: Path, units: str | None = None, tolerance: float | None = Non
         units: Unit of its coordinates; None means the header's, or mm if the header has none.
         tolerance: Largest gap between two ends that is closed, mm; None means 0.001 mm.
     """
-    document, repaired = document_of(path)
-    scale = dxf_scale(document, path, units)
-    marks, pieces, unit = Marks(), list[Piece](), min(scale.length, 1e4)
+    document = _document(path)
+    scale = _scale(document, path, units)
+    pieces, marks = list[Piece](), list[Mark]()
     for entity, shown in Walk(document):
         layer = label_of(shown)
         with sound(entity, shown):
-            if not marks.took(*_mark(entity, unit), layer):
-                pieces += _pieces(entity, layer, unit)
-    pieces = [piece.scaled(scale.length / unit) for piece in pieces]  # of miles and more, to be refused
-    return marks.drawing(pieces, scale, tolerance, f"DXF, {scale}{repaired}", unit=scale.length)
+            if entity.dxftype() == "POINT":
+                marks.append(Mark(layer, _flat([entity.dxf.location])[0] * scale.length))
+            else:
+                pieces += _pieces(entity, layer, scale.length)
+    return assembled(pieces, marks, scale, tolerance, f"DXF, {scale}", unit=scale.length)
 
 
-def _mark(entity: Any, unit: float) -> tuple[FloatArray | None, float]:
-    """Centre, mm, and diameter, mm, of a circle or a point; None for another entity."""
-    if entity.dxftype() == "POINT":
-        return _flat(entity.dxf.location) * unit, 0.0
-    if entity.dxftype() == "CIRCLE":
-        return _flat(_world(entity, entity.dxf.center)) * unit, 2 * entity.dxf.radius * unit
-    return None, 0.0
+def _document(path: Path) -> Any:
+    if not path.read_bytes().rstrip().endswith(b"EOF"):
+        raise UserError("it cannot be read as DXF: it does not end with EOF; export it again")
+    try:
+        return ezdxf.filemanagement.readfile(path)
+    except (DXFError, UnicodeDecodeError) as error:
+        reason = " ".join(str(error).split()).replace(str(path), path.name).rstrip(".")
+    except OSError:  # of ezdxf: it is no DXF file
+        reason = "it is none"
+    except Exception:  # a damaged file can make ezdxf raise anything
+        reason = "it is damaged"
+    raise UserError(f"it cannot be read as DXF: {reason}; export it again")
+
+
+def _scale(document: Any, path: Path, units: str | None) -> Scale:
+    """Unit of the coordinates: the given one, that of the header, or mm."""
+    if units:
+        return Scale(UNITS[units], units, "given")
+    # ezdxf says metres of a file without a header
+    number = document.header.get("$INSUNITS", 0) if b"$INSUNITS" in path.read_bytes() else 0
+    if not number:
+        return Scale()
+    if name := HEADER_UNITS.get(number):
+        return Scale(UNITS[name], name, "of the header")
+    raise UserError(
+        f"the unit of its header ($INSUNITS) is {number}, {dxf_units.unit_name(number)}; "
+        'give units = "mm" or another one'
+    )
 
 
 def _pieces(entity: Any, layer: str, unit: float) -> Iterator[Piece]:
+    """The lines and arcs of an entity, whose coordinates are in `unit` mm."""
     kind = entity.dxftype()
     if kind == "LINE":
-        yield line(_flat(entity.dxf.start), _flat(entity.dxf.end), layer).scaled(unit)
+        start, end = unit * _flat([entity.dxf.start, entity.dxf.end])
+        yield line(start, end, layer)
+        return
+    if kind == "CIRCLE":
+        points, cuts = entity.vertices, [0.0, 360.0]
     elif kind == "ARC":
-        first = np.radians(entity.dxf.start_angle)
-        sweep = np.radians((entity.dxf.end_angle - entity.dxf.start_angle) % 360) or 2 * np.pi
-        start, middle, end = (
-            _flat(_world(entity, entity.dxf.center + entity.dxf.radius * np.array([np.cos(a), np.sin(a), 0])))
-            for a in (first, first + sweep / 2, first + sweep)
-        )
-        if sweep > 2 * np.pi - 1e-9:
-            yield from full_circle(0.5 * (start + middle) * unit, entity.dxf.radius * unit, layer)
-        else:
-            yield arc_through(start, middle, end, layer).scaled(unit)
-    elif kind == "CIRCLE":
-        centre = _flat(_world(entity, entity.dxf.center))
-        yield from full_circle(centre * unit, entity.dxf.radius * unit, layer)
+        first = entity.dxf.start_angle
+        points, cuts = entity.vertices, [first, first + ((entity.dxf.end_angle - first) % 360 or 360)]
     elif kind == "ELLIPSE":
         first, last = entity.dxf.start_param, entity.dxf.end_param
-        last += 2 * np.pi if last <= first else 0.0
-
-        for piece in arcs_along(_flattened(entity.vertices), first, last, layer, unit):
-            yield piece.scaled(unit)
+        points, cuts = entity.vertices, [first, last + (2 * np.pi if last <= first else 0)]
     elif kind == "SPLINE":
         spline = entity.construction_tool()
-        knots = np.unique(spline.knots())
-        inside = knots[(knots >= spline.knots()[spline.order - 1]) & (knots <= spline.knots()[spline.count])]
-        for first, last in pairwise(inside.tolist()):
-            for piece in arcs_along(_flattened(spline.points), first, last, layer, unit):
-                yield piece.scaled(unit)
-    elif not WITHOUT_GEOMETRY.fullmatch(kind):
+        knots = np.array(spline.knots())
+        inside = (knots >= knots[spline.order - 1]) & (knots <= knots[spline.count])
+        points, cuts = spline.points, np.unique(knots[inside]).tolist()
+    elif WITHOUT_GEOMETRY.fullmatch(kind):
+        return
+    else:
         raise UserError(
             f"cannot read the {kind} on layer {layer!r}; draw the boundary by lines, "
             "arcs, circles, polylines, ellipses and splines, or freeze that layer"
         )
+    for first, last in pairwise(cuts):
+        yield from arcs_along(lambda parameters: unit * _flat(points(parameters)), first, last, layer)
 
 
-def _world(entity: Any, point: Any) -> Any:
-    """A point of an entity's own coordinate system in the drawing's."""
-    return entity.ocs().to_wcs(ezdxf.math.Vec3(point))
-
-
-def _flattened(points: Callable[[FloatArray], Iterable[Any]]) -> Curve:
-    """A curve in the plane from one in space."""
-    return lambda parameters: np.array([_flat(point) for point in points(parameters)])
-
-
-def _flat(point: Any) -> FloatArray:
-    return np.array([point[0], point[1]], dtype=np.float64)
+def _flat(points: Any) -> FloatArray:
+    """Points in space in the plane, shape (n, 2)."""
+    return np.array([(point[0], point[1]) for point in points], dtype=np.float64)

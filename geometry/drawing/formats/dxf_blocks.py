@@ -1,13 +1,11 @@
 """Walks through the visible entities of a DXF drawing, its blocks and polylines taken apart."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-import numpy as np
 from ezdxf.lldxf.const import DXFError
 
-from pinnray.geometry.drawing.formats.drawing import place
 from pinnray.runtime.errors import UserError
 
 MOST = 100_000
@@ -31,17 +29,14 @@ class Walk:
     def __init__(self, document: Any) -> None:
         self._document = document
         self._count = 0
-        self._hidden = {
-            layer.dxf.name.lower()
-            for layer in document.layers
-            if layer.is_off() or layer.is_frozen() or layer.dxf.name.lower() == "defpoints"
-        } | {"defpoints"}
         self._frozen = {layer.dxf.name.lower() for layer in document.layers if layer.is_frozen()}
+        off = {layer.dxf.name.lower() for layer in document.layers if layer.is_off()}
+        self._hidden = self._frozen | off | {"defpoints"}
 
     def __iter__(self) -> Iterator[Drawn]:
-        yield from self._shown(list(self._document.modelspace()), "0", ())
+        yield from self._shown(self._document.modelspace(), "0", ())
 
-    def _shown(self, entities: list[Any], around: str, within: tuple[str, ...]) -> Iterator[Drawn]:
+    def _shown(self, entities: Iterable[Any], around: str, within: tuple[str, ...]) -> Iterator[Drawn]:
         """Entities with their layers.
 
         Args:
@@ -50,53 +45,48 @@ class Walk:
             within: Names of the blocks that they are in.
         """
         for entity in entities:
-            own = layer_of(entity)
-            layer = around if own == "0" else own
-            if _is_invisible(entity):
+            kind, layer = entity.dxftype(), str(_attribute(entity, "layer", "0"))
+            layer = around if layer == "0" else layer
+            hidden = self._frozen if kind == "INSERT" else self._hidden
+            if _attribute(entity, "invisible", 0) or layer.lower() in hidden:
                 continue
-            if entity.dxftype() == "INSERT":
-                if layer.lower() not in self._frozen:
-                    yield from self._inserted(entity, layer, within)
-            elif layer.lower() in self._hidden:
-                continue
-            elif entity.dxftype() in ("LWPOLYLINE", "POLYLINE"):
+            if kind == "INSERT":
+                name = str(entity.dxf.get("name", ""))
+                yield from self._shown(self._parts(entity, layer, within), layer, (*within, name.lower()))
+            elif kind in ("LWPOLYLINE", "POLYLINE"):
                 with sound(entity, layer):
                     parts = list(entity.virtual_entities())
                 yield from self._shown(parts, layer, within)
             else:
                 yield Drawn(entity, layer)
 
-    def _inserted(self, entity: Any, layer: str, within: tuple[str, ...]) -> Iterator[Drawn]:
-        name = str(entity.dxf.get("name", ""))
-        block = entity.block()
-        remedy = "delete its insertion, or bind the external reference"
-        if block is None:
-            raise UserError(f"the block {name!r} is not in the file; {remedy}")
-        if block.block.is_xref:
+    def _parts(self, insert: Any, layer: str, within: tuple[str, ...]) -> list[Any]:
+        """The entities of all copies of a block that an insertion makes."""
+        name, block = str(insert.dxf.get("name", "")), insert.block()
+        if block is None or block.block.is_xref:
             raise UserError(
-                f"the block {name!r} is in the file {block.block.dxf.get('xref_path')!r}; {remedy}"
+                f"the block {name!r} is not in the file; delete its insertion, or bind the external reference"
             )
         if name.lower() in within:
             raise UserError(f"the block {name!r} is within itself; delete that insertion")
 
         def skipped(part: Any, reason: str) -> None:
-            if layer_of(part).lower() not in self._hidden:
+            if str(_attribute(part, "layer", "0")).lower() not in self._hidden:
                 raise UserError(
                     f"cannot place the {part.dxftype()} of the block {name!r}: {reason}; explode the block"
                 )
 
-        times = max(1, entity.dxf.get("row_count", 1)) * max(1, entity.dxf.get("column_count", 1))
+        times = max(1, insert.dxf.get("row_count", 1)) * max(1, insert.dxf.get("column_count", 1))
         self._count += times * (1 + len(block))
         if self._count > MOST:
             raise UserError(
                 f"its blocks make more than {MOST} entities, the last {name!r}; draw each curve once"
             )
-        with sound(entity, layer):
-            single = list(entity.multi_insert()) if times > 1 else [entity]
-            parts = [
-                part for each in single for part in each.virtual_entities(skipped_entity_callback=skipped)
+        with sound(insert, layer):
+            copies = insert.multi_insert() if times > 1 else [insert]
+            return [
+                part for each in copies for part in each.virtual_entities(skipped_entity_callback=skipped)
             ]
-        yield from self._shown(parts, layer, (*within, name.lower()))
 
 
 @contextmanager
@@ -110,33 +100,13 @@ def sound(entity: Any, layer: str) -> Iterator[None]:
         told = isinstance(error, DXFError | ValueError) and str(error)
         reason = str(error).splitlines()[0].rstrip(".") if told else "a value is missing or wrong"
         raise UserError(
-            f"the {entity.dxftype()}{_where(entity)} on layer {layer!r} is damaged: {reason}; draw it anew, "
+            f"a {entity.dxftype()} on layer {layer!r} is damaged: {reason}; draw it anew, "
             "or freeze that layer"
         ) from None
 
 
-def _is_invisible(entity: Any) -> bool:
+def _attribute(entity: Any, name: str, default: object) -> Any:
     try:
-        return bool(entity.dxf.get("invisible", 0))
+        return entity.dxf.get(name, default)
     except DXFError:  # of a kind that ezdxf does not know
-        return False
-
-
-def layer_of(entity: Any) -> str:
-    """The layer of an entity; `0`, the format's default, where it has none."""
-    try:
-        return str(entity.dxf.layer)
-    except DXFError:  # of a kind that ezdxf does not know
-        return "0"
-
-
-def _where(entity: Any) -> str:
-    """Place of an entity in words, as far as it says."""
-    for name in ("start", "center", "location", "insert"):
-        if entity.dxf.hasattr(name):
-            point = entity.dxf.get(name)
-            return f" at {place(np.array([point[0], point[1]]))}"
-    for name in ("control_points", "fit_points"):
-        for point in list(getattr(entity, name, ()))[:1]:
-            return f" at {place(np.array([point[0], point[1]]))}"
-    return ""
+        return default

@@ -1,6 +1,6 @@
 """Finds out which ends of pieces are one, and says where a boundary is open, forks or is drawn twice."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.drawing.formats.drawing import UNITS, WORDS, Scale, place
+from pinnray.geometry.drawing.formats.drawing import UNITS, Scale, place
 from pinnray.geometry.drawing.formats.pieces import FARTHEST, Piece, is_near
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
@@ -26,7 +26,7 @@ LARGEST = 2000.0
 """Largest extent of a section, mm."""
 
 USUAL = (10.0, 500.0)
-"""Extents of fingers, mm: a header that gives another one where mm give such a one is doubted."""
+"""Extents of fingers, mm. Where mm give such a one and the header's unit another, the unit must be given."""
 
 
 class Joined(NamedTuple):
@@ -68,7 +68,7 @@ def _clusters(points: FloatArray, pairs: IntArray) -> IntArray:
 def _matches(
     pieces: Sequence[Piece], nodes: IntArray, places: FloatArray, tolerance: float
 ) -> tuple[IntArray, FloatArray]:
-    """Pairs of nodes (k, 2) that are one: loose ends, with their distances, mm, then forks at loose ends."""
+    """Pairs of loose ends (k, 2) that are one, with their distances, mm."""
     loose = np.bincount(nodes.ravel(), minlength=len(places)) == 1
     own = {
         tuple(sorted(ends))
@@ -76,23 +76,16 @@ def _matches(
         if abs(piece.bulge) < 1
     }
     links, gaps, matched = list[IntArray](), list[float](), np.zeros(len(places), dtype=bool)
-    for pair, gap in _near(places, np.flatnonzero(loose), tolerance):
+    ends = np.flatnonzero(loose)
+    pairs = np.sort(ends[cKDTree(places[ends]).query_pairs(tolerance, output_type="ndarray")], axis=1)
+    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+    for which in np.argsort(apart, kind="stable"):  # the nearest first
+        pair, gap = pairs[which], float(apart[which])
         if not matched[pair].any() and tuple(pair.tolist()) not in own:
             links.append(pair)
             gaps.append(gap)
             matched[pair] = True
-    lengths = np.linalg.norm(places[nodes[:, 0]] - places[nodes[:, 1]], axis=1)
-    stray = loose & ~matched & np.isin(np.arange(len(places)), nodes[lengths > 10 * JOIN])
-    links += [pair for pair, _ in _near(places, np.arange(len(places)), JOIN) if stray[pair].any()]
     return np.array(links, dtype=np.int64).reshape(-1, 2), np.array(gaps)
-
-
-def _near(places: FloatArray, numbers: IntArray, reach: float) -> Iterator[tuple[IntArray, float]]:
-    """Pairs (2,) of nodes of some numbers within a distance, and their distances, mm; the nearest first."""
-    pairs = np.sort(numbers[cKDTree(places[numbers]).query_pairs(reach, output_type="ndarray")], axis=1)
-    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
-    for which in np.argsort(apart, kind="stable"):
-        yield pairs[which], float(apart[which])
 
 
 def check_extent(pieces: Sequence[Piece], scale: Scale) -> None:
@@ -100,28 +93,20 @@ def check_extent(pieces: Sequence[Piece], scale: Scale) -> None:
     if not pieces:
         raise UserError("there is no line or arc in it; draw the boundary of the section")
     ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
-    extent = float(np.ptp(ends, axis=0).max()) if np.isfinite(ends).all() else np.inf
+    if not is_near(ends):
+        raise UserError(
+            f"a coordinate is not finite or beyond {FARTHEST:g} mm, read in {scale}; draw near the origin"
+        )
+    extent = float(np.ptp(ends, axis=0).max())
     drawn = extent / scale.length
-    better = [
-        name
-        for low, high in (USUAL, (1.0, LARGEST))
-        for name in ("mm", "in", "cm", "m", "um")
-        if low <= drawn * UNITS[name] <= high
-    ]
-    other = f'; give units = "{better[0]}" for {drawn * UNITS[better[0]]:.4g} mm' if better else "; scale it"
-    said = WORDS.get(scale.name, scale.name)
-    if 1 <= extent <= LARGEST and is_near(ends):
-        doubted = scale.origin == "of the header" and USUAL[0] <= drawn <= USUAL[1]
-        if doubted and scale.length != 1 and not USUAL[0] / 2 <= extent <= USUAL[1]:
-            raise UserError(
-                f"its header says {said}, in which it measures {extent:.4g} mm{other}"
-                + (f', or units = "{scale.name}" if it is so' if scale.name in UNITS else "")
-            )
-        return
-    if 0 < drawn <= FARTHEST and not 1 <= extent <= LARGEST:
-        first = f"its header says {said}: " if scale.origin == "of the header" else ""
-        raise UserError(f"{first}the drawing measures {extent:.4g} mm, not 1 to {LARGEST:g} mm{other}")
-    raise UserError(f"a coordinate is not finite or beyond {FARTHEST:g} mm; draw the section near the origin")
+    usual = USUAL[0] / 2 <= extent <= USUAL[1] or not USUAL[0] <= drawn <= USUAL[1]
+    beyond = "" if 1 <= extent <= LARGEST else f", not 1 to {LARGEST:g} mm"
+    if beyond or (scale.origin == "of the header" and not usual):
+        other = "m" if scale.length == 1 else "mm"
+        raise UserError(
+            f"read in {scale} the drawing measures {extent:.4g} mm{beyond}; give its units: "
+            f'units = "{other}" makes it {drawn * UNITS[other]:.4g} mm'
+        )
 
 
 def check_twice(found: Joined) -> None:
@@ -154,16 +139,8 @@ def check_ends(found: Joined, tolerance: float) -> None:
     gaps = apart.min(axis=1)
     one = int(gaps.argmin())
     other = int(apart[one].argmin())
-    remedy = ""
-    if tolerance < gaps.max() <= LARGEST_TOLERANCE:
-        remedy = f"; tolerance = {_above(float(gaps.max())):g} (mm) closes it"
+    remedy = f", or give tolerance = {1.1 * gaps.max():.2g}" if gaps.max() <= LARGEST_TOLERANCE else ""
     raise UserError(
         f"the boundary is open at {place(loose[one])}: a gap of {gaps[one]:.4g} mm to the next end at "
-        f"{place(loose[other])}; ends join within {tolerance:.4g} mm{remedy}"
+        f"{place(loose[other])}; ends join within {tolerance:.4g} mm; close it{remedy}"
     )
-
-
-def _above(length: float) -> float:
-    """A round number a little above a length."""
-    step = 10.0 ** np.floor(np.log10(length) - 1)
-    return float(np.ceil(1.1 * length / step) * step)

@@ -2,33 +2,27 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import pairwise
+from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import gmsh
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator
 
 from pinnray.geometry.drawing.formats.closed_loops import Closed, closed_loops, straightened
 from pinnray.geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, Scale, label_of
-from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, line
+from pinnray.geometry.drawing.formats.pieces import Piece, line
 from pinnray.geometry.drawing.formats.planes import axes_across, plane_text
 from pinnray.geometry.mesh.mesher import session
+from pinnray.geometry.mesh.triangle_mesh import boundary_edges
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
 
-FACES = {
-    4: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]],
-    5: [[0, 1, 2, 3], [0, 1, 3], [0, 1, 4], [1, 2, 4]],
-    6: [[0, 1, 2], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [0, 2, 5, 3]],
-    8: [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
-}
-"""Faces of tetrahedra, pyramids, prisms and hexahedra, by the number of corners."""
+CORNERS = {15: 1, 1: 2, 2: 3, 4: 4}
+"""Corners of points, lines, triangles and tetrahedra of first order, by Gmsh's number of the type."""
 
-TRIANGLE = 2
-"""Gmsh's number of the triangle of first order."""
+TRIANGLE, TETRAHEDRON = 2, 4
 
 FLAT = 1e-4
 """Largest distance of a corner from the straight line that replaces it, and from a plane, mm."""
@@ -45,25 +39,18 @@ class RawMesh(NamedTuple):
     """Nodes and elements of a file."""
 
     points: FloatArray  # (n, 3), mm
-    cells: Mapping[int, IntArray]  # of the highest dimension by the number of corners, (k, corners) each
-    dimension: int  # 2 or 3
+    cells: IntArray  # tetrahedra (k, 4), or triangles (k, 3) of a file without them
     edges: Mapping[str, IntArray]  # of the physical curves by name, (k, 2) each
     nodes: Mapping[str, IntArray]  # of the physical points by name
-    bent: Mapping[tuple[int, int], list[int]]  # nodes along each bent side by its corners, the lesser first
-    parts: Mapping[str, IntArray]  # of the physical surfaces by name, rows of the triangles of first order
-
-    @property
-    def used(self) -> IntArray:
-        """Numbers of the nodes that are corners of an element."""
-        return np.asarray(np.unique(np.concatenate([cells.ravel() for cells in self.cells.values()])))
+    parts: Mapping[str, IntArray]  # of the physical surfaces by name, rows of the triangles
 
 
 def read_msh(path: Path, units: str | None = None, tolerance: float | None = None) -> Drawing:
-    """The section of a Gmsh mesh, of any version of the format.
+    """The section of a Gmsh mesh of triangles or tetrahedra of first order, of any version of the format.
 
-    A plane mesh gives its boundary, with the physical groups as labels; a triangle mesh with the groups
-    `base` (or `clamp`) and `contact` is kept as it is. The mesh of an extruded body gives the boundary of its
-    end face; sides in one line are joined. Bent sides of elements of higher order become arcs.
+    A plane mesh gives its boundary, with the physical groups as labels; one with the groups `base` (or
+    `clamp`) and `contact` is kept as it is. The mesh of an extruded body gives the boundary of its end face;
+    sides in one line are joined.
 
     Args:
         path: The file.
@@ -72,32 +59,30 @@ def read_msh(path: Path, units: str | None = None, tolerance: float | None = Non
     """
     scale = Scale(UNITS[units], units, "given") if units else Scale()
     raw = _raw(path, scale.length)
-    drawing = _plane_mesh if raw.dimension == 2 else _extruded_mesh
+    drawing = _plane_mesh if raw.cells.shape[1] == 3 else _extruded_mesh
     return drawing(raw, lambda pieces: closed_loops(pieces, scale=scale, tolerance=tolerance), scale.length)
 
 
 def _plane_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
-    extent = np.ptp(raw.points[raw.used], axis=0)
+    used, triangles = np.unique(raw.cells, return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    extent = np.ptp(raw.points[used], axis=0)
     across = int(extent.argmin())
     if extent[across] > FLAT:
         raise UserError("its surface is not plane; give a mesh of a plane section or of a solid")
-    axes = axes_across(np.eye(3)[across])
-    points = raw.points @ axes.T
+    points = raw.points @ axes_across(np.eye(3)[across]).T
     groups = sorted(raw.edges, key=lambda name: name in ("base", "contact"))  # these win over `front`
     named = {tuple(sorted(edge)): name for name in groups for edge in raw.edges[name].tolist()}
-    sides = [edge for count, cells in raw.cells.items() for edge in _sides(cells, count)]
-    pieces = [piece for side in _once(sides) for piece in _pieces(raw, points, side, named.get(side, ""))]
-    loops, gaps = close(pieces)
-    markers = raw.nodes.get("markers", np.empty(0, dtype=np.int64))
-    contact = raw.nodes.get("contact", np.empty(0, dtype=np.int64))
+    sides = np.sort(boundary_edges(raw.cells), axis=1)
+    loops, gaps = close([line(points[a], points[b], named.get((a, b), "")) for a, b in sides.tolist()])
+    contact = raw.nodes.get("contact")
     ready = None
-    if set(raw.cells) == {3} and {"base", "contact"} <= set(raw.edges) and not raw.bent:
-        used, triangles = np.unique(raw.cells[3], return_inverse=True)
+    if {"base", "contact"} <= set(raw.edges):
         number = np.full(len(points), -1)
         number[used] = np.arange(len(used))
         ready = MeshInFile(
             points=points[used],
-            triangles=triangles.reshape(-1, 3),
+            triangles=triangles,
             edges={name: number[edges] for name, edges in raw.edges.items()},
             parts=raw.parts,
         )
@@ -105,38 +90,35 @@ def _plane_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
         loops=tuple(straightened(loop, FLAT) for loop in loops),
         unit=unit,
         note=f"MSH, {'triangles as they are' if ready else 'boundary of a plane mesh'}{gaps}",
-        markers=points[markers],
-        contact=points[contact[0]] if len(contact) else None,
+        markers=points[raw.nodes.get("markers", np.empty(0, dtype=np.int64))],
+        contact=None if contact is None else points[contact[0]],
         mesh=ready,
     )
 
 
 def _extruded_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
-    faces = _once(
-        [part for count, cells in raw.cells.items() for face in FACES[count] for part in _rows(cells, face)]
-    )
-    if not faces:
+    faces = np.concatenate([raw.cells[:, corners] for corners in combinations(range(4), 3)])
+    _, first, times = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    faces = faces[np.sort(first[times == 1])]
+    if not len(faces):
         raise UserError("its elements have no outer face; is each there twice?")
-    normals, areas = _normals(raw.points, faces)
-    volume = _volume(raw)
+    across = np.cross(*(raw.points[faces[:, corner]] - raw.points[faces[:, 0]] for corner in (1, 2)))
+    length = np.linalg.norm(across, axis=1)
+    normals, areas = across / np.where(length > 0, length, 1)[:, None], length / 2
+    corners = raw.points[raw.cells]
+    volume = float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum()) / 6
     for normal in _main_directions(normals, areas):
-        slope, heights = np.abs(normals @ normal), raw.points @ normal
-        low, high = float(heights[raw.used].min()), float(heights[raw.used].max())
-        caps = [
-            [
-                number
-                for number, face in enumerate(faces)
-                if slope[number] > 0.999 and np.abs(heights[list(face)] - end).max() < FLAT
-            ]
-            for end in (low, high)
-        ]
-        area = float(areas[caps[0]].sum())
-        same = abs(areas[caps[1]].sum() - area) <= SAME * area
-        if not (area and same and abs(area * (high - low) - volume) <= SAME * volume):
+        heights = raw.points @ normal
+        low, high = (float(end) for end in (heights[raw.cells].min(), heights[raw.cells].max()))
+        flat = np.abs(normals @ normal) > 0.999
+        caps = [flat & (np.abs(heights[faces] - end).max(axis=1) < FLAT) for end in (low, high)]
+        area, other = (float(areas[cap].sum()) for cap in caps)
+        fits = abs(other - area) <= SAME * area and abs(area * (high - low) - volume) <= SAME * volume
+        if not (area and fits):
             continue
         points = raw.points @ axes_across(normal).T
-        sides = [side for which in caps[0] for side in _sides(np.array([faces[which]]), len(faces[which]))]
-        loops, gaps = close([piece for side in _once(sides) for piece in _pieces(raw, points, side, "")])
+        sides = np.sort(boundary_edges(faces[caps[0]]), axis=1)
+        loops, gaps = close([line(points[a], points[b], "") for a, b in sides.tolist()])
         return Drawing(
             loops=tuple(straightened(loop, FLAT) for loop in loops),
             unit=unit,
@@ -144,18 +126,6 @@ def _extruded_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
             depth=high - low,
         )
     raise UserError("its body is not extruded; give a mesh of the plane section")
-
-
-def _pieces(raw: RawMesh, points: FloatArray, side: tuple[int, ...], label: str) -> list[Piece]:
-    """A side of an element in the plane: a line, the arc through three nodes, or arcs through more."""
-    first, last = side
-    if (first, last) not in raw.bent:
-        return [line(points[first], points[last], label)]
-    nodes = points[[first, *raw.bent[first, last], last]]
-    if len(nodes) == 3:
-        return [arc_through(nodes[0], nodes[1], nodes[2], label)]
-    curve = BarycentricInterpolator(np.linspace(0, 1, len(nodes)), nodes)
-    return list(arcs_along(lambda parameters: np.asarray(curve(parameters)), 0.0, 1.0, label))
 
 
 def _main_directions(normals: FloatArray, areas: FloatArray) -> list[FloatArray]:
@@ -167,101 +137,35 @@ def _main_directions(normals: FloatArray, areas: FloatArray) -> list[FloatArray]
     return [rounded[first[which]] for which in order]
 
 
-def _normals(points: FloatArray, faces: Sequence[tuple[int, ...]]) -> tuple[FloatArray, FloatArray]:
-    """Unit normals (f, 3) and areas (f,) of triangles and quadrilaterals."""
-    corners = points[np.array([[*face, face[-1]][:4] for face in faces])]
-    cross = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])  # of the diagonals
-    length = np.linalg.norm(cross, axis=1)
-    return cross / np.where(length > 0, length, 1)[:, None], length / 2
-
-
-def _volume(raw: RawMesh) -> float:
-    """Volume of the solid elements, mm^3, each taken as convex."""
-    volume = 0.0
-    for count, cells in raw.cells.items():
-        middle = raw.points[cells].mean(axis=1)
-        for face in FACES[count]:
-            for second, third in pairwise(face[1:]):
-                corners = [raw.points[cells[:, which]] - middle for which in (face[0], second, third)]
-                volume += float(np.abs(np.linalg.det(np.stack(corners, axis=1))).sum()) / 6
-    return volume
-
-
-def _sides(cells: IntArray, corners: int) -> list[tuple[int, ...]]:
-    """Edges of triangles or quadrilaterals (k, corners)."""
-    return [side for which in range(corners) for side in _rows(cells, [which, (which + 1) % corners])]
-
-
-def _rows(cells: IntArray, corners: list[int]) -> list[tuple[int, ...]]:
-    return list(map(tuple, cells[:, corners].tolist()))
-
-
-def _once(parts: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Edges or faces that belong to one element only, edges with their nodes sorted."""
-    times: dict[tuple[int, ...], int] = {}
-    first: dict[tuple[int, ...], tuple[int, ...]] = {}
-    for part in parts:
-        key = tuple(sorted(part))
-        times[key] = times.get(key, 0) + 1
-        first.setdefault(key, part)
-    return [key if len(key) == 2 else first[key] for key, count in times.items() if count == 1]
-
-
 def _raw(path: Path, unit: float) -> RawMesh:
     with _opened(path) as mesh:
+        for kind in mesh.getElementTypes():
+            if kind not in CORNERS:
+                name = mesh.getElementProperties(kind)[0]
+                raise UserError(
+                    f"it holds elements of type {name}; there may be triangles and tetrahedra of first order"
+                )
         tags, coordinates, _ = mesh.getNodes()
         number = np.full(int(tags.max(initial=0)) + 1, -1)
         number[tags.astype(np.int64)] = np.arange(len(tags))
-        points = unit * coordinates.reshape(-1, 3)
-        by_dimension: dict[int, dict[int, list[IntArray]]] = {2: {}, 3: {}}
-        bent = dict[tuple[int, int], list[int]]()
-        for dimension in (2, 3):
-            for kind in mesh.getElementTypes(dimension):
-                name, _, order, whole, _, corners = mesh.getElementProperties(kind)
-                if corners not in ((3, 4) if dimension == 2 else FACES):
-                    raise UserError(f"it holds elements of type {name}, which cannot be read")
-                _, nodes = mesh.getElementsByType(kind)
-                cells = _numbers(number, nodes.reshape(-1, int(whole))[:, :corners])
-                by_dimension[dimension].setdefault(int(corners), []).append(cells)
-                if order > 1:
-                    sides = mesh.getElementEdgeNodes(kind).reshape(-1, int(order) + 1)
-                    bent |= _bent(points, _numbers(number, sides))
-        dimension = 3 if by_dimension[3] else 2
-        if not by_dimension[dimension]:
-            raise UserError("it holds no triangles, quadrilaterals or solid elements")
-        return RawMesh(
-            points=points,
-            bent=bent,
-            cells={count: np.concatenate(parts) for count, parts in by_dimension[dimension].items()},
-            dimension=dimension,
-            edges={name: _numbers(number, nodes.reshape(-1, 2)) for name, nodes in _groups(1)},
-            nodes={name: _numbers(number, nodes.ravel()) for name, nodes in _groups(0)},
-            parts=_parts(mesh),
+        tetrahedra, (triangle_tags, triangles) = (
+            mesh.getElementsByType(kind) for kind in (TETRAHEDRON, TRIANGLE)
         )
-
-
-def _parts(mesh: Any) -> dict[str, IntArray]:
-    """Rows, among the triangles of first order, of those of every named physical surface."""
-    tags, _ = mesh.getElementsByType(TRIANGLE)
-    order = np.argsort(tags)
-    parts: dict[str, list[IntArray]] = {}
-    for _, group in gmsh.model.getPhysicalGroups(2):
-        name = label_of(gmsh.model.getPhysicalName(2, group))
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(2, group):
-            own, _ = mesh.getElementsByType(TRIANGLE, int(entity))
-            parts.setdefault(name, []).append(order[np.searchsorted(tags, own, sorter=order)])
-    return {name: np.concatenate(rows) for name, rows in parts.items() if name}
-
-
-def _bent(points: FloatArray, sides: IntArray) -> dict[tuple[int, int], list[int]]:
-    """Inner nodes of the sides (k, order + 1), corners first, that are more than `FLAT` off their chord."""
-    start, end = points[sides[:, 0]], points[sides[:, 1]]
-    shares = np.arange(1, sides.shape[1] - 1) / (sides.shape[1] - 1)
-    off = points[sides[:, 2:]] - (start[:, None] + shares[:, None] * (end - start)[:, None])
-    found = {}
-    for first, last, *inner in sides[np.linalg.norm(off, axis=2).max(axis=1) > FLAT].tolist():
-        found[min(first, last), max(first, last)] = inner if first < last else inner[::-1]
-    return found
+        order = np.argsort(triangle_tags)
+        cells = tetrahedra[1].reshape(-1, 4) if len(tetrahedra[1]) else triangles.reshape(-1, 3)
+        if not len(cells):
+            raise UserError("it holds neither triangles nor tetrahedra")
+        return RawMesh(
+            points=unit * coordinates.reshape(-1, 3),
+            cells=_numbers(number, cells),
+            edges={name: _numbers(number, nodes) for name, (_, nodes) in _groups(1, 1)},
+            nodes={name: _numbers(number, nodes.ravel()) for name, (_, nodes) in _groups(0, 15)},
+            parts={
+                name: order[np.searchsorted(triangle_tags, own, sorter=order)]
+                for name, (own, _) in _groups(2, TRIANGLE)
+                if name
+            },
+        )
 
 
 def _numbers(number: IntArray, tags: IntArray) -> IntArray:
@@ -272,17 +176,17 @@ def _numbers(number: IntArray, tags: IntArray) -> IntArray:
     return np.asarray(number[tags])
 
 
-def _groups(dimension: int) -> Iterator[tuple[str, IntArray]]:
-    """Known physical groups of curves or points: name and node tags of the elements' corners."""
-    found: dict[str, list[IntArray]] = {}
-    for _, tag in gmsh.model.getPhysicalGroups(dimension):
-        label = label_of(gmsh.model.getPhysicalName(dimension, tag))
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
-            for kind, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity)[::2], strict=True):
-                whole = int(gmsh.model.mesh.getElementProperties(kind)[3])
-                corners = nodes.astype(np.int64).reshape(-1, whole)[:, : dimension + 1]
-                found.setdefault(LABELS.get(label, label), []).append(corners)
-    return ((name, np.concatenate(parts)) for name, parts in found.items())
+def _groups(dimension: int, kind: int) -> Iterator[tuple[str, tuple[IntArray, IntArray]]]:
+    """Physical groups: name, tags of the elements of a type, and those of their nodes (k, corners)."""
+    found: dict[str, list[tuple[IntArray, IntArray]]] = {}
+    for _, group in gmsh.model.getPhysicalGroups(dimension):
+        label = label_of(gmsh.model.getPhysicalName(dimension, group))
+        label = label if dimension == 2 else LABELS.get(label, label)
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
+            own, nodes = gmsh.model.mesh.getElementsByType(kind, int(entity))
+            found.setdefault(label, []).append((own, nodes.reshape(-1, CORNERS[kind])))
+    for name, parts in found.items():
+        yield name, tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
 
 
 @contextmanager

@@ -12,6 +12,9 @@ from pinnray.runtime.arrays import FloatArray
 DEVIATION = 1e-3
 """Largest distance of the arcs from the ellipse or spline for which they stand, mm."""
 
+HALF_CIRCLE = 1 + 1e-9
+"""Largest bulge of an arc that stands for a part of a curve."""
+
 PROBES = np.linspace(0, 1, 17)[1:-1]
 
 FARTHEST = 1e7
@@ -22,16 +25,12 @@ Curve = Callable[[FloatArray], FloatArray]
 
 
 class Piece(NamedTuple):
-    """A line or an arc."""
+    """A line or an arc, mm."""
 
     start: FloatArray  # (2,)
     end: FloatArray  # (2,)
     bulge: float  # tangent of a quarter of the arc's angle, positive to the left; zero for a line
     label: str  # name of the layer, group, part or physical group; empty without one
-
-    def scaled(self, factor: float) -> "Piece":
-        """The piece with every length times a factor."""
-        return Piece(factor * self.start, factor * self.end, self.bulge, self.label)
 
 
 def line(start: ArrayLike, end: ArrayLike, label: str) -> Piece:
@@ -39,63 +38,48 @@ def line(start: ArrayLike, end: ArrayLike, label: str) -> Piece:
     return Piece(np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64), 0.0, label)
 
 
-def arc_through(start: ArrayLike, middle: ArrayLike, end: ArrayLike, label: str) -> Piece:
-    """The arc with two ends through a point at half of its length."""
-    first, half, last = (np.asarray(point, dtype=np.float64) for point in (start, middle, end))
-    return Piece(first, last, _bulge(first, half, last), label)
-
-
-def full_circle(centre: ArrayLike, radius: float, label: str) -> list[Piece]:
-    """A full circle as two arcs, counter-clockwise."""
-    middle = np.asarray(centre, dtype=np.float64)
-    along = np.array([radius, 0.0])
-    right, left = middle + along, middle - along
-    return [Piece(right, left, 1.0, label), Piece(left, right, 1.0, label)]
-
-
-def arcs_along(curve: Curve, first: float, last: float, label: str, unit: float = 1.0) -> Iterator[Piece]:
+def arcs_along(curve: Curve, first: float, last: float, label: str) -> Iterator[Piece]:
     """Arcs through three points of a curve each, halved until none is more than `DEVIATION` off.
 
-    A curve beyond `FARTHEST` gives one line to a point out there, which the reader refuses.
+    An arc of a circle is exact, of at most half of it. A curve beyond `FARTHEST` gives one line to a point
+    out there, which the reader refuses.
 
     Args:
-        curve: The curve, in units of `unit` mm.
+        curve: The curve, mm.
         first: Parameter of its start.
         last: Parameter of its end.
         label: Label of the pieces.
-        unit: Length of one unit of the curve, mm.
     """
     with np.errstate(all="ignore"):  # of what has no finite coordinates
         ends = curve(np.array([first, last]))
         between = curve(first + PROBES * (last - first))
     for point in (*ends, *between):
-        if not is_near(point, unit):
+        if not is_near(point):
             yield line(ends[0], point, label)
             return
     closed = bool(np.linalg.norm(ends[1] - ends[0]) < 1e-9 * max(1.0, float(np.abs(ends).max())))
-    cuts = np.linspace(first, last, 5 if closed else 2)
+    cuts = np.linspace(first, last, 3 if closed else 2)
     for start, end in pairwise(cuts.tolist()):
-        yield from _halved(curve, start, end, label, 0.8 * DEVIATION / unit, 0)
+        yield from _halved(curve, start, end, label, 0)
 
 
-def is_near(points: FloatArray, unit: float = 1.0) -> bool:
-    """Whether all coordinates, of `unit` mm each, are finite and at most `FARTHEST`."""
-    return bool((np.abs(points) <= FARTHEST / unit).all())
+def is_near(points: FloatArray) -> bool:
+    """Whether all coordinates are finite and at most `FARTHEST`, mm."""
+    return bool((np.abs(points) <= FARTHEST).all())
 
 
-def _halved(
-    curve: Curve, first: float, last: float, label: str, deviation: float, level: int
-) -> Iterator[Piece]:
-    start, middle, end = curve(np.array([first, 0.5 * (first + last), last]))
+def _halved(curve: Curve, first: float, last: float, label: str, level: int) -> Iterator[Piece]:
+    half = 0.5 * (first + last)
+    start, middle, end = curve(np.array([first, half, last]))
     bulge = _bulge(start, middle, end)
-    if abs(bulge) < 1 and _deviation(start, end, bulge, curve(first + PROBES * (last - first))) <= deviation:
+    off = _deviation(start, end, bulge, curve(first + PROBES * (last - first)))
+    if abs(bulge) < HALF_CIRCLE and off <= 0.8 * DEVIATION:
         yield Piece(start, end, bulge, label)
     elif level == 24:  # halvings
         yield line(start, end, label)
     else:
-        half = 0.5 * (first + last)
-        yield from _halved(curve, first, half, label, deviation, level + 1)
-        yield from _halved(curve, half, last, label, deviation, level + 1)
+        yield from _halved(curve, first, half, label, level + 1)
+        yield from _halved(curve, half, last, label, level + 1)
 
 
 def _bulge(start: FloatArray, middle: FloatArray, end: FloatArray) -> float:

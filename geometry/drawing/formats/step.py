@@ -15,7 +15,7 @@ from OCP.GeomLProp import GeomLProp_SLProps
 
 from pinnray.geometry.drawing.formats.closed_loops import closed_loops
 from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Scale
-from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
+from pinnray.geometry.drawing.formats.pieces import Piece, arcs_along, line
 from pinnray.geometry.drawing.formats.planes import axes_across, plane_of, plane_text
 from pinnray.geometry.drawing.formats.step_parts import parts_of
 from pinnray.runtime.arrays import FloatArray
@@ -61,7 +61,7 @@ def read_step(
     cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
     axes = axes_across(cut.normal)
     pieces = [
-        piece.scaled(unit)
+        piece
         for face in _united(cut.faces)
         for wire in face.Wires()
         for edge in wire.Edges()
@@ -109,7 +109,13 @@ def _across(solid: cq.Solid) -> Cut:
         middle = _cut_at(solid, normal, 0.5 * (low + high))
         area = sum(face.Area() for face in middle.faces)
         for offset in (low, high):  # a cap has the edges of the file
-            cap = [face for face in _flat_faces(solid, normal) if abs(_offset(face, normal) - offset) < 1e-6]
+            cap = [
+                face
+                for face in solid.Faces()
+                if face.geomType() == "PLANE"
+                and np.linalg.norm(np.cross(_array(face.normalAt()), normal)) < PARALLEL
+                and abs(float(_array(face.Center()) @ normal) - offset) < 1e-6
+            ]
             if abs(sum(face.Area() for face in cap) - area) < 1e-7 * area:
                 return Cut(cap, normal, offset, high - low)
         if area * (high - low) > 0.5 * solid.Volume():
@@ -132,10 +138,7 @@ def _directions(solid: cq.Solid) -> list[FloatArray]:
 def _is_extruded(solid: cq.Solid, normal: FloatArray) -> bool:
     """Whether every face is parallel to the direction `normal`, or plane and across it."""
     for face in solid.Faces():
-        if face.geomType() == "PLANE":
-            slopes = [abs(float(_array(face.normalAt()) @ normal))]
-        else:
-            slopes = [abs(float(each @ normal)) for each in _normals(face)]
+        slopes = [abs(float(each @ normal)) for each in _normals(face)]
         if slopes and not (max(slopes) < PARALLEL or min(slopes) > 1 - PARALLEL):
             return False
     return True
@@ -162,8 +165,7 @@ def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
         )
     size = 4 * solid.BoundingBox().DiagonalLength + abs(offset)
     plane = cq.Face.makePlane(size, size, cq.Vector(*(normal * offset)), cq.Vector(*normal))
-    box = solid.BoundingBox()
-    middle = np.array([0.5 * (box.xmin + box.xmax), 0.5 * (box.ymin + box.ymax), 0.5 * (box.zmin + box.zmax)])
+    middle = _array(solid.BoundingBox().center)
     shift = middle - normal * (middle @ normal)
     faces = plane.moved(cq.Location(cq.Vector(*shift))).intersect(solid).Faces()
     if not faces:
@@ -173,34 +175,11 @@ def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
     return Cut(faces, normal, offset, high - low, _is_extruded(solid, normal))
 
 
-def _flat_faces(solid: cq.Solid, normal: FloatArray) -> list[cq.Face]:
-    return [
-        face
-        for face in solid.Faces()
-        if face.geomType() == "PLANE" and np.linalg.norm(np.cross(_array(face.normalAt()), normal)) < PARALLEL
-    ]
-
-
-def _offset(face: cq.Face, normal: FloatArray) -> float:
-    return float(_array(face.Center()) @ normal)
-
-
 def _extent(solid: cq.Solid, normal: FloatArray) -> tuple[float, float]:
     """Where the solid begins and ends along a direction, mm."""
-    flat = [_offset(face, normal) for face in _flat_faces(solid, normal)]
-    box = _turned(solid, normal).BoundingBox(1e-4)
-    low, high = float(box.zmin), float(box.zmax)
-    near = (
-        [offset for offset in flat if offset - low < 1e-3],
-        [offset for offset in flat if high - offset < 1e-3],
-    )
-    return min(near[0], default=low), max(near[1], default=high)
-
-
-def _turned(solid: cq.Solid, normal: FloatArray) -> cq.Shape:
-    """The solid in a frame whose z axis is `normal`."""
     plane = cq.Plane(origin=(0, 0, 0), xDir=tuple(axes_across(normal)[0]), normal=tuple(normal))
-    return solid.moved(cq.Location(plane).inverse)
+    box = solid.moved(cq.Location(plane).inverse).BoundingBox()
+    return float(box.zmin), float(box.zmax)
 
 
 def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
@@ -208,18 +187,14 @@ def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
     first, last = edge._bounds()
 
     def on_edge(parameters: FloatArray) -> FloatArray:
-        return np.array([_array(edge.positionAt(float(t), mode="parameter")) for t in parameters]) @ axes.T
+        points = [_array(edge.positionAt(float(t), mode="parameter")) for t in parameters]
+        return unit * (np.array(points) @ axes.T)
 
-    start, middle, end = on_edge(np.array([first, 0.5 * (first + last), last]))
     if edge.geomType() == "LINE":
+        start, end = on_edge(np.array([first, last]))
         yield line(start, end, "")
-    elif edge.geomType() == "CIRCLE":
-        if edge.IsClosed():
-            yield from full_circle(axes @ _array(edge.arcCenter()), edge.radius(), "")
-        else:
-            yield arc_through(start, middle, end, "")
     else:
-        yield from arcs_along(on_edge, first, last, "", unit)
+        yield from arcs_along(on_edge, first, last, "")
 
 
 def _discs(

@@ -16,16 +16,12 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from pinnray.runtime.errors import UserError
 
 MARKER = re.compile(r"markers?([-_ .:]?\d+)*(\s*[(<]\d+[)>])?$", re.IGNORECASE)
 """Names of the parts that are markers: also `marker-1:1` of Fusion, `marker-1<2>` of SolidWorks."""
-
-MOST = 10_000
-"""Largest number of placed parts."""
 
 
 class Part(NamedTuple):
@@ -69,14 +65,7 @@ def parts_of(path: Path) -> list[Part]:
         raise UserError("it cannot be read as STEP: it holds no shape; export the body as a solid")
     roots = TDF_LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
-    parts: list[Part] = []
-    for root in roots:
-        for part in _placed(root, gp_Trsf(), ()):
-            parts.append(part)
-            if len(parts) > MOST:
-                raise UserError(
-                    f"its assemblies place more than {MOST} parts; export the body and its markers"
-                )
+    parts = [part for root in roots for part in _placed(root, gp_Trsf(), ())]
     if not parts:
         raise UserError("it holds no solid; export the body as a solid")
     return parts
@@ -108,9 +97,8 @@ def _placed(label: TDF_Label, around: gp_Trsf, within: tuple[str, ...]) -> Itera
 
 
 def _moved(solid: cq.Solid, place: gp_Trsf) -> cq.Shape:
-    if place.IsNegative() or abs(place.ScaleFactor() - 1) > 1e-12:  # of a mirrored or scaled part
-        return cq.Shape.cast(BRepBuilderAPI_Transform(solid.wrapped, place, True).Shape())
-    return cq.Shape.cast(solid.wrapped.Moved(TopLoc_Location(place)))
+    """A solid moved; the copy may be mirrored or scaled."""
+    return cq.Shape.cast(BRepBuilderAPI_Transform(solid.wrapped, place, True).Shape())
 
 
 def _name(label: TDF_Label) -> str:

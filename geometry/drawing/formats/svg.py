@@ -1,6 +1,7 @@
 """Reads the curves of an SVG file. The names of its groups and elements are the labels."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -9,10 +10,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import svgelements
 
-from pinnray.geometry.drawing.formats.closed_loops import Marks
+from pinnray.geometry.drawing.formats.closed_loops import assembled
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, label_of
-from pinnray.geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, full_circle, line
-from pinnray.geometry.drawing.formats.svg_tree import NAMESPACE, drawn, svg_scale, tag_of
+from pinnray.geometry.drawing.formats.pieces import Piece, arcs_along, line
+from pinnray.geometry.drawing.formats.svg_tree import drawn, svg_scale, tag_of
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 
@@ -35,51 +36,31 @@ def read_svg(path: Path, units: str | None = None, tolerance: float | None = Non
         units: Unit of the user space; None means by `width`, `height` and `viewBox`, or pixels without them.
         tolerance: Largest gap between two ends that is closed, mm; None means 0.001 mm.
     """
-    tree = None
     try:
         root = ET.parse(path).getroot()
         if (tag := tag_of(root)) != "svg":
             raise UserError(f"its outermost element is {tag or root.tag}, not svg")
         scale = svg_scale(root, units)
-        tree = drawn(root)
-        parsed = svgelements.SVG.parse(BytesIO(ET.tostring(tree)), reify=False)
-        back = ~svgelements.Matrix(parsed.viewbox_transform or "")
-    except (OSError, ET.ParseError, ValueError, UnicodeDecodeError) as error:
-        raise UserError(f"it cannot be read as SVG: {error or _unsound(tree)}") from None
+        parsed = svgelements.SVG.parse(BytesIO(ET.tostring(drawn(root))), reify=False)
+        upward = svgelements.Matrix(scale.length, 0, 0, -scale.length, 0, 0)
+        place = ~svgelements.Matrix(parsed.viewbox_transform or "") * upward
+        pieces = [
+            piece
+            for element, label in _shapes(parsed, "")
+            for piece in _pieces(element.segments(transformed=False), label, element.transform * place)
+        ]
+    except (ET.ParseError, UserError) as error:
+        raise UserError(f"it cannot be read as SVG: {error}") from None
     except RecursionError:
-        raise UserError("it cannot be read as SVG: it is nested too deeply") from None
-    except (ArithmeticError, AttributeError, LookupError, TypeError):  # of svgelements, at what is no SVG
-        raise UserError(f"it cannot be read as SVG: {_unsound(tree)}") from None
-    marks, pieces = Marks(), list[Piece]()
-    for element, label in _shapes(parsed, ""):
-        place = _Transformation(element.transform * back, scale.length)
-        if not place.is_finite:
-            raise UserError(f"the transformation of {_described(element)} is not finite")
-        try:
-            if not marks.took(*_mark(element, place), label):
-                pieces += _pieces(element.segments(transformed=False), label, place)
-        except TypeError:  # svgelements reads a coordinate that is no number as None
-            raise UserError(f"a coordinate of {_described(element)} is no number") from None
+        raise UserError(
+            "it cannot be read as SVG: an element contains itself, or is nested too deeply"
+        ) from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):  # of svgelements
+        raise UserError(
+            "it cannot be read as SVG: the value of an attribute is missing or no number"
+        ) from None
     said = {"given": " (given)", "assumed": f" {ASSUMED}"}.get(scale.origin, "")
-    return marks.drawing(pieces, scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
-
-
-def _unsound(tree: ET.Element | None) -> str:
-    """The attribute that svgelements cannot read, in words, as far as it is a path's."""
-    for path in () if tree is None else tree.iter(f"{NAMESPACE}path"):
-        try:
-            svgelements.Path(path.get("d", ""))
-        except Exception:  # of svgelements
-            name = repr(path.get("id")) if path.get("id") else "a path without an id"
-            return f"the attribute d of {name} has no sound value"
-    return "an attribute has no sound value"
-
-
-def _described(element: Any) -> str:
-    if element.id:
-        return f"the element {element.id!r}"
-    kind = type(element).__name__.lower()
-    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} without an id"
+    return assembled(pieces, [], scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
 
 
 def _shapes(group: Any, label: str) -> Iterator[tuple[Any, str]]:
@@ -100,54 +81,21 @@ def _name(element: Any) -> str:
     return ""
 
 
-class _Transformation:
-    """From an element's own coordinates into the drawing's, mm, y upward."""
-
-    def __init__(self, matrix: Any, unit: float) -> None:
-        flip = np.array([[unit, 0.0], [0.0, -unit]])
-        self._matrix = flip @ np.array([[matrix.a, matrix.c], [matrix.b, matrix.d]])
-        self._shift = flip @ np.array([matrix.e, matrix.f])
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether it has neither an infinite number nor none."""
-        return bool(np.isfinite(self._matrix).all() and np.isfinite(self._shift).all())
-
-    @property
-    def scale(self) -> float | None:
-        """Length of a unit, mm; None if circles do not stay circles."""
-        low, high = sorted(np.linalg.svd(self._matrix, compute_uv=False))
-        return float(high) if high - low <= 1e-9 * high else None
-
-    def __call__(self, point: Any) -> FloatArray:
-        """A point in the drawing, shape (2,), mm."""
-        return np.asarray(self._matrix @ [float(point[0]), float(point[1])] + self._shift)
-
-    def along(self, segment: Any) -> Callable[[FloatArray], FloatArray]:
-        """Points of a segment at parameters from 0 to 1."""
-        return lambda parameters: np.array([self(segment.point(float(t))) for t in parameters])
-
-
-def _mark(shape: Any, place: _Transformation) -> tuple[FloatArray | None, float]:
-    """Centre and diameter of a circle, mm; None for another shape."""
-    if not isinstance(shape, svgelements.Circle | svgelements.Ellipse) or not place.scale:
-        return None, 0.0
-    if abs(shape.rx - shape.ry) > 1e-9 * shape.rx:
-        return None, 0.0
-    return place((shape.cx, shape.cy)), 2 * float(shape.rx) * place.scale
-
-
-def _pieces(segments: Iterable[Any], label: str, place: _Transformation) -> Iterator[Piece]:
+def _pieces(segments: Iterable[Any], label: str, matrix: Any) -> Iterator[Piece]:
+    """Lines and arcs of segments, whose own coordinates a matrix takes into the drawing's."""
     for segment in segments:
         if isinstance(segment, svgelements.Move) or segment.start is None or segment.end is None:
             continue
-        start, end = place(segment.start), place(segment.end)
-        round_arc = isinstance(segment, svgelements.Arc) and abs(segment.rx - segment.ry) <= 1e-9 * segment.rx
         if isinstance(segment, svgelements.Line | svgelements.Close):
+            start, end = _placed(matrix, [segment.start, segment.end])
             yield line(start, end, label)
-        elif not (round_arc and place.scale):
-            yield from arcs_along(place.along(segment), 0.0, 1.0, label)
-        elif abs(segment.sweep) > 2 * np.pi - 1e-9:
-            yield from full_circle(place(segment.center), float(segment.rx) * place.scale, label)
         else:
-            yield arc_through(start, place(segment.point(0.5)), end, label)
+            yield from arcs_along(partial(_along, segment, matrix), 0.0, 1.0, label)
+
+
+def _along(segment: Any, matrix: Any, parameters: FloatArray) -> FloatArray:
+    return _placed(matrix, [segment.point(float(each)) for each in parameters])
+
+
+def _placed(matrix: Any, points: Iterable[Any]) -> FloatArray:
+    return np.array([matrix.point_in_matrix_space(point) for point in points], dtype=np.float64)

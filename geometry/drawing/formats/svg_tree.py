@@ -1,12 +1,11 @@
-"""Prepares the elements of an SVG file: what is drawn, in which unit, with symbols where they are used."""
+"""Prepares the elements of an SVG file: what is drawn, and in which unit."""
 
 import re
-from collections.abc import Iterator
-from math import inf, isfinite
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import count
+from math import inf
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
-
-import svgelements
 
 from pinnray.geometry.drawing.formats.drawing import UNITS, Scale
 from pinnray.runtime.errors import UserError
@@ -21,11 +20,10 @@ LENGTHS |= {"": UNITS["px"], **{name: UNITS[name] for name in ("um", "m")}}
 LENGTH = re.compile(r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([a-zA-Z%]*)")
 """A number with or without a unit."""
 
-SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon", "use", "image", "text"}
-LENGTHY = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "x1", "y1", "x2", "y2"}
-GROUPS = {"svg", "g", "a", "switch", "defs", "style"}
-UNDRAWN = {"mask", "marker", "symbol", "clipPath", "pattern"}
-"""Elements whose content is not drawn where it stands, but may be used elsewhere."""
+SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon", "image", "text"}
+GROUPS = {"g", "a", "use", "switch", "defs", "style"}
+MOST = 100_000
+"""Largest number of elements with all copies."""
 
 
 class ViewBox(NamedTuple):
@@ -38,17 +36,18 @@ class ViewBox(NamedTuple):
 
 
 def drawn(root: ET.Element) -> ET.Element:
-    """A copy of the tree without what is not drawn, with symbols and inner `svg` elements as groups.
+    """A copy of the tree without what is not drawn, with the elements that a `use` shows in its place.
 
     Raises:
-        UserError: If an element contains itself, copies grow without limit, or a size is no length.
+        UserError: If copies grow without limit, or a symbol or an inner `svg` is shown.
     """
-    _check_copies(root)
     box = view_box(root)
-    sizes = {"width": box.width, "height": box.height} if box else {}
-    kept = {name: text for name, text in root.attrib.items() if name not in ("width", "height")}
-    copy = ET.Element(root.tag, kept | {name: repr(size) for name, size in sizes.items()})
-    copy.extend(list(_Copies(root, sizes).of(root)))
+    copy = ET.Element(root.tag, root.attrib)
+    for name in ("width", "height"):
+        copy.attrib.pop(name, None)
+        if box:
+            copy.set(name, repr(getattr(box, name)))
+    copy.extend(list(_copies(root, {element.get("id"): element for element in root.iter()}, count())))
     return copy
 
 
@@ -105,102 +104,28 @@ def svg_scale(root: ET.Element, units: str | None) -> Scale:
     )
 
 
-def _check_copies(root: ET.Element) -> None:
-    """Refuse elements that contain themselves, and copies of copies whose number grows without limit."""
-    by_id = {element.get("id"): element for element in root.iter()}
-    sizes: dict[ET.Element, float] = {}
-
-    def size(element: ET.Element) -> float:
-        if element not in sizes:
-            sizes[element] = inf  # while it is open, that is, if it contains itself
-            copied = by_id.get(_link(element)) if tag_of(element) == "use" else None
-            sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
-        return sizes[element]
-
-    if (count := size(root)) > 100_000:  # a copy counts as often as it is made
-        what = "an element contains itself" if count == inf else f"its copies make {count:.0f} elements"
-        raise UserError(f"{what}; draw each curve once")
-
-
-def _link(element: ET.Element) -> str:
-    """Id of the element that a `use` shows; svgelements, too, takes any sign in place of the #."""
-    return element.get("href", element.get(LINK, ""))[1:]
-
-
-class _Copies:
+def _copies(
+    elements: Iterable[ET.Element], by_id: Mapping[str | None, ET.Element], counter: Iterator[int]
+) -> Iterator[ET.Element]:
     """Copies of elements as they are drawn."""
-
-    def __init__(self, root: ET.Element, sizes: dict[str, float]) -> None:
-        self._by_id = {element.get("id"): element for element in root.iter()}
-        self._sizes = sizes  # of the user space, to which percentages refer
-
-    def of(self, parent: ET.Element) -> Iterator[ET.Element]:
-        """Copies of an element's children."""
-        for child in parent:
-            tag = tag_of(child)
-            target = self._by_id.get(_link(child)) if tag == "use" else None
-            if tag == "path" and child.get("d", "").strip() in ("", "none"):
-                continue  # it is empty
-            if tag == "use" and target is not None and tag_of(target) in ("symbol", "svg"):
-                yield self._group(child, target, f"translate({child.get('x', '0')},{child.get('y', '0')})")
-            elif tag == "svg":
-                yield self._group(child, child, "")
-            elif tag == "switch":
-                yield self._copy(child, "g", list(self.of(child))[:1])
-            elif tag in UNDRAWN:
-                yield self._copy(child, "defs", list(self.of(child)))
-            elif tag in SHAPES | GROUPS and not child.get("requiredExtensions"):
-                yield self._copy(child, tag, list(self.of(child)))
-
-    @staticmethod
-    def _copy(element: ET.Element, tag: str, children: list[ET.Element]) -> ET.Element:
-        copy = ET.Element(NAMESPACE + tag, element.attrib)
-        copy.text, copy.tail = element.text, element.tail
-        copy.extend(children)
-        return copy
-
-    def _group(self, shown: ET.Element, source: ET.Element, shift: str) -> ET.Element:
-        """A group in place of an inner `svg`, or of a `use` of one or of a symbol."""
-        own = {name: self._length(source, name) for name in ("x", "y", "width", "height")}
-        sizes = {name: self._length(shown, name) for name in ("width", "height")}
-        place = own | {name: size for name, size in sizes.items() if size is not None}
-        moves = [shown.get("transform", ""), shift]
-        x, y = (0.0 if place[name] is None else place[name] for name in ("x", "y"))
-        box = view_box(source)
-        if box is None:
-            moves.append(f"translate({x},{y})")
-        else:
-            wide, high = (
-                place[name] or self._sizes.get(name) or getattr(box, name) for name in ("width", "height")
-            )
-            aspect = source.get("preserveAspectRatio")
-            moves.append(svgelements.Viewbox.viewbox_transform(x, y, wide, high, *box, aspect))
-        self._check_shares(source, box is not None or any(place[name] for name in ("width", "height")))
-        skipped = {"x", "y", "width", "height", "viewBox", "preserveAspectRatio", "href", LINK, "transform"}
-        kept = {name: text for name, text in shown.attrib.items() if name not in skipped}
-        group = ET.Element(NAMESPACE + "g", kept | {"transform": " ".join(filter(None, moves))})
-        group.extend(list(self.of(source)))
-        return group
-
-    @staticmethod
-    def _check_shares(source: ET.Element, has_size: bool) -> None:
-        """Refuse percentages of a size that is not the whole drawing's, which svgelements takes for it."""
-        for element in (each for each in source.iter() if has_size and each is not source):
-            for name, text in element.attrib.items():
-                if name in LENGTHY and text.strip().endswith("%"):
-                    raise UserError(f"{name} = {text!r} within an inner {tag_of(source)}; write a number")
-
-    def _length(self, element: ET.Element, name: str) -> float | None:
-        """A length of the user space; None where there is none."""
-        text = element.get(name, "").strip()
-        if not text or text == "auto":
-            return None
-        whole = self._sizes.get({"x": "width", "y": "height"}.get(name, name))
-        parts = LENGTH.fullmatch(text)
-        scale = whole / 100 if parts and parts[2] == "%" and whole else None
-        if parts and parts[2].lower() in LENGTHS:
-            scale = LENGTHS[parts[2].lower()] / LENGTHS[""]
-        length = float(parts[1]) * scale if parts and scale is not None else inf
-        if not isfinite(length):
-            raise UserError(f"{name} = {text!r} of an inner {tag_of(element)} is no length; write a number")
-        return length
+    for element in elements:
+        if next(counter) > MOST:
+            raise UserError(f"its copies make more than {MOST} elements; draw each curve once")
+        tag, kept, children = tag_of(element), dict(element.attrib), list(element)
+        if tag == "use":
+            shown = by_id.get(element.get("href", element.get(LINK, "")).removeprefix("#"))
+            children = [] if shown is None else [shown]
+            x, y = kept.pop("x", 0), kept.pop("y", 0)
+            kept["transform"] = f"{kept.get('transform', '')} translate({x},{y})"
+        if tag == "svg" or (tag == "use" and any(tag_of(child) == "symbol" for child in children)):
+            what = "a symbol" if tag == "use" else "an inner svg"
+            raise UserError(f"it shows {what}, which is not read; make it a group")
+        if tag not in SHAPES | GROUPS or element.get("requiredExtensions"):
+            continue
+        if tag == "path" and element.get("d", "").strip() in ("", "none"):
+            continue  # it is empty
+        copies = list(_copies(children, by_id, counter))
+        copy = ET.Element(NAMESPACE + ("g" if tag in ("use", "switch") else tag), kept)
+        copy.text = element.text
+        copy.extend(copies[:1] if tag == "switch" else copies)
+        yield copy

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import ForceCurve, force_curves, write_force_displacement
+from pinnray.comparison.evaluation.force_curves import ForceCurve, force_curves, write_force_displacement
 from pinnray.comparison.figures.force_charts import draw_force_displacement
 from pinnray.runtime.figure import MEASURED
 from pinnray.solvers.problem import Load

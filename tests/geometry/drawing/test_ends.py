@@ -95,9 +95,9 @@ def test_no_end_is_joined_with_two_others():
         closed_loops(pieces)
 
 
-def test_a_side_drawn_twice_within_rounding_is_told():
+def test_a_side_drawn_again_beside_the_first_is_refused():
     corners = [*BEAM, BEAM[0]]
     pieces = [line(a, b, "") for a, b in pairwise(corners)]
     pieces.append(line((100.0, -1e-4), (1e-4, 0.0), ""))  # again, 0.1 um beside
-    with pytest.raises(UserError, match=r"from \(.*\) to \(.*\) is drawn twice|3 curves meet"):
+    with pytest.raises(UserError, match="is open at"):
         closed_loops(pieces)

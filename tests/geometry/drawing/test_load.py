@@ -74,12 +74,13 @@ def test_a_body_held_at_both_ends_has_markers_on_both_sides(tmp_path):
     assert len(finger.markers) == 9
 
 
-def test_a_long_curved_body_is_touched_at_its_side(tmp_path):
-    drop = '<path d="M5 30 C 5 5 60 5 95 25 L 95 35 C 60 40 5 55 5 30 z"/>'
-    finger = finger_from_file(write_svg(tmp_path / "drop.svg", drop))
-    x, y = finger.placement.inverse([[finger.contact_abscissa, 0]])[0]
-    assert (x, y) == pytest.approx((50, -11), abs=0.3)  # half of 5 to 95, on the upper side
-    assert clamped_length(finger) == pytest.approx(10)
+def test_a_body_without_flat_end_or_straight_side_must_be_given_clamp_and_contact(tmp_path):
+    path = write_svg(tmp_path / "drop.svg", '<path d="M5 30 C 5 5 60 5 95 25 L 95 35 C 60 40 5 55 5 30 z"/>')
+    with pytest.raises(UserError, match="it has no straight side to be touched; give contact = "):
+        finger_from_file(path)
+    path = write_svg(tmp_path / "disc.svg", '<circle cx="50" cy="30" r="20"/>')
+    with pytest.raises(UserError, match="it has no flat end to be clamped; give clamp = "):
+        finger_from_file(path, Description(contact=[50, -10]))
 
 
 @pytest.mark.parametrize("turn", [0, 37, 90, 180, 271])
@@ -110,9 +111,10 @@ def test_ring(tmp_path):
     for radius in (20, 15):
         document.modelspace().add_circle((3, 4), radius)
     document.saveas(tmp_path / "ring.dxf")
-    finger = finger_from_file(tmp_path / "ring.dxf")
+    description = Description(clamp=[[-7, 4 - np.sqrt(300)], [13, 4 - np.sqrt(300)]], contact=[3, 24])
+    finger = finger_from_file(tmp_path / "ring.dxf", description)
     outline = finger.section.outline
-    assert clamped_length(finger) == pytest.approx(2 * np.pi * 20 / 6, rel=1e-2)  # the lowest sixth
+    assert clamped_length(finger) == pytest.approx(2 * np.pi * 20 / 6)  # the shorter way
     front = np.concatenate([outline.ends[which] for which in outline.pieces("front")])
     reach = 2 * 20 * np.sin(np.radians(60))
     assert np.ptp(front[:, 0]) == pytest.approx(reach, rel=1e-6)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.drawing.formats.closed_loops import closed_loops, nearest_piece, straightened
-from pinnray.geometry.drawing.formats.pieces import DEVIATION, arc_through, arcs_along, full_circle, line
+from pinnray.geometry.drawing.formats.closed_loops import closed_loops, straightened
+from pinnray.geometry.drawing.formats.pieces import DEVIATION, arcs_along, line
 from pinnray.geometry.section.loop import Loop
 from pinnray.runtime.errors import UserError
 
@@ -16,12 +16,15 @@ def ellipse(parameters):
     return np.stack([30 * np.cos(parameters), 10 * np.sin(parameters)], axis=1)
 
 
-def test_arc_through_three_points_has_their_circle():
-    piece = arc_through([1, 0], [0, 1], [-1, 0], "")
-    assert piece.bulge == pytest.approx(1)
-    clockwise = arc_through([-1, 0], np.sqrt([0.5, 0.5]) * [-1, 1], [0, 1], "")
-    assert clockwise.bulge == pytest.approx(-np.tan(np.pi / 8))
-    assert arc_through([0, 0], [1, 0], [3, 0], "").bulge == 0
+def circle(parameters):
+    return np.stack([5 + np.cos(parameters), 2.5 + np.sin(parameters)], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("sweep", "bulges"), [(np.pi / 2, [np.tan(np.pi / 8)]), (-np.pi, [-1]), (2 * np.pi, [1, 1])]
+)
+def test_an_arc_of_a_circle_is_exact_and_at_most_half_of_it(sweep, bulges):
+    assert [piece.bulge for piece in arcs_along(circle, 0, sweep, "")] == pytest.approx(bulges, rel=1e-12)
 
 
 def test_arcs_stay_near_the_ellipse():
@@ -38,7 +41,7 @@ def test_pieces_in_any_order_and_direction_are_chained():
     pieces = [
         line(corners[2], corners[1], "back"),  # against the others
         line(corners[0], corners[1], ""),
-        *full_circle([5, 2.5], 1, "hole"),
+        *arcs_along(circle, 0, 2 * np.pi, "hole"),
         line(corners[3] + [0, 4e-4], corners[0], "base"),  # an end within the tolerance
         line(corners[2], corners[3], ""),
     ]
@@ -76,6 +79,6 @@ def test_corners_in_a_straight_line_go():
 )
 def test_nearest_place(point, piece, fraction, distance):
     half_disc = Loop(np.array([[0, 0], [10, 0.0]]), np.array([0, 1.0]), ("", ""))
-    found = nearest_piece([half_disc], np.array(point, dtype=float))
-    assert found[1] == piece
-    assert found[2:] == pytest.approx((fraction, distance))
+    found = half_disc.places(np.array([point], dtype=float))
+    assert found.pieces == [piece]
+    assert [found.shares[0], found.distances[0]] == pytest.approx([fraction, distance])

@@ -1,4 +1,4 @@
-"""SVG files as programs write them: what is drawn, symbols, and sizes."""
+"""SVG files as programs write them: what is drawn, copies, and sizes."""
 
 import numpy as np
 import pytest
@@ -43,56 +43,28 @@ def test_what_svg_does_not_draw_is_left_out(tmp_path, undrawn):
 @pytest.mark.parametrize(
     ("drawn", "bounds"),
     [
-        (f'<symbol id="s">{HOLE}</symbol><use href="#s" x="5" y="1"/>', (25, 4, 35, 8)),
         (f'<mask>{HOLE}</mask><use href="#hole" x="5" y="1"/>', (25, 4, 35, 8)),
-        # a symbol fits its viewBox into the size of its use
-        (
-            '<symbol id="s" viewBox="0 0 5 2"><rect width="5" height="2"/></symbol>'
-            '<use href="#s" x="20" y="3" width="10" height="4"/>',
-            (20, 3, 30, 7),
-        ),
-        (
-            '<defs><symbol id="s" viewBox="1 1 5 2" width="10" height="4">'
-            '<rect x="1" y="1" width="5" height="2"/>'
-            '</symbol></defs><g transform="translate(2 0)">'
-            '<use href="#s" transform="scale(0.5)" x="40" y="4"/></g>',
-            (22, 2, 27, 4),
-        ),
-        (
-            '<symbol id="s" viewBox="0 0 5 2" preserveAspectRatio="xMinYMin meet">'
-            '<rect width="5" height="2"/></symbol>'
-            '<use href="#s" x="20" y="1" width="30" height="4"/>',
-            (20, 1, 30, 5),
-        ),
-        # an inner svg likewise
-        (
-            '<svg x="20" y="3" width="10" height="4" viewBox="0 0 5 2"><rect width="5" height="2"/></svg>',
-            (20, 3, 30, 7),
-        ),
-        ('<svg x="20" y="3"><rect width="50%" height="4"/></svg>', (20, 3, 70, 7)),
-        ('<svg x="50%" y="3px"><rect width="5" height="4"/></svg>', (50, 3, 55, 7)),
     ],
 )
-def test_symbols_and_inner_svgs_are_where_they_are_used(tmp_path, drawn, bounds):
+def test_copies_are_where_they_are_used(tmp_path, drawn, bounds):
     path = write_svg(tmp_path / "a.svg", f'<rect width="100" height="60"/>{drawn}')
     _, hole = sorted(read_drawing(path).loops, key=lambda loop: -abs(loop.area))
     left, top, right, bottom = bounds
     assert hole.bounds == pytest.approx(np.array([[left, -bottom], [right, -top]]))
 
 
-def test_a_symbol_is_used_in_a_symbol_and_again(tmp_path):
-    symbols = '<symbol id="s"><rect x="2" y="2" width="3" height="3"/></symbol>'
-    symbols += '<symbol id="t"><use href="#s" x="10"/></symbol>'
-    used = '<g id="u"><use href="#t" y="1"/></g><use href="#u" x="20"/>'
-    _, *holes = read_drawing(write_svg(tmp_path / "a.svg", f"{BODY}{symbols}{used}")).loops
+def test_a_copy_is_copied_again(tmp_path):
+    copies = '<g id="s"><rect x="2" y="2" width="3" height="3"/></g>'
+    copies += '<g id="t"><use href="#s" x="10"/></g><use href="#t" y="1"/>'
+    _, *holes = read_drawing(write_svg(tmp_path / "a.svg", f"{BODY}{copies}")).loops
     found = sorted(hole.bounds.round(9).tolist() for hole in holes)
-    assert found == [[[12, -6], [15, -3]], [[32, -6], [35, -3]]]
+    assert found == [[[2, -5], [5, -2]], [[12, -6], [15, -3]], [[12, -5], [15, -2]]]
 
 
-def test_a_use_of_a_symbol_keeps_its_name(tmp_path):
+def test_a_copy_has_its_name(tmp_path):
     path = write_svg(
         tmp_path / "a.svg",
-        f'{BODY}<symbol id="dot"><circle r="0.8"/></symbol>'
+        f'{BODY}<defs><circle id="dot" r="0.8"/></defs>'
         '<g id="markers"><use href="#dot" x="20" y="5"/></g>'
         '<use id="markers" href="#dot" x="40" y="5"/>',
     )

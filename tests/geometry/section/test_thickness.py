@@ -5,7 +5,7 @@ import pytest
 
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
-from pinnray.geometry.section.thickness import _Pieces, _samples, cavity_widths, through, wall_thickness
+from pinnray.geometry.section.thickness import _samples, cavity_widths, through, wall_thickness
 
 
 def disc(radius: float, pieces: int = 2) -> Loop:
@@ -67,7 +67,7 @@ def test_ray_from_inside_ends_on_the_arc():
 
 def test_samples_lie_on_their_piece_and_look_into_the_body():
     ring = Section(disc(10, 3), (rectangle(-2, -2, 3, 3).reversed(),))
-    points, normals, _ = _samples(_Pieces.of(ring.loops), 0.7)
+    points, normals, _ = _samples(ring.loops, 0.7)
     assert ring.clearance(points + 0.01 * normals) == pytest.approx(0.01, rel=2e-3)
 
 

@@ -215,22 +215,6 @@ def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, mo
     assert Path("out/default/report.html").is_file()
 
 
-def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, without_pictures):
-    """Compilers and other libraries do not say where."""
-
-    def full(*_: object, **__: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    cache = folder / "absent" / "cache"
-    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
-    monkeypatch.setattr("pinnray.comparison.report.html_report.write_report", full)
-    monkeypatch.setattr(
-        "pinnray.commands.launch._space", lambda path: 10**3 if path.is_relative_to(cache) else 10**9
-    )
-    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == BAD_INPUT
-    assert capsys.readouterr().err.splitlines()[-1] == f"error: {cache}: No space left on device"
-
-
 def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "pinnray.solvers.pinn.finite_basis.presets", None)
     assert main(["compare", "--solvers", "pinn-std"]) == BAD_INPUT

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.comparison.crossval.true_fields import FieldSampler
 from pinnray.comparison.evaluation.certification import with_certificates
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.solvers.extrusion import ExtrudedSpace
@@ -15,6 +14,7 @@ from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.fem.solid import FaceField, Fem3dSolver
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import State
+from pinnray.studies.crossval.true_fields import FieldSampler
 from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import bar_mesh
 
