@@ -35,10 +35,6 @@ class RigSettings(CheckedModel):
     irregular: float = bounded(
         0.0, 0, 0.1, "", "", "Deviation of the markers' outlines from circles, rms over the radius"
     )
-    mottle: float = bounded(0.0, 0, 0.5, "", "", "Share of the markers' area that light specks cover")
-    layers: float = bounded(
-        0.0, 0, 0.5, "", "", "Difference between the reflectances of every other layer of the print, relative"
-    )
     marker_plane: float = bounded(0.0, -1000, 1000, "mm", "", "Height of the markers above the fiducials")
     cover: tuple[str, ...] = Field(
         default=(),

@@ -81,7 +81,7 @@ def film_finger(
     workspace, camera, pose = rig.view(finger)
     board, covered = rig.sheet(), rig.covered
     check_covers(covered, len(mesh.marker_nodes))
-    bench = Bench(mesh, finger, workspace, rig.paint, rig.irregular, rig.mottle, rig.layers)
+    bench = Bench(mesh, finger, workspace, rig.paint, rig.irregular)
     solution, source = filmed_solution(problem, solver, stages)
     course = filmed_course(solution)
     recording = Recording(

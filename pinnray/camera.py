@@ -36,18 +36,17 @@ def calibrate(
     k3: bool = False,
     out: str | Path | None = None,
 ) -> "Calibration":
-    """Calibrate a camera from photographs of a chessboard, a ChArUco board or a grid of dots.
+    """Calibrate a camera from photographs of a chessboard or a ChArUco board.
 
     Args:
         images: Photographs of the board, all of one size: pictures, folders, patterns, or a video.
-        board: Inner corners of a chessboard, such as "9x6", squares of a ChArUco board, "charuco:8x6", or
-            dots of a grid, "circles:7x6" or "acircles:4x11".
+        board: Inner corners of a chessboard, such as "9x6", or squares of a ChArUco board, "charuco:8x6".
         square: Side of a square, mm.
         marker: Side of a marker of a ChArUco board, mm.
         dictionary: ArUco dictionary of a ChArUco board.
         model: Lens model: `brown` up to about 100 degrees of view, `fisheye` beyond.
         k3: Whether to fit the third radial coefficient too.
-        out: Camera file, .json or .yaml, that `track` takes; nothing is written if None.
+        out: Camera file, .json, that `track` takes; nothing is written if None.
 
     Raises:
         UserError: If the photographs do not determine the camera.

@@ -17,7 +17,7 @@ from pydantic import BaseModel
 
 from pinnray.cli import compare_main, main
 from pinnray.commands.app import pinnray
-from pinnray.geometry.cache import CAD_FORMATS
+from pinnray.geometry.cache import CAD_FORMATS, finger_mesh
 from pinnray.geometry.finger.markers import marker_positions
 from pinnray.geometry.finger.parameters import Parameters, parameter_info
 from pinnray.geometry.finger.presets import FOLDER, load_design, preset_names
@@ -116,10 +116,13 @@ def run_folder(tmp_path_factory) -> Path:
     """The output of a small comparison, of a solver that follows the load and one that is trained too."""
     out = tmp_path_factory.mktemp("docs") / "run"
     options = (
-        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 1 --adapt 0.008 --solver-set pinn-std.preset=paper "
+        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 2 --adapt 0.02 --solver-set pinn-std.preset=paper "
         "--solver-set pinn-std.epochs=2 --solver-set pinn-std.width=4 --quiet"
     )
-    code = compare_main([*options.split(), "--out", str(out)])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(finger_mesh.__kwdefaults__, "across", 1)  # few elements
+        patch.setattr("pinnray.runtime.figure.DPI", 20)  # coarse pictures
+        code = compare_main([*options.split(), "--out", str(out)])
     assert code in (0, 3)  # so short a training may not converge
     return out
 

@@ -21,7 +21,7 @@ Save = Callable[..., Path]
 def folder(compared, estimated, evaluate, finished, tmp_path) -> Path:
     """A run with a truth, a found force and its place, and figures."""
     given = evaluate("fem-asm", 1.02)
-    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(36.0, 35.0, 37.5), [(0.5, 0.2)])
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(36.0, 35.0, 37.5))
     given = replace(given, in_sample=True, left_out=estimated.marker_displacement, identified=force)
     network = evaluate("pinn-asm", 1.01)
     network = replace(network, in_sample=True, left_out=estimated.marker_displacement, twin="fem-asm")
