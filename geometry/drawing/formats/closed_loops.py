@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Mark, Scale, place
-from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, check_twice, joined
+from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, joined
 from pinnray.geometry.drawing.formats.pieces import Piece
 from pinnray.geometry.section.loop import STRAIGHT, Loop
 from pinnray.runtime.arrays import FloatArray
@@ -145,7 +145,6 @@ def straightened(loop: Loop, deviation: float = 1e-7) -> Loop:
 def _chained(loose: Sequence[Piece], reach: float) -> Closed:
     """Closed curves of pieces that are all part of one."""
     found = joined(loose, reach)
-    check_twice(found)
     check_ends(found, reach)
     pieces, nodes, places, gaps = found
     at: dict[int, list[int]] = {}
