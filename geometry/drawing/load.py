@@ -158,7 +158,7 @@ def _clamped(outline: Loop, description: Description, unit: float) -> tuple[Loop
     if isinstance(given, tuple):
         outline = straightened(outline.renamed([""] * len(outline.points)))
         for pair in given:
-            outline = with_part(outline, [unit * np.array(point) for point in pair], "base")
+            outline = with_part(outline, unit * np.array(pair), "base")
         source = "given"
     else:
         label = label_of(given) if given else "base"
