@@ -50,7 +50,7 @@ AROUND = (
 LINES = (
     *("clamp = [[0, 0], [0, -{h}]]", "contact = [{x}, 0]", "contact = [{x}, 0]\ncontact_width = {r}"),
     *("markers = 5", "markers = [[{x}, -{y}]]", "marker_diameter = {r}", "depth = {h}", 'units = "cm"'),
-    *('clamp = "base"', 'contact = "front"', 'contact = "é"'),
+    *("markers = 3", "contact = [0, 0]", 'contact = "é"'),
 )
 SPOILT = (
     *("clamp = nan", "contact = []", "markers = [[0, 0]]", "depth = -1", "depth = 1e999", 'units = ""'),

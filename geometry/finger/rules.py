@@ -51,9 +51,8 @@ def cavity_length(p: Parameters) -> RuleResult:
     start, end = cavity_ends(p)
     return RuleResult(
         end - start - MIN_CAVITY,
-        f"no room for a cavity: height {p.height:g} mm less tip_length {p.tip_length:g} mm and "
-        f"base_thickness {p.base_thickness:g} mm leaves {end - start:.3g} mm, at least {MIN_CAVITY} mm is "
-        "needed",
+        f"no room for a cavity: tip_length {p.tip_length:g} mm and base_thickness {p.base_thickness:g} mm "
+        f"leave {end - start:.3g} mm of height {p.height:g} mm, at least {MIN_CAVITY} mm is needed",
     )
 
 
@@ -63,9 +62,8 @@ def cavity_open(p: Parameters) -> RuleResult:
     opening = float(front[1] - back[1])
     return RuleResult(
         opening - MIN_CAVITY,
-        f"walls close the cavity: front_thickness {p.front_thickness:g} mm and back_thickness "
-        f"{p.back_thickness:g} mm leave {opening:.3g} mm between them at the tip block, at least "
-        f"{MIN_CAVITY} mm is needed",
+        f"front_thickness {p.front_thickness:g} mm and back_thickness {p.back_thickness:g} mm leave "
+        f"{opening:.3g} mm between the walls at the tip block, at least {MIN_CAVITY} mm is needed",
     )
 
 
@@ -76,8 +74,7 @@ def base_wall(p: Parameters) -> RuleResult:
     return RuleResult(
         wall - MIN_WALL,
         f"the base is open: base_thickness {p.base_thickness:g} mm and foot_height {p.foot_height:g} mm "
-        f"leave a wall of {wall:.3g} mm between cavity and {'slot' if slot else 'base'}, at least "
-        f"{MIN_WALL} mm is needed",
+        f"leave a wall of {wall:.3g} mm, at least {MIN_WALL} mm is needed",
     )
 
 
