@@ -121,7 +121,9 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
             "materials belong to the physical surfaces of a plane Gmsh mesh of triangles whose curves have "
             "groups base and contact; mesh the section with them and give that .msh"
         )
-    mesh = ready_mesh(drawing.mesh, placement, section, markers, x, materials) if drawing.mesh else None
+    mesh = None
+    if drawing.mesh:
+        mesh = ready_mesh(drawing.mesh, placement, section, markers, (x, width), materials)
     return DrawnFinger(
         name=description.name or _name(drawing.file),
         section=section,

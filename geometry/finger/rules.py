@@ -203,7 +203,7 @@ def _marker_words(p: Parameters) -> str:
 def _marker_room(p: Parameters) -> tuple[int, float]:
     """The marker that has the least room around it, and the largest diameter that fits there, mm."""
     centres = marker_positions(p)
-    body = shapely.Polygon(finger_outline(p).flattened()[0], list(cells(p)))
+    body = shapely.Polygon(finger_outline(p).flattened(), list(cells(p)))
     away = shapely.distance(body.boundary, shapely.points(centres))
     margins = np.where(shapely.contains_xy(body, *centres.T), away, -away)
     worst = int(margins.argmin())
