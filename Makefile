@@ -38,7 +38,7 @@ docs: setup ## build the documentation site, build/docs/html
 	OMP_NUM_THREADS=1 $(if $(ARGS),NOTEBOOKS=off) $(BIN)/python -m sphinx -M $(or $(ARGS),html) docs build/docs -W --keep-going -q
 
 verification: setup ## measure fem against known answers, write docs/verification.md
-	$(BIN)/python -m benchmarks.verification
+	$(BIN)/python -m benchmarks verification
 
 # Every tool runs, and the last line names those that fail.
 lint: setup ## check style, format, types and the order of the packages

@@ -22,9 +22,9 @@ BENCHMARKS = {
     "trained": "networks.graded:trained",
     "scenes": "tracker.scenes:main",
     "stress": "tracker.stress:main",
+    "verification": "verification.document:main",
     "validation": "validation.document:main",
-    "posterior": "validation.posterior:main",
-    "reliability": "reliability.document:main",
+    "reliability": "reliability.faults:main",
 }
 """Names, and functions that return a table; the modules' docstrings have descriptions and times."""
 
@@ -47,6 +47,7 @@ SETTLED = (
     "optimise",
     "live",
     "growth",
+    "posterior",
 )
 """Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
 
@@ -83,7 +84,7 @@ def main() -> int:
         try:
             show(getattr(importlib.import_module(f"benchmarks.{module}"), function)(**options))
         except ModuleNotFoundError as error:
-            print(f"error: {name} needs {error.name}; pip install 'pinn-ray[bench]'", file=sys.stderr)
+            print(f"error: {name} needs {error.name}; pip install 'pinn-ray[dev]'", file=sys.stderr)
             return 2
         except UserError as error:
             print(f"error: {error}", file=sys.stderr)

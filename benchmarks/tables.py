@@ -45,6 +45,12 @@ def table_of(page: Path, name: str) -> str:
     return page.read_text(encoding="utf-8").partition(begin_of(name))[2].partition(END)[0]
 
 
+def cells_of(page: Path, name: str) -> list[list[str]]:
+    """The cells of the table between its marks on a page, without its header."""
+    lines = table_of(page, name).splitlines()[2:]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
 def fill(page: Path, name: str, table: str) -> None:
     """Put a table between its marks on a page."""
     before, begin, rest = page.read_text(encoding="utf-8").partition(begin_of(name))

@@ -1,1 +1,1 @@
-"""One finger, many solvers: measurements or truth, metrics, pictures, report, cross-validation."""
+"""One finger, many solvers: measurements or truth, metrics, pictures, report."""

@@ -57,9 +57,9 @@ nitpick_ignore_regex = [
         r"(numpy|pathlib|annotated_types|collections\.abc|types|pandas|pd|matplotlib|pydantic|pyvista)\..*",
     ),
     ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|(.*\.)?T|.*Options)"),
-    ("py:.*", r"pinnray\.comparison\.(figures|crossval|evaluation\.truths)\..*"),
+    ("py:.*", r"pinnray\.comparison\.(figures|evaluation\.truths)\..*"),
     ("py:.*", r"pinnray\.geometry\.(finger\.(rules|parameters)|drawing\.placement)\..*"),
-    ("py:.*", r"pinnray\.(film|observations|robots|runtime|studies|vision)\..*"),
+    ("py:.*", r"pinnray\.(film|measurements|robots|runtime|studies|vision)\..*"),
     ("py:.*", r"pinnray\.solvers\.fem\.adaptive_refinement\..*"),
 ]
 

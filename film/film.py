@@ -1,37 +1,60 @@
 """A film to track: its source, its camera, its fiducials and the colour of the markers."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from pinnray.geometry.finger.finger import Finger
+from pydantic import Field, field_validator
+
+from pinnray.geometry.finger.parameters import CheckedModel
 from pinnray.runtime.content_hash import file_digest
 
-if TYPE_CHECKING:  # it imports OpenCV
+if TYPE_CHECKING:  # options are of this class, and `--help` has to be quick
+    from pinnray.geometry.finger.finger import Finger
     from pinnray.vision.tracking.scene import FilmedScene
 
 
-@dataclass(frozen=True)
-class Film:
+class FilmSettings(CheckedModel):
+    """Camera, fiducials, marker colour and tracking method of a film."""
+
+    camera: Path | None = Field(
+        default=None, description="Camera file of `pinnray calibrate`; none: the camera is not calibrated"
+    )
+    workspace: Path | None = Field(
+        default=None, description="JSON file of the fiducials; none: those around the design"
+    )
+    colour: str = Field(default="dark", description="Colour of the markers, as printed by `pinnray pick`")
+    method: Literal["precise", "hough"] = Field(
+        default="precise", description="Disc detector; hough is the paper's pipeline"
+    )
+    fps: float | None = Field(
+        default=None,
+        description="Frames a second of pictures or a pipe, which do not say it; none: 30, with a warning",
+    )
+
+    def of(self, source: str) -> "Film":
+        """The film from a source, with these settings."""
+        return Film(source=source, **self.model_dump())
+
+
+class Film(FilmSettings):
     """A film.
 
-    Attributes:
-        source: Video, folder or glob of pictures, number of a camera, or "-".
-        camera: Camera file, as `pinnray calibrate` writes it; None if the camera is not calibrated.
-        workspace: JSON file of the fiducials; those around the design if None.
-        colour: Colour of the markers, as printed by `pinnray pick`.
-        method: Detector of the discs; "hough" is the paper's pipeline.
-        fps: Frames a second of pictures or a pipe, which do not say it.
+    Raises:
+        UserError: If the camera's or the workspace's file does not exist.
     """
 
-    source: str
-    camera: Path | None = None
-    workspace: Path | None = None
-    colour: str = "dark"
-    method: Literal["precise", "hough"] = "precise"
-    fps: float | None = None
+    source: str = Field(
+        description='Video, folder or glob of pictures, number of a camera, or "-" for a pipe'
+    )
 
-    def scene(self, design: Finger) -> "FilmedScene":
+    @field_validator("camera", "workspace")
+    @classmethod
+    def _there(cls, file: Path | None) -> Path | None:
+        if file is not None and not file.is_file():
+            raise ValueError("there is no such file")
+        return file
+
+    def scene(self, design: "Finger") -> "FilmedScene":
         """The filmed scene of a finger.
 
         Raises:
@@ -57,5 +80,4 @@ class Film:
         hashes = {
             f"{name}_sha256": file_digest(path) for name, path in files.items() if path and path.is_file()
         }
-        settings = {"colour": self.colour, "method": self.method, "fps": self.fps}
-        return {"source": self.source, **settings, **hashes}
+        return self.model_dump(include={"source", "colour", "method", "fps"}) | hashes

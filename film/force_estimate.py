@@ -14,7 +14,7 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.tables import Cell, terminal_table, write_csv
-from pinnray.solvers.identification.tracker import ForceReading, LawTracker
+from pinnray.solvers.identification.tracker import ForceReading, ForceTracker
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Progress
@@ -97,12 +97,12 @@ class FrameForce(NamedTuple):
     delay: float
 
 
-def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, radius: float) -> LawTracker:
+def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, radius: float) -> ForceTracker:
     """The force tracker of a finger.
 
     Args:
         mesh: Of the finger.
-        material: If its law is the linear one, the law of finite strain that the markers tell is taken.
+        material: If its law is the linear one, the neo-Hookean one is taken.
         points: Markers at rest, shape (m, 2), mm.
         radius: Of the markers, mm.
 
@@ -110,15 +110,14 @@ def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, ra
         UserError: If DOLFINx is missing.
     """
     make_solver("fem-id")  # or says which library is missing
-    from pinnray.solvers.fem.identification import fem_law_tracker
+    from pinnray.solvers.fem.identification import fem_force_tracker
 
-    problem = Problem(mesh, material)
-    if material.law == "linear":
-        return fem_law_tracker(problem, points, radius)
-    return fem_law_tracker(problem, points, radius, [material.law])
+    law = "neo-hookean" if material.law == "linear" else material.law
+    problem = Problem(mesh, material.model_copy(update={"law": law}))
+    return fem_force_tracker(problem, points, radius)
 
 
-def forces_of(tracking: Tracking, tracker: LawTracker, progress: Progress) -> list[FrameForce]:
+def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> list[FrameForce]:
     """The force in every frame of a track, against the mean of its frames at rest.
 
     Args:
@@ -157,7 +156,7 @@ class LiveRate(NamedTuple):
 
 
 class _Markers(NamedTuple):
-    """The markers of a live frame: what `LawTracker.update` takes, and when they were tracked, s."""
+    """The markers of a live frame: what `ForceTracker.update` takes, and when they were tracked, s."""
 
     frame: int
     time: float
@@ -167,7 +166,7 @@ class _Markers(NamedTuple):
     tracked: float
 
 
-class LiveForce:
+class LiveForce(NewestOnly[_Markers]):
     """Follows the force while a film is tracked: in the newest frame, as fast as it can.
 
     A context manager around the tracking, which an error of the estimate ends at the next frame.
@@ -181,35 +180,22 @@ class LiveForce:
         forces: What was found so far.
     """
 
-    def __init__(self, tracker: LawTracker, depth: float) -> None:
+    def __init__(self, tracker: ForceTracker, depth: float) -> None:
+        super().__init__(self._answer)
         self._tracker, self._depth = tracker, depth
         self.forces: list[FrameForce] = []
-        self._newest = NewestOnly(self._answer)
         self._started = self._answered = 0.0  # when the first and the last force were found, s
         self._moves = False
         # Over the frames before the markers move: sum of their places, mm, and number of frames in which each
         # was seen. The first frame gives them the shapes (m, 2) and (m, 1).
         self._sum, self._count = np.zeros((1, 2)), np.zeros((1, 1))
 
-    def __enter__(self) -> "LiveForce":
-        self._newest.__enter__()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        kind = error[0]
-        self._newest.__exit__(kind if isinstance(kind, type) else None)
-
-    def finish(self) -> list[FrameForce]:
-        """The forces, once that in the last frame is found; no frame may follow."""
-        self._newest.finish()
-        return self.forces
-
     @property
     def live_rate(self) -> LiveRate:
         """How it kept up with the film."""
         spent = self._answered - self._started
         rate = (len(self.forces) - 1) / spent if spent else 0.0
-        return LiveRate(self._newest.passed_over, rate)
+        return LiveRate(self.passed_over, rate)
 
     def watch(self, frame: Frame, detections: FrameDetections) -> None:
         """Take a frame; see `pinnray.vision.tracking.tracker.track`."""
@@ -221,11 +207,15 @@ class LiveForce:
         known, count = seen & (self._count > 0).all(axis=1), np.maximum(self._count, 1)
         deviations = np.repeat(noise[:, None] * np.sqrt(1 + 1 / count), 2, axis=1)
         moved = np.where(known[:, None], places - self._rest, 0.0)
-        self._newest.put(_Markers(frame.number, frame.time, moved, deviations, known, time.perf_counter()))
+        self.put(_Markers(frame.number, frame.time, moved, deviations, known, time.perf_counter()))
 
     def line(self) -> str:
         """The last force in words."""
         return force_line(self.forces[-1], self._depth) if self.forces else "force: not yet"
+
+    def newest_row(self) -> dict[str, Cell | None] | None:
+        """The last force by the columns of `force.csv`; None before there is one."""
+        return force_row(self.forces[-1], self._depth) if self.forces else None
 
     @property
     def _rest(self) -> FloatArray:
@@ -261,35 +251,33 @@ def force_line(force: FrameForce, depth: float) -> str:
     return "; ".join(filter(None, [*parts, reading.status]))
 
 
-def force_rows(forces: Sequence[FrameForce], depth: float) -> list[dict[str, Cell]]:
-    """A row for every frame with a force; empty cells where there is no estimate or no bound."""
-    rows = []
-    for frame, when, reading, delay in forces:
-        x, y = reading.force
-        numbers = {
-            "force_N": reading.size * depth,
-            "force_low_N": reading.low * depth,
-            "force_high_N": reading.high * depth,
-            "N_per_mm": reading.size,
-            "N_per_mm_low": reading.low,
-            "N_per_mm_high": reading.high,
-            "force_x_N_per_mm": x,
-            "force_y_N_per_mm": y,
-            "position_mm": reading.position,
-            "position_low_mm": reading.position_low,
-            "position_high_mm": reading.position_high,
-            "inflation": reading.inflation,
-        }
-        row: dict[str, Cell] = {"frame": frame, "time_s": when}
-        row |= {name: float(value) if np.isfinite(value) else "" for name, value in numbers.items()}
-        row |= {"equilibria": reading.evaluations, "seconds": reading.seconds, "delay_s": delay}
-        rows.append(row | {"remark": reading.status})
-    return rows
+def force_row(force: FrameForce, depth: float) -> dict[str, Cell | None]:
+    """The force in a frame by the columns of `force.csv`; None where there is no estimate or no bound."""
+    reading = force.reading
+    x, y = reading.force
+    numbers = {
+        "force_N": reading.size * depth,
+        "force_low_N": reading.low * depth,
+        "force_high_N": reading.high * depth,
+        "N_per_mm": reading.size,
+        "N_per_mm_low": reading.low,
+        "N_per_mm_high": reading.high,
+        "force_x_N_per_mm": x,
+        "force_y_N_per_mm": y,
+        "position_mm": reading.position,
+        "position_low_mm": reading.position_low,
+        "position_high_mm": reading.position_high,
+        "inflation": reading.inflation,
+    }
+    row: dict[str, Cell | None] = {"frame": force.frame, "time_s": force.time}
+    row |= {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
+    row |= {"equilibria": reading.evaluations, "seconds": reading.seconds, "delay_s": force.delay}
+    return row | {"remark": reading.status}
 
 
 def write_forces(folder: Path, forces: Sequence[FrameForce], depth: float) -> None:
     """Write `force.csv` and the picture `force.png` into a folder."""
-    write_csv(folder / "force.csv", force_rows(forces, depth))
+    write_csv(folder / "force.csv", [force_row(force, depth) for force in forces])
     readings = [force.reading for force in forces]
     times = np.array([force.time for force in forces])
     sizes, places = (

@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import marker_errors
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.figures.gallery import each_of
 from pinnray.comparison.figures.overlay import errors_note
@@ -51,7 +50,7 @@ def predicted_frame(folder: Path, comparison: Results, tracking: Tracking, image
         each_of(
             "Mean of |Δu| + |Δv| at the markers, mm",
             comparison.evaluations,
-            lambda each: marker_errors(each, comparison.observations).mae_sum,
+            lambda each: comparison.scores[each.solver].markers.mae_sum,
         ),
     )
 
@@ -126,7 +125,7 @@ def _markers(axes: Axes, tracking: Tracking, computed: FloatArray) -> None:
 
 
 def _name(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
-    note = errors_note(evaluation, comparison.observations)
+    note = errors_note(comparison.scores[evaluation.solver])
     title = axes.set_title(f"{evaluation.label_at_markers}: {note}", size=SMALL)
     longer = title.get_window_extent().width / axes.get_window_extent().width
     title.set_fontsize(SMALL / max(longer, 1.0))

@@ -5,24 +5,26 @@ from math import inf
 from textwrap import shorten
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pinnray.geometry.registration import FIXED, Registration
 from pinnray.runtime.arrays import BoolArray, FloatArray, frozen_array
 from pinnray.runtime.errors import ShapeError, UserError
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Observations:
-    """Marker displacements, final minus initial position, ordered from base to tip.
+    """Marker displacements, final minus initial position: `Observations(points, displacements)` is enough.
 
     Attributes:
-        points: Initial positions, shape (m, 2), mm.
+        points: Initial positions, ordered from base to tip, shape (m, 2), mm.
         displacements: Shape (m, 2), mm; meaningless at markers that are not visible.
-        standard_deviations: Standard deviations of the displacements, shape (m, 2), mm.
-        visible: Which markers were seen, shape (m,); none where no displacement is known.
+        standard_deviations: Of the displacements, shape (m, 2), mm, or one for all; 0 where unknown.
+        visible: Which markers were seen, shape (m,), all if None; none where no displacement is known.
         source: One sentence on the origin of the numbers, or on why there are none, shown with them.
         simulated: True if no camera was involved.
-        marker_radius: Radius of the markers' discs, over which their displacements are means, mm.
+        marker_radius: Radius of the markers' discs, over which their displacements are means, mm; the default
+            design's, `design.marker_radius` is that of another one.
         pressed: Registration of the pressed picture with that at rest.
         drawn: Registration of the picture at rest with the drawing.
 
@@ -38,23 +40,41 @@ class Observations:
     source: str
     simulated: bool
     marker_radius: float
-    pressed: Registration = FIXED
-    drawn: Registration = FIXED
+    pressed: Registration
+    drawn: Registration
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        displacements: ArrayLike,
+        standard_deviations: ArrayLike = 0.0,
+        visible: ArrayLike | None = None,
+        source: str = "measurements given as arrays",
+        simulated: bool = False,
+        marker_radius: float = 0.8,
+        pressed: Registration = FIXED,
+        drawn: Registration = FIXED,
+    ) -> None:
+        (count, *_) = (*np.shape(np.asarray(points, dtype=object)), 1)
+        if np.ndim(np.asarray(standard_deviations, dtype=object)) == 0:
+            standard_deviations = np.full((count, 2), standard_deviations)
+        for name, values, dtype, shape in (
+            ("points", points, np.float64, (count, 2)),
+            ("displacements", displacements, np.float64, (count, 2)),
+            ("standard_deviations", standard_deviations, np.float64, (count, 2)),
+            ("visible", np.ones(count) if visible is None else visible, np.bool_, (count,)),
+        ):
+            object.__setattr__(self, name, frozen_array(values, dtype=dtype, shape=shape, name=name))
+        self.__dict__.update(
+            source=source, simulated=simulated, marker_radius=marker_radius, pressed=pressed, drawn=drawn
+        )
+        self._check()
 
     def __repr__(self) -> str:
         seen = f"{self.visible.sum()} of {len(self.visible)} markers"
         return f"Observations({seen}, {self.label}: {shorten(self.source, 80, placeholder=' ...')!r})"
 
-    def __post_init__(self) -> None:
-        count = len(np.atleast_1d(self.visible))
-        for name, dtype, shape in (
-            ("points", np.float64, (count, 2)),
-            ("displacements", np.float64, (count, 2)),
-            ("standard_deviations", np.float64, (count, 2)),
-            ("visible", np.bool_, (count,)),
-        ):
-            frozen = frozen_array(getattr(self, name), dtype=dtype, shape=shape, name=name)
-            object.__setattr__(self, name, frozen)
+    def _check(self) -> None:
         deviations = self.standard_deviations
         if (deviations < 0).any():
             raise UserError("standard deviations must be zero or more (mm)")
@@ -66,7 +86,7 @@ class Observations:
             )
         if not 0 <= self.marker_radius < inf:
             raise UserError(f"the marker radius must be zero or more, got {self.marker_radius} (mm)")
-        if count == 0:
+        if not len(self.visible):
             raise ShapeError("observations need at least one marker")
 
     @property

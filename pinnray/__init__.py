@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from pinnray.camera import film_forces as film_forces
     from pinnray.camera import rig as rig
     from pinnray.camera import track as track
-    from pinnray.compared import Comparison as Comparison
-    from pinnray.comparison.crossval.result import CrossvalResult as CrossvalResult
     from pinnray.comparison.evaluation.evaluation import Evaluation as Evaluation
+    from pinnray.comparison.report.comparison import Comparison as Comparison
     from pinnray.designers import optimise as optimise
     from pinnray.designers import predict as predict
     from pinnray.designers import predict_field as predict_field
@@ -35,7 +34,8 @@ if TYPE_CHECKING:
     from pinnray.geometry.finger.presets import load_design as load_design
     from pinnray.geometry.finger.presets import preset_names as preset_names
     from pinnray.geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
-    from pinnray.observations import Observations as Observations
+    from pinnray.geometry.observations import Observations as Observations
+    from pinnray.measurements import load_measurements as load_measurements
     from pinnray.robots.export import Exported as Exported
     from pinnray.runtime.errors import OutsideBodyError as OutsideBodyError
     from pinnray.runtime.errors import UserError as UserError
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from pinnray.solvers.physics import Material as Material
     from pinnray.solvers.problem import Problem as Problem
     from pinnray.solvers.registry import solver_names as solver_names
+    from pinnray.studies.crossval.result import CrossvalResult as CrossvalResult
     from pinnray.studies.fields.prediction import PredictedField as PredictedField
     from pinnray.studies.optimum.search import Optimum as Optimum
     from pinnray.vision.calibration.camera_calibration import Calibration as Calibration

@@ -1,27 +1,18 @@
 """Functions of the front door for experimenters: calibrate, track, force from a film, and the virtual rig."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Literal
 
-from pinnray.arguments import (
-    FILM,
-    MATERIAL,
-    FilmJobKeywords,
-    FilmKeywords,
-    JobKeywords,
-    mesh_settings,
-    read_finger,
-    read_job,
-    read_solver,
-)
-from pinnray.geometry import observations
+from pinnray.arguments import MATERIAL, mesh_settings, read_finger, read_job, read_solver, taken
+from pinnray.film.film import FilmSettings
+from pinnray.film.rig_settings import RigSettings
 from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.finger.parameters import unknown_parameter
-from pinnray.observations import Observations
-from pinnray.runtime.errors import UserError
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.geometry.observations import Observations
+from pinnray.measurements import load_measurements
 from pinnray.runtime.text_files import as_path
 from pinnray.solvers.physics import Load, LoadKind, Material
 from pinnray.solvers.solver import Solver
@@ -29,8 +20,6 @@ from pinnray.solvers.solver import Solver
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pinnray.film.film import Film
-    from pinnray.runtime.tables import Cell
     from pinnray.vision.calibration.camera_calibration import Calibration
     from pinnray.vision.rig.exposure import Exposure
     from pinnray.vision.rig.motion import Motion
@@ -47,18 +36,17 @@ def calibrate(
     k3: bool = False,
     out: str | Path | None = None,
 ) -> "Calibration":
-    """Calibrate a camera from photographs of a chessboard, a ChArUco board or a grid of dots.
+    """Calibrate a camera from photographs of a chessboard or a ChArUco board.
 
     Args:
         images: Photographs of the board, all of one size: pictures, folders, patterns, or a video.
-        board: Inner corners of a chessboard, such as "9x6", squares of a ChArUco board, "charuco:8x6", or
-            dots of a grid, "circles:7x6" or "acircles:4x11".
+        board: Inner corners of a chessboard, such as "9x6", or squares of a ChArUco board, "charuco:8x6".
         square: Side of a square, mm.
         marker: Side of a marker of a ChArUco board, mm.
         dictionary: ArUco dictionary of a ChArUco board.
         model: Lens model: `brown` up to about 100 degrees of view, `fisheye` beyond.
         k3: Whether to fit the third radial coefficient too.
-        out: Camera file, .json or .yaml, that `track` takes; nothing is written if None.
+        out: Camera file, .json, that `track` takes; nothing is written if None.
 
     Raises:
         UserError: If the photographs do not determine the camera.
@@ -87,7 +75,7 @@ def track(
     *,
     out: str | Path | None = None,
     progress: bool | None = None,
-    **film: Unpack[FilmKeywords],
+    **film: Any,
 ) -> Observations:
     """Measure the markers of a finger in a film that shows it at rest, pressed, and held.
 
@@ -96,7 +84,8 @@ def track(
         design: The finger, in one of the ways of `mesh`.
         out: Folder for observations, tracks and pictures; nothing is kept if None.
         progress: Whether to show the stages; if None in a notebook only.
-        film: How it is read: `camera`, `workspace`, `colour`, `method`, `fps`; see `FilmKeywords`.
+        film: How it is read, by the words of `pinnray.film.film.FilmSettings`: `camera`, `workspace`,
+            `colour`, `method`, `fps`.
 
     Raises:
         UserError: If the film does not show the finger.
@@ -104,10 +93,7 @@ def track(
     from pinnray.film.track_film import track_film
     from pinnray.runtime.stages import shown_stages
 
-    for name in film:
-        if name not in FILM:
-            raise UserError(unknown_parameter(name, besides=(*FILM, "design", "out", "progress")))
-    opened, finger = _film(source, film), read_finger(design)
+    opened, finger = FilmSettings(**film).of(str(source)), read_finger(design)
     with (
         TemporaryDirectory() if out is None else nullcontext(as_path(out, "out")) as folder,
         shown_stages(progress) as stages,
@@ -115,7 +101,7 @@ def track(
     ):
         Path(folder).mkdir(parents=True, exist_ok=True)
         _, found = track_film(opened, finger, Path(folder), report, video=out is not None)
-    return Observations.of(found)
+    return found
 
 
 def film_forces(
@@ -124,7 +110,7 @@ def film_forces(
     *,
     material: Material | str | None = None,
     progress: bool | None = None,
-    **given: Unpack[FilmJobKeywords],
+    **given: Any,
 ) -> "pd.DataFrame":
     """Estimate the indenter's force and its place in every frame of a film, from the markers.
 
@@ -143,18 +129,17 @@ def film_forces(
     Raises:
         UserError: If the film does not show the finger, or DOLFINx is missing.
     """
+    import numpy as np
     import pandas as pd
 
-    from pinnray.film.force_estimate import MESH, force_rows, force_tracker, forces_of
+    from pinnray.film.force_estimate import MESH, force_row, force_tracker, forces_of
     from pinnray.film.track_film import track_film
     from pinnray.geometry.cache import finger_mesh, mesh_sizes
     from pinnray.runtime.stages import shown_stages
 
-    words: dict[str, Any] = {**given}
-    film = _film(source, {name: words.pop(name) for name in FILM if name in words})
-    finger, elastic, _ = read_job(
-        design, material, None, words, besides=("material", *FILM), allowed=MATERIAL
-    )
+    film = FilmSettings(**taken(given, FilmSettings)).of(str(source))
+    words = ("material", *FilmSettings.model_fields)
+    finger, elastic, _ = read_job(design, material, None, given, besides=words, allowed=MATERIAL)
     with shown_stages(progress) as stages:
         with TemporaryDirectory() as folder, stages.stage("track") as report:
             tracking, seen = track_film(film, finger, Path(folder), report, video=False)
@@ -163,8 +148,7 @@ def film_forces(
         with stages.stage("force") as report:
             tracker = force_tracker(mesh, elastic, seen.points, finger.marker_radius)
             forces = forces_of(tracking, tracker, report)
-    rows = force_rows(forces, finger.depth)
-    return pd.DataFrame([_with_nan(row) for row in rows])
+    return pd.DataFrame([force_row(force, finger.depth) for force in forces]).fillna(np.nan)
 
 
 def rig(
@@ -172,21 +156,15 @@ def rig(
     solver: str | Solver | None = None,
     *,
     out: str | Path,
-    frame: tuple[int, int] = (1280, 720),
-    tilt: float = 0.0,
-    turn: float = 0.0,
-    paint: Literal["dark", "red", "green", "blue"] = "dark",
     exposure: "Exposure | None" = None,
     motion: "Motion | None" = None,
-    boards: int = 0,
-    board: str = "9x6",
-    square: float = 8.0,
+    codec: str = "ffv1",
     seed: int = 0,
-    size: float | None = None,
-    material: Material | None = None,
+    size: float | MeshSettings | None = None,
+    material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     progress: bool | None = None,
-    **given: Unpack[JobKeywords],
+    **given: Any,
 ) -> Path:
     """Film a pressed finger with a virtual camera, and write the true markers and forces beside the film.
 
@@ -194,21 +172,17 @@ def rig(
         design: The finger, in one of the ways of `mesh`.
         solver: Of the filmed displacements; the finite-strain simulation of `compare` if None.
         out: Folder for the film and its files, which is replaced.
-        frame: Width and height, pixels.
-        tilt: Angle between the optical axis and the finger's z axis, degrees, up to 30.
-        turn: Rotation of the camera about its optical axis, degrees.
-        paint: Of the markers.
         exposure: Light, lens and sensor, as `pinnray.vision.rig.exposure.Exposure`.
         motion: Numbers of frames at rest, moving and held, as `pinnray.vision.rig.motion.Motion`.
-        boards: Number of photographs of a calibration board, for `calibrate`.
-        board: Inner corners of a chessboard, such as "9x6".
-        square: Side of its squares, mm.
+        codec: `ffv1` or `png` (lossless), `mjpg` or `mp4v`.
         seed: Of the noise.
         size: Largest element in walls and ribs, mm.
-        material: The elastic constants.
+        material: The elastic constants, or the name of a material.
         load: Motion of the indenter, or its kind alone.
         progress: Whether to show the stages; if None in a notebook only.
-        given: Parameters of finger, material and load, as for `solve`.
+        given: Camera, markers, cables and calibration boards by the words of
+            `pinnray.film.rig_settings.RigSettings`, such as `frame`, `tilt`, `paint`, `boards`; parameters of
+            finger, material and load, as for `solve`.
 
     Returns:
         The video; `camera.json` and `observations_true.csv` are beside it.
@@ -216,78 +190,50 @@ def rig(
     Raises:
         UserError: If the finger cannot be filmed so.
     """
-    from pinnray.film.filmed_force import filmed_course
-    from pinnray.film.virtual_film import filmed_solution, write_film
+    from pinnray.film.virtual_film import film_finger
     from pinnray.geometry.cache import finger_mesh
     from pinnray.runtime.output_folder import check_output
     from pinnray.runtime.stages import shown_stages
-    from pinnray.vision.calibration.charuco import parse_board
-    from pinnray.vision.rig.bench import PAINTS, Bench
+    from pinnray.solvers.problem import Problem
     from pinnray.vision.rig.exposure import Exposure
     from pinnray.vision.rig.motion import Motion
-    from pinnray.vision.rig.recording import Recording
-    from pinnray.vision.rig.recording_files import FILES
-    from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
-    from pinnray.vision.tracking.workspace import default_workspace
+    from pinnray.vision.rig.recording_files import FILES, check_codec
 
     folder = as_path(out, "out")
     check_output(folder)
-    limits = {"tilt": (tilt, -30, 30), "turn": (turn, -360, 360), "boards": (boards, 0, 1000)}
-    for name, (value, low, high) in limits.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise UserError(f"{name} = {value!r}: give a number from {low} to {high}")
-    if len(frame) != 2 or not all(isinstance(each, int) and 10 <= each <= 4000 for each in frame):
-        raise UserError(f"frame = {frame!r}: give width and height in pixels, such as (1280, 720)")
-    if paint not in PAINTS:
-        raise UserError(f"paint = {paint!r}: there are {', '.join(PAINTS)}")
-    finger, elastic, moved = read_job(design, material, load, given, besides=("material", "load", "size"))
+    check_codec(codec)
+    settings = RigSettings(**taken(given, RigSettings))
+    words = ("size", "material", "load", *RigSettings.model_fields)
+    finger, elastic, moved = read_job(design, material, load, given, besides=words)
+    (
+        settings.view(finger),
+        settings.sheet(),
+        settings.covered,
+    )  # or says what is wrong, before the mesh is made
     chosen = None if solver is None else read_solver(solver)
-    sheet, workspace, camera = parse_board(board, square), default_workspace(finger), default_camera(*frame)
     with shown_stages(progress) as stages:
         with stages.stage("mesh"):
             mesh = finger_mesh(finger, settings=mesh_settings(size))
-        solution, source = filmed_solution(mesh, finger, elastic, moved, chosen, stages)
-        recording = Recording(
-            bench=Bench(mesh, finger, workspace, paint),
-            displacement=solution.displacement(mesh.at_nodes()),
-            camera=camera,
-            pose=viewing_pose(camera, workspace, tilt=tilt, turn=turn),
+        film_finger(
+            Problem(mesh, elastic, moved, finger=finger),
+            chosen,
+            folder,
+            stages,
+            rig=settings,
             exposure=exposure or Exposure(),
             motion=motion or Motion(),
+            codec=codec,
             seed=seed,
-            course=filmed_course(solution),
         )
-        write_film(recording, solution, folder, stages, source=source, board=sheet, boards=boards, facts={})
-    return folder / FILES["ffv1"]
+    return folder / FILES[codec]
 
 
 def read_observations(
-    given: "str | Path | observations.Observations | pd.DataFrame | None", design: Finger
-) -> observations.Observations | None:
+    given: "str | Path | Observations | pd.DataFrame | None", design: Finger
+) -> Observations | None:
     """Observations of a finger, from a data frame, a CSV file, or a film."""
-    if given is None or isinstance(given, observations.Observations):
+    if given is None or isinstance(given, Observations):
         return given
-    if not isinstance(given, str | Path):
-        return Observations.from_dataframe(given, marker_radius=design.marker_radius)
-    if Path(given).suffix.lower() != ".csv":
+    if isinstance(given, str | Path) and Path(given).suffix.lower() != ".csv":
         return track(given, design)
-    return Observations.from_csv(given, marker_radius=design.marker_radius)
-
-
-def _with_nan(row: "dict[str, Cell]") -> "dict[str, Cell]":
-    """A row of a file with nan in place of empty cells, but for its remark."""
-    return {name: float("nan") if cell == "" and name != "remark" else cell for name, cell in row.items()}
-
-
-def _film(source: object, film: Mapping[str, Any]) -> "Film":
-    """The film, with the options of `FilmKeywords` that are given."""
-    from pinnray.film.film import Film
-
-    if (method := film.get("method", "precise")) not in ("precise", "hough"):
-        raise UserError(f"method = {method!r}: there are precise, hough")
-    files = {
-        name: as_path(film[name], said)
-        for name, said in (("camera", "the camera"), ("workspace", "the workspace"))
-        if film.get(name) is not None
-    }
-    return Film(str(source), **{**film, **files})
+    return load_measurements(given, marker_radius=design.marker_radius)

@@ -9,12 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Literal
 
-from pinnray.arguments import JobKeywords, mesh_settings, read_job
+from pinnray.arguments import mesh_settings, read_job
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.runtime.text_files import as_path
@@ -32,11 +33,11 @@ if TYPE_CHECKING:
 def sensitivity(
     design: str | Path | Finger = "default",
     *,
-    size: float | None = None,
+    size: float | MeshSettings | None = None,
     material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     progress: bool | None = None,
-    **given: Unpack[JobKeywords],
+    **given: Any,
 ) -> "LocalSensitivity":
     """How every figure of a finger changes with each parameter: `sensitivity(stroke=8).plot("force")`.
 
@@ -87,7 +88,7 @@ def sweep(
     out: str | Path | None = None,
     processes: int | None = None,
     progress: bool | None = None,
-    **fixed: Unpack[JobKeywords],
+    **fixed: Any,
 ) -> "pd.DataFrame":
     """Solve many fingers: `sweep({"rib_count": [4, 6], "young": [3, 5]}, stroke=8)`; see `pinnray sweep`.
 
@@ -164,10 +165,10 @@ def predict(
     if not isinstance(several, Sequence) or not all(isinstance(each, Mapping) for each in several):
         raise UserError(f"the fingers are dictionaries such as {{'rib_count': 5}}, not {fingers!r}")
     emulator = emulator_of(as_path(sweep, "the sweep"))
-    read = [emulator.inputs.read({name: str(value) for name, value in each.items()}) for each in several]
-    for place, finger in enumerate(read):
-        if fault := emulator.inputs.fault(finger):
-            raise UserError(f"finger {place}: {fault}")
+    read = [
+        emulator.inputs.finger({name: str(value) for name, value in each.items()}, f"finger {place}: ")
+        for place, each in enumerate(several)
+    ]
     return prediction_table(emulator, read, emulator.predict(read))
 
 

@@ -9,19 +9,11 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
-from pinnray.arguments import (
-    JobKeywords,
-    MeshKeywords,
-    given_drawing,
-    mesh_settings,
-    read_job,
-    read_solver,
-    read_solvers,
-)
+from pinnray.arguments import given_drawing, mesh_settings, read_job, read_solver, read_solvers, taken
 from pinnray.camera import read_observations
-from pinnray.compared import Comparison
+from pinnray.comparison.report.comparison import Comparison
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.finger import Finger
@@ -39,10 +31,10 @@ from pinnray.solvers.solver import Solver, Traits, solved, with_law
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pinnray.comparison.crossval.result import CrossvalResult
+    from pinnray.studies.crossval.result import CrossvalResult
 
 
-def mesh(design: str | Path | Finger = "default", **given: Unpack[MeshKeywords]) -> TriangleMesh:
+def mesh(design: str | Path | Finger = "default", **given: Any) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before: `mesh(size=0.5, rib_count=6)`.
 
     Args:
@@ -52,9 +44,8 @@ def mesh(design: str | Path | Finger = "default", **given: Unpack[MeshKeywords])
     Raises:
         UserError: If the design or a setting is not admissible.
     """
-    words: dict[str, Any] = {**given}
-    settings = {name: words.pop(name) for name in MeshSettings.model_fields if name in words}
-    finger, _, _ = read_job(design, None, None, words, besides=tuple(MeshSettings.model_fields), allowed=())
+    settings = taken(given, MeshSettings)
+    finger, _, _ = read_job(design, None, None, given, besides=tuple(MeshSettings.model_fields), allowed=())
     return finger_mesh(finger, settings=MeshSettings(**settings) if settings else None)
 
 
@@ -90,12 +81,12 @@ def solve(
     solver: str | Solver | None = None,
     *,
     preset: str | None = None,
-    size: float | None = None,
+    size: float | MeshSettings | None = None,
     material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
     progress: bool | None = None,
-    **given: Unpack[JobKeywords],
+    **given: Any,
 ) -> Solution:
     """Solve a problem, or a design with the usual material and load, with one solver.
 
@@ -108,7 +99,8 @@ def solve(
         solver: A solver or its name, which takes the material law that it has; if None `fem`, or with a
             preset `pinn-std`.
         preset: Of a network: `fast`, `local`, `paper` or `trained`.
-        size: Largest element in walls and ribs, mm; as the next arguments, for a design only.
+        size: Largest element in walls and ribs, mm, or `MeshSettings`; as the next arguments, for a design
+            only.
         material: The elastic constants, unless `young` and others are given, or a name of
             `pr.MATERIALS`.
         load: Motion of the indenter, or its kind alone.
@@ -164,7 +156,7 @@ def compare(
     preset: str | None = None,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
     truth: str = "sliding",
-    size: float | None = None,
+    size: float | MeshSettings | None = None,
     adapt: float | None = None,
     material: Material | str | None = None,
     load: Load | LoadKind | None = None,
@@ -172,7 +164,7 @@ def compare(
     out: str | Path | None = None,
     resume: bool = False,
     progress: bool | None = None,
-    **given: Unpack[JobKeywords],
+    **given: Any,
 ) -> Comparison:
     """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
 
@@ -200,17 +192,18 @@ def compare(
     from pinnray.comparison.pipeline.job import Job, checked
     from pinnray.comparison.pipeline.pipeline import compute, run
     from pinnray.options.preset_jobs import job_defaults
+    from pinnray.options.solver_choice import spare_solvers
     from pinnray.runtime.stages import shown_stages
 
     if adapt is not None and (isinstance(adapt, bool) or not isinstance(adapt, int | float)):
         raise UserError(f"adapt = {adapt!r} is no number; give a tolerance in mm")
     words = ("solvers", "size", "adapt", "material", "load", "measurements", "truth", "preset", "reference")
     finger, elastic, moved = read_job(design, material, load, given, besides=words)
-    chosen = read_solvers(job_defaults(None).solvers.split(",") if solvers is None else solvers, preset)
+    chosen = read_solvers(job_defaults(preset).solvers.split(",") if solvers is None else solvers, preset)
     job = Job(
         design=finger,
         solvers=chosen,
-        spare=[each.name for each in chosen if each.name != reference] if solvers is None else (),
+        spare=spare_solvers(chosen, reference, preset) if solvers is None else (),
         mesh=mesh_settings(size),
         adapt=adapt,
         material=elastic,
@@ -222,9 +215,9 @@ def compare(
     )
     with shown_stages(progress) as stages:
         if out is not None:
-            return Comparison.of(run(replace(job, out=as_path(out, "out")), stages))
+            return run(replace(job, out=as_path(out, "out")), stages)
         with TemporaryDirectory() as folder:
-            return Comparison.of(compute(checked(job), stages, Path(folder)))
+            return compute(checked(job), stages, Path(folder))
 
 
 def crossval(
@@ -233,7 +226,7 @@ def crossval(
     *,
     out: str | Path,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
-    size: float | None = None,
+    size: float | MeshSettings | None = None,
     material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     progress: bool | None = None,
@@ -250,18 +243,18 @@ def crossval(
         material: The elastic constants.
         load: Motion of the indenter, or its kind alone.
         progress: Whether to show the stages; if None in a notebook only.
-        study: Further attributes of `comparison.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
+        study: Further attributes of `studies.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
             `seeds`, `noise`; and parameters of finger, material and load, as for `solve`.
 
     Returns:
-        The scores; `table()` has them by truth, layout, solver and scheme.
+        The scores; `table()` has them by truth, layout, solver, scheme and score.
 
     Raises:
         UserError: If the study cannot be made, or the folder holds another one.
     """
-    from pinnray.comparison.crossval.cross_validation import cross_validate
-    from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
     from pinnray.runtime.stages import shown_stages
+    from pinnray.studies.crossval.cross_validation import cross_validate
+    from pinnray.studies.crossval.study import CrossvalStudy, solver_variants
 
     own = [each.name for each in fields(CrossvalStudy)]
     words = {name: study.pop(name) for name in list(study) if name not in own}

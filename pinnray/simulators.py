@@ -2,10 +2,12 @@
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Unpack
+from typing import TYPE_CHECKING, Any
 
-from pinnray.arguments import JobKeywords, mesh_settings, read_job
+from pinnray.arguments import mesh_settings, read_job, taken
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.robots.export_settings import KINDS, ExportSettings, Kind
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import as_path
 from pinnray.solvers.physics import Load, LoadKind, Material
@@ -15,58 +17,47 @@ if TYPE_CHECKING:
 
 
 def export(
-    kind: Literal["mujoco", "sofa", "mesh"],
+    kind: Kind,
     design: str | Path | Finger = "default",
     *,
     out: str | Path,
-    hinges: int = 12,
-    loss_factor: float = 0.2,
-    across: int = 1,
-    layers: int = 1,
-    places: int = 6,
-    score: bool = False,
-    size: float | None = None,
+    size: float | MeshSettings | None = None,
     material: Material | str | None = None,
     load: Load | LoadKind | None = "cylinder",
     progress: bool | None = None,
-    **given: Unpack[JobKeywords],
+    **given: Any,
 ) -> "Exported":
     """Write a finger for a robot simulator, in SI units: `export("mujoco", out="model", score=True)`.
 
-    Warns of loads that `fem-nonlinear` did not reach, and of a scene that nobody has run.
+    Warns of loads that `fem-nonlinear` did not reach.
 
     Args:
         kind: `mujoco`: a chain of hinges and a flexible body, both fitted to `fem-nonlinear` under a cylinder
-            at several places, up to the stroke; `sofa`: a scene and its mesh; `mesh`: tetrahedra, their
-            surface, and the material.
+            at several places, up to the stroke; `mesh`: tetrahedra, their surface, and the material.
         design: A finger in one of the ways of `mesh`.
         out: Output folder.
-        hinges: Number of hinges of the chain.
-        loss_factor: Damping of the material, which is stated and not fitted.
-        across: Least number of tetrahedra through a wall.
-        layers: Layers of tetrahedra through the depth.
-        places: Number of places of the cylinder for the fit.
-        score: Whether to press the models of `mujoco` at loads that the fit has not seen.
         size: Largest element of `fem-nonlinear` in walls and ribs, mm; 1 if None.
         material: See `solve`.
         load: See `solve`; a cylinder.
         progress: Whether to show the stages; if None in a notebook only.
-        given: Parameters of finger, material and load.
+        given: Settings by the words of `pinnray.robots.export_settings.ExportSettings`: `hinges`,
+            `loss_factor`, `across`, `layers`, `places`, `score`; parameters of finger, material and load.
 
     Raises:
         UserError: If MuJoCo is missing, a load is not possible, or the finger is of several materials.
     """
     from pinnray.geometry.cache import finger_mesh, mesh_sizes
-    from pinnray.robots.export import KINDS, SIZES, ExportSettings, export_finger
+    from pinnray.robots.export import SIZES, export_finger
     from pinnray.runtime.stages import shown_stages
     from pinnray.solvers.problem import Problem
 
     if kind not in KINDS:
         raise UserError(f"there is no export {kind!r}; there are {', '.join(KINDS)}")
-    settings = ExportSettings(
-        hinges=hinges, loss_factor=loss_factor, across=across, layers=layers, places=places, score=score
-    )
-    finger, elastic, moved = read_job(design, material, load, given, besides=("size", "material", "load"))
+    settings = ExportSettings(**taken(given, ExportSettings))
+    if settings.score and kind != "mujoco":
+        raise UserError(f"score is of mujoco; no score is made for {kind}")
+    words = ("size", "material", "load", *ExportSettings.model_fields)
+    finger, elastic, moved = read_job(design, material, load, given, besides=words)
     with shown_stages(progress) as stages:
         with stages.stage("mesh"):
             triangles = finger_mesh(finger, settings=mesh_sizes(finger, mesh_settings(size), SIZES))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
@@ -11,15 +11,15 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
+from pinnray.robots.export_settings import ExportSettings, Kind
 from pinnray.robots.mjcf import Damping, chain_mjcf, flex_mjcf, with_header
 from pinnray.robots.picture import draw_score
-from pinnray.robots.presses import PLACES, PressedFinger, at_rest, press
+from pinnray.robots.presses import PressedFinger, press
 from pinnray.robots.score import ModelScore, scored
 from pinnray.robots.simulation import Model, chain_front, check_mujoco, flex_front
-from pinnray.robots.sofa import sofa_scene
-from pinnray.robots.solid_files import write_material, write_msh, write_surface, write_vtk
+from pinnray.robots.solid_files import write_material, write_surface, write_vtk
 from pinnray.robots.solid_mesh import SolidMesh
-from pinnray.robots.springs import Springs, fitted_springs
+from pinnray.robots.springs import fitted_springs
 from pinnray.runtime.atomic import write_json, write_text
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.stages import Stages
@@ -28,42 +28,12 @@ from pinnray.solvers.finger_figures.figures import DENSITY
 from pinnray.solvers.finger_figures.measures import thinnest_wall
 from pinnray.solvers.problem import Problem
 
-Kind = Literal["mujoco", "sofa", "mesh"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
 SIZES = MeshSettings(size=1.0)
 """Sizes of the elements of `fem-nonlinear`, unless others are asked for."""
 FASTEST = 1500.0
 """Largest angular frequency of the chain, rad/s: with it a time step of 1 ms is stable."""
 COARSE = 45
 """Length of the finger over the largest side of a tetrahedron in the section."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExportSettings:
-    """What is exported, and how.
-
-    Attributes:
-        hinges: Number of the chain's hinges.
-        loss_factor: Of the material's damping: stated, as no load here measures it.
-        across: Least number of tetrahedra through a wall.
-        layers: Number of layers of tetrahedra through the depth.
-        places: Number of places of the cylinder for the fit.
-        score: Whether to score the models.
-    """
-
-    hinges: int = 12
-    loss_factor: float = 0.2
-    across: int = 1
-    layers: int = 1
-    places: int = PLACES
-    score: bool = False
-
-    def __post_init__(self) -> None:
-        for name, least, most in (("hinges", 2, 60), ("across", 1, 8), ("layers", 1, 40), ("places", 2, 20)):
-            if not least <= getattr(self, name) <= most:
-                raise UserError(f"{name} = {getattr(self, name)}: give a whole number from {least} to {most}")
-        if not 0 < self.loss_factor < 2:
-            raise UserError(f"loss_factor = {self.loss_factor:g}: give a number above 0 and below 2")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +57,8 @@ def export_finger(
     """Write a finger's models for a simulator.
 
     Args:
-        kind: `mujoco`: a chain of hinges and a flexible body, both fitted; `sofa`: a scene and its mesh;
-            `mesh`: tetrahedra and the material.
+        kind: `mujoco`: a chain of hinges and a flexible body, both fitted; `mesh`: tetrahedra, their surface
+            and the material.
         problem: The finger with its material and, for `mujoco`, the cylinder with its largest travel.
         out: Output folder.
         settings: How.
@@ -111,27 +81,11 @@ def export_finger(
         body = SolidMesh.of(finger_mesh(finger, settings=coarse, across=settings.across), settings.layers)
     if kind == "mujoco":
         return _mujoco(problem, finger, density, body, out, settings, stages)
-    files = [out / "finger.msh", out / "material.json"]
-    write_msh(files[0], body)
-    write_material(files[1], material, density, settings.loss_factor)
-    if kind == "mesh":
-        files += [out / "finger.vtk", out / "finger.stl"]
-        write_vtk(files[2], body)
-        write_surface(files[3], body)
-        return Exported(tuple(files))
-    with stages.stage("first vibration"):
-        _, _, damping = _chain(at_rest(problem), density, settings)
-    scene = sofa_scene("finger.msh", body, material, density, damping.loss_factor / damping.frequency)
-    write_text(out / "finger.scn", scene)
-    return Exported((out / "finger.scn", *files), remarks=("no SOFA has run this scene yet",))
-
-
-def _chain(
-    pressed: PressedFinger, density: float, settings: ExportSettings
-) -> tuple[Chain, Springs, Damping]:
-    chain = Chain.of(pressed.problem.mesh, pressed.front, settings.hinges, density)
-    springs = fitted_springs(chain, pressed, fastest=FASTEST)
-    return chain, springs, Damping(settings.loss_factor, float(springs.frequencies[0]))
+    files = out / "finger.vtk", out / "finger.stl", out / "material.json"
+    write_vtk(files[0], body)
+    write_surface(files[1], body)
+    write_material(files[2], material, density, settings.loss_factor)
+    return Exported(files)
 
 
 def _mujoco(
@@ -148,7 +102,9 @@ def _mujoco(
         pressed = press(problem, report, scored=settings.score, places=settings.places)
     rest, depth, name = MM * pressed.front, finger.depth, finger.name
     with stages.stage("fit"):
-        chain, springs, damping = _chain(pressed, density, settings)
+        chain = Chain.of(problem.mesh, pressed.front, settings.hinges, density)
+        springs = fitted_springs(chain, pressed, fastest=FASTEST)
+        damping = Damping(settings.loss_factor, float(springs.frequencies[0]))
         wall = thinnest_wall(finger.section)
         hinges = chain_mjcf(name, chain, springs, wall, depth, damping)
 

@@ -13,8 +13,8 @@ from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Progress, silent, solved, with_law
 
-FIRST, LAST, PLACES = 0.2, 0.7, 6
-"""Places of the cylinder for the fit, as fractions of the front face from base to tip, and their number.
+FIRST, LAST = 0.2, 0.7
+"""Places of the cylinder for the fit, as fractions of the front face from base to tip.
 
 The first is at least the cylinder's radius from the base. Half way between neighbours are the places for the
 score, each with two loads: at about half of the stroke and at the full one.
@@ -70,8 +70,8 @@ def press(
     problem: Problem,
     progress: Progress = silent,
     *,
-    scored: bool = True,
-    places: int = PLACES,
+    scored: bool,
+    places: int,
 ) -> PressedFinger:
     """Press a finger at the places to fit and at those to score.
 

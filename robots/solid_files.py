@@ -1,4 +1,4 @@
-"""Files of the extruded body for other programs: Gmsh 2.2, VTK and STL, in metres, and its material."""
+"""Files of the extruded body for other programs: VTK and STL, in metres, and its material."""
 
 from pathlib import Path
 from typing import Any
@@ -7,36 +7,15 @@ import numpy as np
 import pyvista
 
 from pinnray.robots.solid_mesh import SolidMesh
-from pinnray.runtime.atomic import atomic_path, write_json, write_text
+from pinnray.runtime.atomic import atomic_path, write_json
 from pinnray.solvers.physics import Material
-
-GROUPS = ("base", "front")
-"""Boundaries that are physical groups of triangles; `body` is the group of all tetrahedra."""
-
-
-def write_msh(path: Path, body: SolidMesh) -> None:
-    """Write the tetrahedra and the triangles of `GROUPS` as Gmsh's format 2.2, which SOFA and MuJoCo read."""
-    names = [*(f'2 {group} "{name}"' for group, name in enumerate(GROUPS, 1)), f'3 {len(GROUPS) + 1} "body"']
-    nodes = [f"{number} {x:.9g} {y:.9g} {z:.9g}" for number, (x, y, z) in enumerate(body.points.tolist(), 1)]
-    kinds = [(2, body.faces_on(name)) for name in GROUPS] + [(4, body.tetrahedra)]
-    elements = [
-        f"{kind} 2 {group} {group} {' '.join(map(str, row))}"
-        for group, (kind, cells) in enumerate(kinds, 1)
-        for row in (cells + 1).tolist()
-    ]
-    numbered = [f"{number} {line}" for number, line in enumerate(elements, 1)]
-    blocks: list[tuple[str, list[str]]] = [
-        ("MeshFormat", ["2.2 0 8"]),
-        ("PhysicalNames", [str(len(names)), *names]),
-        ("Nodes", [str(len(nodes)), *nodes]),
-        ("Elements", [str(len(numbered)), *numbered]),
-    ]
-    write_text(path, "".join("\n".join([f"${name}", *lines, f"$End{name}\n"]) for name, lines in blocks))
 
 
 def write_vtk(path: Path, body: SolidMesh) -> None:
-    """Write the tetrahedra as a VTK file."""
+    """Write the tetrahedra as a VTK file, with 1 at the nodes of `base` and of `front`."""
     grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: body.tetrahedra}, body.points)
+    for name in ("base", "front"):
+        grid.point_data[name] = np.isin(np.arange(len(body.points)), body.nodes_on(name)).astype(np.uint8)
     with atomic_path(path) as partial:
         grid.save(partial)
 

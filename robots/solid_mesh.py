@@ -53,20 +53,6 @@ class SolidMesh:
         flat = np.unique(self.section.boundary(name))
         return np.asarray((flat + len(self.section.points) * np.arange(self.levels)[:, None]).ravel())
 
-    def faces_on(self, name: str) -> IntArray:
-        """Triangles of the tetrahedra on a named boundary of the section, shape (f, 3), normals outward."""
-        on = np.zeros(len(self.points), dtype=np.bool_)
-        on[self.nodes_on(name)] = True
-        sides = self.skin
-        edges = {tuple(sorted(pair)) for pair in self.section.boundary(name).tolist()}
-        flat = sides % len(self.section.points)
-        kept = [
-            row
-            for row in np.flatnonzero(on[sides].all(axis=1))
-            if tuple(sorted(set(flat[row].tolist()))) in edges
-        ]
-        return sides[kept]
-
     @property
     def skin(self) -> IntArray:
         """Triangles of the whole surface, shape (f, 3), normals outward."""

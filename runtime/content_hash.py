@@ -8,8 +8,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 _PROGRAM = __name__.partition(".")[0]
 
 _IMPORT = re.compile(rf"^[ \t]*(?:from|import) ({_PROGRAM}\.[\w.]+)".encode(), re.MULTILINE)
@@ -84,6 +82,8 @@ def _package(module: str) -> Path | None:
 
 
 def _array_or_text(value: object) -> object:
+    import numpy as np  # where arrays are hashed it is there; options have to be read quickly
+
     if isinstance(value, np.ndarray):
         return [str(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
     return str(value)

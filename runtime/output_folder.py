@@ -11,7 +11,6 @@ import os
 import shutil
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from ctypes import CDLL
 from pathlib import Path
 from typing import Any
 
@@ -146,12 +145,8 @@ def _take_place(partial: Path, out: Path) -> None:
         if out.exists():
             with locked(out):  # for a moment it has the name of an unfinished folder
                 (out / MARK).touch()
-                if _exchanged(partial, out):
-                    with suppress(OSError):  # a later run replaces it
-                        partial.replace(previous)
-                else:
-                    out.replace(previous)
-                    partial.replace(out)
+                out.replace(previous)
+                partial.replace(out)
         else:
             partial.replace(out)
     except OSError as error:
@@ -167,13 +162,6 @@ def _take_place(partial: Path, out: Path) -> None:
     if previous.exists():
         with suppress(OSError):
             _discard(previous)
-
-
-def _exchanged(one: Path, other: Path) -> bool:
-    """Exchange two folders in one step; False where the file system cannot. Source: rename(2)."""
-    renameat2 = getattr(CDLL(None), "renameat2", None)
-    here, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
-    return renameat2 is not None and renameat2(here, bytes(one), here, bytes(other), exchange) == 0
 
 
 def _previous(out: Path) -> Path:

@@ -1,8 +1,8 @@
 """The stages of a run: their progress and how long each took."""
 
 import time
-from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
 from types import TracebackType
@@ -20,9 +20,7 @@ from rich.progress import (
 from rich.table import Column
 
 from pinnray.runtime.errors import InapplicableError
-from pinnray.runtime.machine import cores, machine
-from pinnray.runtime.processes.child import ProcessFailed
-from pinnray.runtime.processes.pool import Input, Output, Pool
+from pinnray.runtime.machine import machine
 from pinnray.runtime.progress import Progress as Report
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
@@ -167,34 +165,3 @@ class Stage:
         if stages._log:
             line = f"{self._name}: {seconds:.1f} s{note and ', '}{note}"
             stages._console.print(line, markup=False, highlight=False, soft_wrap=True)
-
-
-def in_stages(
-    work: Callable[[Input, Report], Output],
-    tasks: Mapping[str, Input],
-    *,
-    processes: int,
-    stages: Stages,
-    kind: str,
-    note: Callable[[str, Output | ProcessFailed], str],
-) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
-    """Run tasks in processes that share the cores, with a stage for each and one for all of them.
-
-    Args:
-        work: A function of a module, called with a task and a function that reports progress.
-        tasks: Tasks by name; they must be picklable.
-        processes: Largest number of processes at a time.
-        stages: Where the progress is shown.
-        kind: Name of the stage for all, such as "runs".
-        note: Turns a task's name and its answer into a short text.
-    """
-    with (
-        stages.stage(kind) as overall,
-        Pool(processes, threads=max(1, cores() // max(1, min(processes, len(tasks))))) as pool,
-        closing(pool.answers(work, tasks, report=stages.told)) as answers,
-    ):
-        for done, (name, answer) in enumerate(answers, start=1):
-            yield name, answer
-            stages.told(name, 1.0, note(name, answer))
-            stages.told(name)
-            overall(done / len(tasks), f"{done} of {len(tasks)} {kind}")

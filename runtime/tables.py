@@ -1,7 +1,7 @@
 """Numbers as text; tables of texts for the terminal and pages, of cells for CSV files, written atomically."""
 
 import csv
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan
 from pathlib import Path
@@ -19,8 +19,8 @@ LEAST_PERCENT, LEAST_DISTANCE = 0.001, 0.0001
 """Smaller shares, %, and lengths, mm, are printed as less than this: they are as good as zero."""
 
 
-def write_csv(path: Path, rows: Sequence[dict[str, Cell]]) -> None:
-    """Write rows with equal keys under a header, atomically; numbers keep all their digits.
+def write_csv(path: Path, rows: Sequence[Mapping[str, Cell | None]]) -> None:
+    """Write rows with equal keys under a header, atomically; numbers keep all their digits, None is empty.
 
     A text that a spreadsheet would take for a formula, as a file of others may be called, gets an apostrophe.
     """
@@ -30,7 +30,7 @@ def write_csv(path: Path, rows: Sequence[dict[str, Cell]]) -> None:
         writer.writerows({key: plain(cell) for key, cell in row.items()} for row in rows)
 
 
-def plain(cell: Cell) -> Cell:
+def plain(cell: Cell | None) -> Cell | None:
     """The cell, a text that begins like a formula with an apostrophe before it.
 
     Source: OWASP, CSV Injection.

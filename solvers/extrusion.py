@@ -31,8 +31,6 @@ class ExtrudedSpace:
     section: LagrangeSpace  # Quadratic elements on the shared mesh
     faces: FloatArray  # Places of the layers' faces, from 0 to half of the depth, shape (layers + 1,), mm
     held: bool = False  # Whether the side faces cannot move along z, so that the body is in plane strain
-    # Whether the other half moves as this one turned over, (-u_x, -u_y, u_z), not as it mirrored
-    antisymmetric: bool = False
     degree: ClassVar[int] = 2
 
     @classmethod
@@ -109,7 +107,7 @@ class ExtrudedSpace:
     def mirrored(self) -> BoolArray:
         """Components held by symmetry in the middle plane, and u_z on side faces that are held, (N, 3)."""
         mask = np.zeros(self.nodes.shape, dtype=bool)
-        mask[: len(self.section.nodes), [0, 1] if self.antisymmetric else 2] = True
+        mask[: len(self.section.nodes), 2] = True
         mask[-len(self.section.nodes) :, 2] = self.held
         return mask
 
@@ -124,14 +122,6 @@ class ExtrudedSpace:
     def mean_value(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Weights of the nodes in a weighted sum over points (q, 2), meant over z, shape (N,)."""
         return np.asarray(np.kron(self.shares, self.section.mean_value(points, weights)))
-
-    def slope_value(self, points: FloatArray, weights: FloatArray) -> FloatArray:
-        """Weights of the nodes in the slope along z, by least squares over it, of that sum, shape (N,), 1/mm.
-
-        A sum that is in proportion to z has its factor as the slope.
-        """
-        levels = self.shares * self.levels
-        return np.asarray(np.kron(levels / (levels @ self.levels), self.section.mean_value(points, weights)))
 
     def extruded(self, values: FloatArray) -> FloatArray:
         """Nodal values, shape (N, 3), that repeat a displacement (P, 2) of the section at every level."""

@@ -1,22 +1,20 @@
 """Material and load: elastic constants, and the motion of the indenter."""
 
-from collections.abc import Sequence
-from math import cos, isfinite, radians, sin
-from numbers import Real
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, get_args
+from math import cos, radians, sin
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
-import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
-from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.elasticity import Lame, lame_constants
 from pinnray.solvers.names import LawName
 from pinnray.solvers.names import LoadKind as LoadKind
 
-RADIUS = 5.0
+if TYPE_CHECKING:  # options are of these classes, and `--help` has to be quick
+    from pinnray.runtime.arrays import FloatArray
+    from pinnray.solvers.elasticity import Lame
+
+USUAL_RADIUS = 5.0
 """Default radius of the cylinder, mm."""
 
 ROUGHEST = 5.0
@@ -24,18 +22,6 @@ ROUGHEST = 5.0
 
 LEAST_TRAVEL = 1e-9
 """Smallest displacement of an indenter that moves, mm: a hundredth of an atom's size."""
-
-
-def _number(
-    default: float | None, low: float, high: float, unit: str, meaning: str, symbol: str = "", **limits: Any
-) -> Any:
-    """A number with its unit, the ends of the range that a study may span, and the limits of pydantic."""
-    return Field(
-        default=default,
-        description=meaning,
-        json_schema_extra={"unit": unit, "symbol": symbol, "low": low, "high": high},
-        **limits,
-    )
 
 
 class Substance(NamedTuple):
@@ -54,39 +40,17 @@ class Material(CheckedModel):
     given for plane stress.
     """
 
-    synonyms = MappingProxyType(
-        dict.fromkeys(("e", "modulus", "elastic_modulus", "stiffness"), "young") | {"nu": "poisson"}
+    #: From a thousandth of the softest gels' to eight times diamond's
+    young: float = bounded(11.4, 1e-6, 1e7, "MPa", "E", "Young's modulus")
+    poisson: float = bounded(0.45, -0.99, 0.4999, "", "nu", "Poisson's ratio", gt=-1, lt=0.5)
+    plane: Literal["strain", "stress"] = Field(
+        default="strain",
+        description="Plane strain (a thick finger), or plane stress, whose equations the paper prints",
     )
-
-    young: float = _number(11.4, 1e-6, 1e7, "MPa", "Young's modulus", "E", gt=0)
-    poisson: float = _number(0.45, -0.99, 0.4999, "", "Poisson's ratio", "nu", gt=-1, lt=0.5)
-    #: Plane "strain" (thick finger) or plane "stress" (the equations that the paper prints)
-    plane: Literal["strain", "stress"] = "strain"
-    law: LawName = "linear"  #: "linear" is Hooke's law; the others are of finite strain
+    law: LawName = Field(
+        default="linear", description="Material law of the solvers that have it; the others keep their own"
+    )
     _substance: Substance | None = PrivateAttr(None)  # beside the constants, which alone decide a solution
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            *,
-            young: float = 11.4,
-            poisson: float = 0.45,
-            plane: Literal["strain", "stress"] = "strain",
-            law: LawName = "linear",
-            E: float = 11.4,
-            nu: float = 0.45,
-        ) -> None: ...
-
-    @field_validator("young")
-    @classmethod
-    def _of_a_solid(cls, young: float) -> float:
-        softest, stiffest = 1e-6, 1e7  # a thousandth of the softest gels' to eight times diamond's
-        if not softest <= young <= stiffest:
-            raise ValueError(
-                f"no solid has this Young's modulus; give {softest:g} to {stiffest:g} MPa (1 MPa = 10^6 Pa)"
-            )
-        return young
 
     @model_validator(mode="after")
     def _supported(self) -> Self:
@@ -106,45 +70,56 @@ class Material(CheckedModel):
         return made
 
     @property
-    def lame(self) -> Lame:
+    def lame(self) -> "Lame":
         """Lamé constants of the plane law, MPa."""
-        return lame_constants(self.young, self.poisson, self.plane)
+        return self._lame(self.plane)
 
     @property
-    def solid_lame(self) -> Lame:
+    def solid_lame(self) -> "Lame":
         """Lamé constants in three dimensions, MPa."""
-        return lame_constants(self.young, self.poisson, "strain")
+        return self._lame("strain")
+
+    def _lame(self, plane: Literal["strain", "stress"]) -> "Lame":
+        from pinnray.solvers.elasticity import lame_constants
+
+        return lame_constants(self.young, self.poisson, plane)
 
 
-def travel(stroke: float, direction: float = 0.0, slide: bool = False) -> tuple[float | None, float]:
-    """Displacement (u, v), mm, of an indenter that presses.
-
-    Args:
-        stroke: Its travel, mm.
-        direction: Of the travel, degrees: 0 into the finger, 90 along it to the tip.
-        slide: Whether the contact slides along the finger: u is free.
+class Travel(CheckedModel):
+    """Travel of an indenter that presses.
 
     Raises:
-        UserError: If it does not press.
+        UserError: If it does not press, or slides and has a direction.
     """
-    for name, value in (("stroke", stroke), ("direction", direction)):
-        if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
-            raise UserError(f"{name} = {value!r} is not a finite number")
-    if stroke <= 0:
-        raise UserError(f"stroke {stroke:g}: the indenter presses; give its travel, above 0 mm")
-    if not -90 < direction < 90:
-        raise UserError(f"direction {direction:g}: give an angle between -90 and 90 degrees")
-    if slide and direction:
-        raise UserError("slide leaves the travel along the finger free, so that direction says nothing")
-    along, into = sin(radians(direction)), cos(radians(direction))
-    return None if slide else stroke * along, -stroke * into
+
+    stroke: float = bounded(10.0, 1e-6, 1e4, "mm", "", "Travel of the indenter")
+    direction: float = bounded(
+        0.0, -89, 89, "deg", "", "Direction of the travel: 0 into the finger, 90 along it to the tip"
+    )
+    slide: bool = Field(default=False, description="Let the contact slide along the finger: u is free")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.slide and self.direction:
+            raise ValueError("slide leaves the travel along the finger free, so that direction says nothing")
+        return self
+
+    @property
+    def displacement(self) -> tuple[float | None, float]:
+        """Displacement (u, v), mm."""
+        along, into = sin(radians(self.direction)), cos(radians(self.direction))
+        return None if self.slide else self.stroke * along, -self.stroke * into
+
+
+RADIUS: Any = bounded(None, 1e-6, 1e4, "mm", "", "Radius of a cylinder; none means 5 mm")
+FRICTION: Any = bounded(0.0, 0.0, ROUGHEST, "", "", "Coefficient of friction of a cylinder")
 
 
 class Load(CheckedModel):
     """Displacement that the indenter prescribes at the boundary `contact`; a component None is free of force.
 
     `Load("cylinder", stroke=5)`: the kind may be given first, and `stroke`, `direction` and `slide` stand for
-    the displacement, as in `travel`.
+    the displacement, as in `Travel`.
 
     Attributes:
         kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_functional`);
@@ -165,60 +140,24 @@ class Load(CheckedModel):
     kind: LoadKind = "mean"
     displacement: tuple[float | None, float | None] = (0.0, -10.0)
     position: float | None = None
-    radius: float | None = Field(default=None, gt=0, allow_inf_nan=False)
-    friction: float = bounded(0.0, 0.0, ROUGHEST, "", "", "Coefficient of friction of a cylinder")
+    radius: float | None = RADIUS
+    friction: float = FRICTION
+    other_words = tuple(Travel.model_fields)
 
-    other_words: ClassVar = ("stroke", "direction", "slide")
-    synonyms = MappingProxyType(
-        dict.fromkeys(("travel", "indentation"), "stroke")
-        | dict.fromkeys(("mu", "friction_coefficient"), "friction")
-        | {"angle": "direction"}
-    )
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            kind: LoadKind = "mean",
-            *,
-            displacement: tuple[float | None, float | None] = (0.0, -10.0),
-            stroke: float = 10.0,
-            direction: float = 0.0,
-            slide: bool = False,
-            position: float | None = None,
-            radius: float | None = None,
-            friction: float = 0.0,
-        ) -> None: ...
-
-    else:
-
-        def __init__(self, *kind, **values) -> None:
-            if len(kind) == 1 and isinstance(kind[0], str) and "kind" not in values:
-                values, kind = {"kind": kind[0], **values}, ()
-            way = {name: values.pop(name) for name in self.other_words if name in values}
-            if way and "displacement" in values:
-                raise UserError(f"{next(iter(way))} and displacement both say how far; give one of them")
-            if way:
-                values["displacement"] = travel(**{"stroke": 10.0, **way})
-            if values.get("kind") == "cylinder" and values.get("radius") is None:
-                values["radius"] = RADIUS
-            super().__init__(*kind, **values)
-
-    @field_validator("kind", mode="before")
-    @classmethod
-    def _of_a_kind(cls, kind: object) -> object:
-        if kind not in (kinds := get_args(LoadKind)):
-            raise ValueError(f"there are {', '.join(kinds)}")
-        return kind
+    def __init__(self, kind: LoadKind = "mean", **values: Any) -> None:
+        way = {name: values.pop(name) for name in self.other_words if name in values}
+        if way and "displacement" in values:
+            raise UserError(f"{next(iter(way))} and displacement both say how far; give one of them")
+        if way:
+            values["displacement"] = Travel(**way).displacement
+        if isinstance(kind, str) and kind == "cylinder" and values.get("radius") is None:
+            values["radius"] = USUAL_RADIUS
+        super().__init__(**{"kind": kind, **values})
 
     @field_validator("displacement", mode="before")
     @classmethod
-    def _of_two(cls, displacement: object) -> object:
-        if isinstance(displacement, np.ndarray):
-            displacement = displacement.tolist()
-        if not isinstance(displacement, Sequence) or isinstance(displacement, str) or len(displacement) != 2:
-            raise ValueError("give u and v in mm, such as (0, -10), or the travel alone as stroke = 10")
-        return displacement
+    def _of_an_array(cls, displacement: Any) -> object:
+        return displacement.tolist() if hasattr(displacement, "tolist") else displacement
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
@@ -253,42 +192,27 @@ class Load(CheckedModel):
         return [axis for axis, value in enumerate(self.displacement) if value is not None]
 
     @property
-    def values(self) -> FloatArray:
+    def values(self) -> "FloatArray":
         """The prescribed components' displacements, shape (1,) or (2,), mm."""
+        import numpy as np
+
         return np.array([value for value in self.displacement if value is not None], dtype=np.float64)
 
 
-class Physics(Material):
-    """Material and load by the names that options, files and studies share.
+class Physics(Travel, Material):
+    """Material and load by the names that options, keywords, files and studies share."""
 
-    The load is that of an indenter that travels in one direction.
-
-    Raises:
-        UserError: If the indenter does not press, or a value does not go with the kind of load.
-    """
-
-    synonyms = MappingProxyType({**Material.synonyms, **Load.synonyms})
-
-    load: LoadKind = "mean"  #: See `Load`
-    stroke: float = _number(10.0, 1e-6, 1e4, "mm", "Travel of the indenter")
-    #: 0 into the finger, 90 along it to the tip
-    direction: float = _number(0.0, -89, 89, "deg", "Direction of the travel")
-    slide: bool = False  #: Whether the contact slides along the finger: u is free
-    radius: float | None = _number(None, 1e-6, 1e4, "mm", "Radius of a cylinder; none means 5 mm")
-    friction: float = bounded(0.0, 0.0, ROUGHEST, "", "", "Coefficient of friction of a cylinder")
-
-    @model_validator(mode="after")
-    def _presses(self) -> Self:
-        travel(self.stroke, self.direction, self.slide)
-        return self
+    load: LoadKind = Field(
+        default="mean",
+        description="Indenter. mean: prescribed weighted mean displacement of the contact; point: one "
+        "prescribed point, as in the paper, which has no limit under refinement; patch: rigid patch; "
+        "cylinder: rigid cylinder",
+    )
+    radius: float | None = RADIUS
+    friction: float = FRICTION
 
     @property
     def parts(self) -> tuple[Material, Load]:
         """Material and load."""
-        load = Load(
-            self.load,
-            displacement=travel(self.stroke, self.direction, self.slide),
-            radius=self.radius,
-            friction=self.friction,
-        )
+        load = Load(self.load, displacement=self.displacement, radius=self.radius, friction=self.friction)
         return Material(**self.model_dump(include=set(Material.model_fields))), load

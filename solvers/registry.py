@@ -31,12 +31,6 @@ PRESETS = {
 }
 """Presets of our solvers, the default first. Each is a class with its own settings."""
 
-RENAMED = {"ridges": "neurons", "slope": "steepness"}
-"""Former names of settings, and their present names."""
-
-FORMER = {"pinn-local": "pinn-std", "pinn-local-asm": "pinn-asm"}
-"""Former names of the preset `local`, and the solvers that have it."""
-
 BUILT_IN = {
     "fem": "pinnray.solvers.fem.linear:FemSolver",
     "fem-nonlinear": "pinnray.solvers.fem.finite_strain.solver:FemNonlinearSolver",
@@ -93,9 +87,6 @@ def make_solver(name: str, **settings: Any) -> Solver:
     """
     if not isinstance(name, str):
         raise UserError(unknown_solver(name))
-    if name in FORMER:
-        warnings.warn(f"{name} is now the preset local of {FORMER[name]}", stacklevel=1)
-        name, settings = FORMER[name], {"preset": "local", **settings}
     if name in BUILT_IN:
         place = BUILT_IN[name]
         if "preset" in settings and name not in PRESETS:
@@ -151,8 +142,6 @@ def _typed(name: str, factory: Any, settings: Mapping[str, Any]) -> dict[str, An
     known = [entry.name for entry in fields(factory) if entry.init]
     typed = {}
     for key, value in settings.items():
-        if RENAMED.get(key) in known:
-            raise UserError(f"{name}: the setting {key!r} is now called {RENAMED[key]!r}")
         if key not in known:
             raise UserError(f"{name} has no setting {key!r}; it has {', '.join(known)}")
         try:

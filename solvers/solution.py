@@ -106,8 +106,6 @@ class IdentifiedForce(NamedTuple):
 
     size: Estimated  #: N/mm
     position: Estimated | None  #: Contact's abscissa on the drawn front, mm; None where it was no unknown
-    #: Share of the contact's motion and force, N/mm, of the finger that was found, from little load to all
-    path: Sequence[tuple[float, float]] = ()
 
     def phrase(self, depth: float | None = None) -> str:
         """Force and place with their intervals in words; in N as well for a finger of a depth, mm."""
@@ -115,13 +113,6 @@ class IdentifiedForce(NamedTuple):
         if depth is not None:
             said += f", {_interval(*(depth * value for value in self.size))} N over {depth:g} mm"
         return said if self.position is None else f"{said}, at x = {_interval(*self.position)} mm"
-
-
-class LateralStiffness(NamedTuple):
-    """Stiffness of a finger at rest against what its plane does not see, at the contact."""
-
-    sideways: float  #: Force along the depth per displacement along it, N/mm
-    torsional: float  #: Torque about the finger's axis per turn about it, N mm/rad
 
 
 @dataclasses.dataclass(frozen=True)
@@ -189,7 +180,6 @@ class Solution:
     #: Where the indenter presses, from a solver of finite strain; None if it does not touch
     contact: Contact | None = None
     identified: IdentifiedForce | None = None  #: The force, from a solver that identifies it
-    lateral: LateralStiffness | None = None  #: From a solver in space, where it was asked for
     pictures: Pictures | None = None  #: Frames of the observations' pictures, from a solver that finds them
 
     def displacement(self, points: ArrayLike | LocatedPoints) -> FloatArray:

@@ -212,19 +212,19 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
         UserError: If it is no `Solution`, or an array in it has a wrong shape or is not finite.
         SolverFailedError: If it raises anything but an error of the input or of the system.
     """
+    return _checked(solver, lambda: solver.solve(problem, progress), problem)
+
+
+def _checked(solver: Solver, solve: Callable[[], Solution], problem: Problem) -> Solution:
+    """The solution under its solver's name, or the errors of `solved`."""
     try:
-        solution = solver.solve(problem, progress)
+        solution = solve()
     except (UserError, OSError):
         raise
     except Exception as error:
         raise SolverFailedError(solver, error) from error
     except SystemExit as ended:
         raise UserError(f"solver {solver.name} ended the program (exit code {ended.code!r})") from ended
-    return _checked(solver, solution, problem)
-
-
-def _checked(solver: Solver, solution: Solution, problem: Problem) -> Solution:
-    """The solution under its solver's name, or the errors of `solved`."""
     for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):
         if not isinstance(value, kind):
             said = f"{_named(value)} as its {kind.__name__}"
@@ -335,5 +335,5 @@ def refitter(solver: Solver, problem: Problem) -> Callable[[Observations], Solut
     """A function that solves a problem for any observations, sharing work where the solver can."""
     if isinstance(solver, Refittable):
         refit = solver.refitter(problem)
-        return lambda seen: _checked(solver, refit(seen), replace(problem, observations=seen))
+        return lambda seen: _checked(solver, lambda: refit(seen), replace(problem, observations=seen))
     return lambda observations: solved(solver, replace(problem, observations=observations))

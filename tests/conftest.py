@@ -5,11 +5,11 @@ import hashlib
 import os
 import pickle
 import resource
-import shutil
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Generator, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.processes.pool import child_environment
 
 os.environ["PETSC_OPTIONS"] = (
     "-no_signal_handler"  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
@@ -92,39 +91,22 @@ def few_elements_throughout() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="session")
-def start_ranks() -> Callable[..., subprocess.Popen[str]]:
-    """`start_ranks(count, *arguments)`: Python with arguments on so many MPI ranks, as one process."""
-    launcher = shutil.which("mpirun")
-    assert launcher, "mpirun comes with DOLFINx"
-
-    def start(count: int, *arguments: str) -> subprocess.Popen[str]:
-        # This process may have initialised MPI itself, and what that left in the environment would confuse
-        # the launcher.
-        return subprocess.Popen(
-            [
-                *(launcher, "--allow-run-as-root", "--oversubscribe", "-n", str(count)),
-                *(sys.executable, *arguments),
-            ],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=child_environment(os.environ),
-        )
-
-    return start
-
-
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures take most of the time of a small run, and have tests of their own."""
     monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.draw_all", lambda *_: [])
 
 
-def inline(_: object, work: Callable, tasks: Mapping[str, object], **__: object) -> Generator:
+def inline(
+    _: object,
+    work: Callable,
+    tasks: Mapping[str, object],
+    report: Callable[..., None] = lambda *_: None,
+    **__: object,
+) -> Generator:
     """Stands for `Pool.answers`: tasks run one after the other in this process."""
     for name, each in tasks.items():
-        yield name, work(each, lambda *_: None)
+        yield name, work(each, partial(report, name))
 
 
 @pytest.fixture

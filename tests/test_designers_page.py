@@ -30,11 +30,11 @@ def test_the_page_has_every_key_of_a_study_and_of_a_question() -> None:
     assert names(table(PAGE, "key of a question")) == own
 
 
-@pytest.mark.parametrize("name", ["ribs.toml", "loads.toml", "friction.toml", "fingers.toml"])
+@pytest.mark.parametrize("name", ["ribs", "loads", "friction", "fingers", "gridsearch"])
 def test_the_example_study_can_be_read(name: str) -> None:
     from pinnray.studies.sweep.study import load_study
 
-    load_study(DOCS / "examples" / name)
+    load_study(DOCS / "examples" / f"{name}.toml")
 
 
 @pytest.mark.parametrize("name", ["wrap.toml", "wrap-cylinder.toml"])

@@ -17,7 +17,7 @@ from pydantic import BaseModel
 
 from pinnray.cli import compare_main, main
 from pinnray.commands.app import pinnray
-from pinnray.geometry.cache import CAD_FORMATS
+from pinnray.geometry.cache import CAD_FORMATS, finger_mesh
 from pinnray.geometry.finger.markers import marker_positions
 from pinnray.geometry.finger.parameters import Parameters, parameter_info
 from pinnray.geometry.finger.presets import FOLDER, load_design, preset_names
@@ -116,10 +116,13 @@ def run_folder(tmp_path_factory) -> Path:
     """The output of a small comparison, of a solver that follows the load and one that is trained too."""
     out = tmp_path_factory.mktemp("docs") / "run"
     options = (
-        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 1 --adapt 0.008 --solver-set pinn-std.preset=paper "
+        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 2 --adapt 0.02 --solver-set pinn-std.preset=paper "
         "--solver-set pinn-std.epochs=2 --solver-set pinn-std.width=4 --quiet"
     )
-    code = compare_main([*options.split(), "--out", str(out)])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(finger_mesh.__kwdefaults__, "across", 1)  # few elements
+        patch.setattr("pinnray.runtime.figure.DPI", 20)  # coarse pictures
+        code = compare_main([*options.split(), "--out", str(out)])
     assert code in (0, 3)  # so short a training may not converge
     return out
 
@@ -283,10 +286,8 @@ def test_the_docs_have_every_field_of_a_model_as_it_is(page, column, model):
     assert names(table(page, column)) == list(model.model_fields)
 
 
-RIG_LINE = "rig --size 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
-SEARCH_LINE = "gridsearch --learning-rates 1e-3 --bc-weights 10 --epochs 2 --solver-set pinn-std.width=4"
+RIG_LINE = "rig --frame 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
 FOLDS_LINE = "crossval --solvers fem,fem-asm --schemes one-out --seeds 1"
-FOLDS_NAMES = {"SEED": "seed-NAME", "LAYOUT": "joints", "TRUTH": "sliding"}
 
 
 @pytest.mark.slow
@@ -294,8 +295,7 @@ FOLDS_NAMES = {"SEED": "seed-NAME", "LAYOUT": "joints", "TRUTH": "sliding"}
     ("line", "page", "column", "words"),
     [
         (RIG_LINE, RIG, "file of a film", {"NUMBER": "NAME"}),
-        (SEARCH_LINE, TRAIN, "file of a search", {"NAME": "learning_rate-0.001_bc_weight-10.0"}),
-        (FOLDS_LINE, OWN_TRUTH, "file of a cross-validation", FOLDS_NAMES),
+        (FOLDS_LINE, OWN_TRUTH, "file of a cross-validation", {}),
     ],
 )
 def test_the_docs_have_every_file_of_a_command(line, page, column, words, tmp_path, in_line, few_elements):
@@ -425,7 +425,7 @@ def test_the_measurements_in_the_docs_can_be_read(tmp_path):
     ("page", "column", "listed"),
     [
         (FORCE, "parameter that can be found", "pinnray.solvers.identification.unknowns:NAMES"),
-        (OWN_TRUTH, "scheme", "pinnray.comparison.crossval.folds:SCHEMES"),
+        (OWN_TRUTH, "scheme", "pinnray.studies.crossval.folds:SCHEMES"),
         (OWN_TRUTH, "truth", "pinnray.comparison.evaluation.truths:TRUTHS"),
     ],
 )
@@ -434,14 +434,15 @@ def test_the_docs_have_every_name_of_a_list(page, column, listed):
 
 
 def test_the_docs_have_every_key_of_a_published_line():
-    from pinnray.film.publication import FrameLine, PublishedForce
+    from pinnray.film.publication import FrameLine
 
     page = HOW_TO / "force-from-film.md"
-    for heading, model in (("key of a line", FrameLine), ("key of a line's force", PublishedForce)):
-        said = {name for row in table(page, heading) for name in re.findall(r"`(\w+)`", row[0])}
-        assert said == set(model.model_json_schema()["properties"])
     (example,) = (block.text for block in blocks(page) if block.language == "json")
-    assert FrameLine.model_validate_json(example).force is not None
+    line = FrameLine.model_validate_json(example)
+    assert line.force is not None
+    for heading, keys in (("key of a line", line.model_dump()), ("column of `force.csv`", line.force)):
+        said = {name for row in table(page, heading) for name in re.findall(r"`(\w+)`", row[0])}
+        assert said == set(keys)
 
 
 def test_the_docs_have_every_exit_code():

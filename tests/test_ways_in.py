@@ -26,15 +26,12 @@ def test_the_page_has_the_table_of_the_default_run(page, name):
 @pytest.mark.slow
 def test_the_figures_of_the_default_run_are_those_of_the_program():
     from pinnray import compare
-    from pinnray.comparison.evaluation.metrics import force_error, truth_differences
 
     comparison = compare("default", ["fem", "fem-asm", "gp"])
     kept = {each.solver: each for each in kept_figures()}
     for evaluation in comparison.evaluations:
-        truth = comparison.truth
-        found = truth_differences(evaluation, truth)
-        figures = found.displacement.rel_l2, found.von_mises.rel_l2, force_error(evaluation, truth)
-        expected = kept[evaluation.solver]
+        own, expected = comparison.scores[evaluation.solver], kept[evaluation.solver]
+        figures = own.to_truth.displacement.rel_l2, own.to_truth.von_mises.rel_l2, own.force_to_truth_rel
         assert figures == pytest.approx((expected.displacement, expected.von_mises, expected.force), rel=1e-3)
 
 

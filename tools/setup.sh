@@ -90,7 +90,7 @@ if ! start 'import torch' 2>/dev/null; then
     say "torch is the CUDA build: installing its libraries (TORCH_INDEX=<PyTorch's CPU index> avoids this)"
     pip install "${index[@]}" "$torch" && start 'import torch' || stop "torch does not start."
 fi
-start 'import cadquery, cv2, dolfinx, gmsh, matplotlib.pyplot, pandas, plotly, pyvista, scipy, sklearn' ||
+start 'import cadquery, cv2, dolfinx, gmsh, matplotlib.pyplot, pandas, pyvista, scipy, sklearn' ||
     stop "a library does not start; its own message is above."
 
 printf '%s\n' "$state" > .venv/setup-state

@@ -1,6 +1,5 @@
 """Displacements from points that were clicked by hand in two photographs, at rest and pressed."""
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -14,7 +13,7 @@ from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import HAND_HELD, Homography, nearest_similarity
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.foreign_tables import foreign_table
+from pinnray.vision.measurements import csv_rows
 
 FEWEST = 3
 """Points that tell a picture's mirror image from itself."""
@@ -57,17 +56,8 @@ def read_clicks(path: Path) -> Clicks:
     With a column `point`, clicks of one number are repeats, and points are in the order of their numbers. A
     `UserError` names what cannot be read.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no table in CSV and UTF-8"
-        raise UserError(f"cannot read the clicks {path}: {reason}") from None
-    rows = [(line, row) for line, row in rows if not row[0].lstrip().startswith("#")]
-    if other := foreign_table([[cell.strip() for cell in row] for _, row in rows]):
-        raise UserError(f"{path} is no list of clicks; {other}")
-    header = [cell.strip().lower() for cell in rows[0][1]] if rows else []
+    _, rows = csv_rows(path, "clicks")
+    header = [cell.lower() for cell in rows[0][1]] if rows else []
     if not {"x", "y"} <= set(header):
         found = f"it has {', '.join(map(repr, header))}" if header else "it is empty"
         raise UserError(f"{path}: the header must name the columns x and y, and may name point; {found}")

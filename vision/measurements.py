@@ -2,8 +2,7 @@
 
 import csv
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
@@ -15,7 +14,6 @@ from pinnray.geometry.registration import FIXED, HAND_HELD, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import atomic_path
 from pinnray.runtime.errors import UserError
-from pinnray.vision.foreign_tables import foreign_table
 
 POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")
@@ -84,7 +82,7 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
         UserError: If the file cannot be read, a column is missing, a value is no number
             or a marker occurs twice; the message names the line.
     """
-    comments, table = _lines(path)
+    comments, table = csv_rows(path, "measurements")
     sources = _said(comments, SOURCE_MARK)
     simulated = any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in comments)
     known = {picture: said[0] for picture, mark in PICTURES.items() if (said := _said(comments, mark))}
@@ -125,8 +123,6 @@ def measurements_of(
     """
     for name in REQUIRED:
         if name not in header:
-            if other := foreign_table([header, *(cells for _, cells in rows)]):
-                raise UserError(f"{table} has no column {name}; {other}")
             raise UserError(
                 f"{table} has no column {name}; the header must name {', '.join(REQUIRED)} "
                 f"and may name {', '.join(OPTIONAL)}, with commas between; it {_titles(header)}"
@@ -194,52 +190,40 @@ def _titles(header: Sequence[str]) -> str:
     return f"names {named}" + (f" and {rest} more" if (rest := len(header) - MOST_TITLES) > 0 else "")
 
 
-def _lines(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The comments, and the cells of the other rows with the numbers of their first lines.
+def csv_rows(path: Path, what: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The comments of a CSV file, and the cells of its other rows with the numbers of their last lines.
 
     A spreadsheet program that saves the file puts a byte-order mark before the first line, quotes comments
     with a comma, and appends commas to them: the mark "simulated" must survive that. Within quotation marks a
     row goes on in the next line.
-    """
-    comments: list[str] = []
-    table: list[tuple[int, list[str]]] = []
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            numbered = enumerate(file, start=1)
-            for number, line in numbered:
-                if line.lstrip().startswith("#"):
-                    comments.append(line.strip(" \t\r\n,;"))
-                    continue
-                cells = _row(line, (more for _, more in numbered), f"{path}, line {number}")
-                if cells and cells[0].startswith("#"):
-                    comments.append(" ".join(cells[0].split()).strip(" ,;"))
-                elif any(cells):
-                    table.append((number, cells))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a CSV file in UTF-8"
-        raise UserError(f"cannot read the measurements {path}: {reason}") from None
-    return comments, table
 
-
-def _row(line: str, following: Iterator[str], where: str) -> list[str]:
-    """Cells of a row that begins with `line` and takes as many of the following lines as its quotes ask for.
+    Args:
+        path: The file.
+        what: Its rows, in a message.
 
     Raises:
-        UserError: If a quotation mark is not closed: the rest of the file would be one cell.
+        UserError: If it cannot be read or is no such file.
     """
-    lines = 0
-    quotes = 0
+    comments: list[str] = []
 
-    def taken() -> Iterator[str]:
-        nonlocal lines, quotes
-        for each in chain([line], following):
-            lines, quotes = lines + 1, quotes + each.count('"')
-            yield each
+    def uncommented(lines: Iterable[str]) -> Iterator[str]:
+        for line in lines:
+            if comment := line.lstrip().startswith("#"):
+                comments.append(line)
+            yield "\n" if comment else line
 
-    cells = next(csv.reader(taken()), [])
-    if lines > 1 and quotes % 2:
-        raise UserError(f"{where}: a quotation mark is opened and not closed")
-    return [cell.strip() for cell in cells]
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(uncommented(file), strict=True)
+            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not a CSV file in UTF-8"
+        if str(error) == "unexpected end of data":
+            reason = "a quotation mark is opened and not closed"
+        raise UserError(f"cannot read the {what} {path}: {reason}") from None
+    comments += [" ".join(cells[0].split()) for _, cells in rows if cells[0].startswith("#")]
+    table = [(number, cells) for number, cells in rows if any(cells) and not cells[0].startswith("#")]
+    return [comment.strip(" \t\r\n,;") for comment in comments], table
 
 
 def _marker(cells: Mapping[str, str], where: str) -> dict[str, float]:

@@ -1,115 +1,109 @@
-"""Trials: a command meets a fault at one of its points, and the same command goes on afterwards."""
+"""A fault at every change of a file of commands: what they leave, and whether the same command goes on.
+
+Each command runs in a forked process whose changes of files are counted. Then it runs again for each,
+with a fault there: killed before it, killed in the middle of a write, a disk that is full from there on, one
+failed call. After each, no process is left and no file is in part under its final name; an output folder
+that is replaced as a whole is the last result or the new one; an error is told in one line; and the same
+command gives the numbers of an undisturbed run to the bit. x86-64 Linux only. `--rows rig` tries the jobs
+with this word in their names; all take some five hours of one core. Broken promises are printed as they are
+found.
+"""
 
 import os
 import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
 from unittest.mock import patch
 
-from benchmarks.reliability.folders import broken, incomplete, leftovers, numbers
-from benchmarks.reliability.jobs import CACHE, FEM, JOBS, OUT, Job, prepared, started
-from benchmarks.reliability.supervision import GROWING, KINDS, Ending, Fault, Point
-from benchmarks.tables import keep_rows, kept_rows
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agree to the bit
 
-ROWS = Path(__file__).with_name("faults.csv")
-REFUSED, NOT_CONVERGED = 2, 3
-WHOLE = "the complete result is in"
-"""Said by a command that cannot replace its output folder; one that cannot resume has it moved first."""
-TRACE = "Traceback (most recent call last)"
-TRIAL = "trial"
+from rich.table import Table
+
+from benchmarks.reliability.folders import CUT, numbers
+from benchmarks.reliability.supervision import GROWING, KINDS, Ending, Fault, Point, supervised
+from pinnray.runtime.exits import BAD_INPUT, NOT_CONVERGED
+from pinnray.runtime.tables import terminal_table
+
+CACHE, OUT, TEMPORARY = "cache", "out", "tmp"
+WATCHED = (OUT, f".{OUT}", CACHE)
+"""Folders whose changes count."""
+
+FEM = "compare --design default --mesh-size 4 --solvers fem"
+RIG = "rig --mesh-size 4 --size 320x240 --rest 4 --moving 2 --held 4 --codec png"
+TRACK = "track FOLDER/film/frames --camera FOLDER/film/camera.json"
+JOBS = {
+    "compare": (FEM,),
+    "compare over an older result": (FEM, FEM),
+    "sweep": ("sweep FOLDER/study.toml --processes 1",),
+    "rig": (RIG,),
+    "track": (f"{RIG} --out FOLDER/film", TRACK),
+    "crossval": ("crossval --solvers fem --schemes one-out --seeds 1 --mesh-size 4 --processes 1",),
+    "gridsearch": (
+        "gridsearch --mesh-size 4 --epochs 4 --learning-rates 1e-3,1e-2 --bc-weights 1 --processes 1 "
+        "--solver-set pinn-std.checkpoint_every=2",
+    ),
+}
+"""Commands by name, the last of which meets the faults; `FOLDER` stands for the folder that it runs in."""
+REPLACING = ("compare", "rig", "track")
+"""Commands that replace their output folder as a whole."""
+STUDY = "mesh_size = 4.0\nsamples = 3\n[varied]\nrib_angle = {from = -10, to = 20}\n"
 
 
-class Row(NamedTuple):
-    """A trial: the fault and its place, the exit code, the promises broken and the files left over."""
-
-    job: str
-    kind: str
-    at: int
-    call: str
-    path: str
-    code: int
-    faults: str
-    leftovers: str
-
-
-class Expected(NamedTuple):
-    """A job's run without any fault."""
-
-    points: tuple[Point, ...]  # its changes of files
-    numbers: dict[str, str]  # digests of its numbers
-    cached: dict[str, str]  # digests of the numbers in its cache, by file name
-    folder: Path  # as it was before the run, to be copied
+def main(rows: str = "") -> Table:
+    """Try the jobs with one of the words in their names, and return a row for each."""
+    lines = []
+    with tempfile.TemporaryDirectory(prefix="reliability-") as folder, filled(Path(folder)) as cache:
+        for name, commands in JOBS.items():
+            if any(word in name for word in rows.split(",")):
+                tried = trials(commands, Path(folder) / "job", cache)
+                promised = sum(not wrong for wrong in tried.values())
+                lines.append([name, *map(str, (len({fault.at for fault in tried}), len(tried), promised))])
+    return terminal_table("faults", ("job", "points", "faults", "as promised"), lines, left=["job"])
 
 
-def run_faults(words: Collection[str] = ()) -> list[Row]:
-    """Run the trials that are not kept yet, or were not as promised, and keep their rows.
+def trials(commands: Sequence[str], place: Path, cache: Path, every: int = 1) -> dict[Fault, list[str]]:
+    """The promises that a command breaks after each fault, or every so manieth of them."""
+    before, run = place / "before", place / "trial"  # always the same: files name the folder they come from
+    before.mkdir(parents=True)
+    shutil.copytree(cache, before / CACHE)
+    (before / "study.toml").write_text(STUDY, encoding="utf-8")
+    for earlier in commands[:-1]:
+        ended_well(started(earlier, before))
+    shutil.copytree(before, run)
+    points = ended_well(started(commands[-1], run)).points
+    expected = numbers(run / OUT)
+    tried = {}
+    for fault in faults(points)[::every]:
+        shutil.rmtree(run)
+        shutil.copytree(before, run)
+        tried[fault] = trial(commands[-1], expected, fault, run)
+        if tried[fault]:
+            print(commands[-1], *fault, *points[fault.at], *tried[fault], file=sys.stderr, flush=True)
+    shutil.rmtree(place)
+    return tried
 
-    Only those of the jobs with one of the words in their names; none means all.
+
+def faults(points: Sequence[Point]) -> list[Fault]:
+    """Every fault at every point that differs: writes are torn, and a full disk stops what needs more of it.
+
+    Of a series of equal calls on a file the first, the middle and the last differ.
     """
-    rows = kept_rows(ROWS, Row)
-    order = {job.name: number for number, job in enumerate(JOBS)}
-    with tempfile.TemporaryDirectory(prefix="reliability-") as name, filled(Path(name)) as cache:
-        place = Path(name) / "job"
-        for job in JOBS:
-            if words and not any(word in job.name for word in words):
-                continue
-            expected = undisturbed(job, place, cache)
-            known, left = known_trials([row for row in rows if row.job == job.name], expected, place)
-            rows = [*(row for row in rows if row.job != job.name), *known]
-            for fault in left:
-                rows.append(trial(job, expected, fault, copied(expected, place)))
-                print(*rows[-1], sep="  ", file=sys.stderr, flush=True)
-                rows.sort(key=lambda row: (order[row.job], KINDS.index(row.kind), row.at))
-                keep_rows(ROWS, Row, rows)
-            shutil.rmtree(place)
-    return rows
-
-
-def known_trials(rows: Sequence[Row], expected: Expected, place: Path) -> tuple[list[Row], list[Fault]]:
-    """Rows of a job that hold for its points of today, numbered as these are, and the faults without one.
-
-    Two processes change their files in another order each time, so that a row is found by its file. The
-    name of one in the cache has a digest that changes with the code.
-    """
-    stock: dict[tuple[str, ...], list[Row]] = {}
-    for row in rows:
-        if not row.faults:
-            stock.setdefault((row.kind, row.call, undated(row.path)), []).append(row)
-    known, left = [], []
-    for fault in faults(expected):
-        point = shown(expected.points[fault.at], place / TRIAL)
-        if found := stock.get((fault.kind, point.call, undated(point.path))):
-            known.append(found.pop(0)._replace(at=fault.at))
-        else:
-            left.append(fault)
-    return known, left
-
-
-def undisturbed(job: Job, folder: Path, cache: Path) -> Expected:
-    """Prepare a job, run it without a fault and keep its points and numbers."""
-    prepared(job, folder / "before", cache)
-    run = folder / TRIAL  # as later: files name the folder that they come from
-    shutil.copytree(folder / "before", run)
-    ending = started(job.arguments, run, job.watched)
-    if ending.code not in (0, NOT_CONVERGED):
-        raise RuntimeError(f"{job.name}: {ending.text}")
-    cached = {Path(name).name: digest for name, digest in numbers(run / CACHE).items()}
-    return Expected(ending.points, numbers(run / OUT), cached, folder / "before")
-
-
-def chosen(points: Sequence[Point]) -> list[int]:
-    """Numbers of the points that differ: of a series of equal calls on a file the first, middle and last."""
-    found: list[int] = []
+    chosen: list[int] = []
     for _, group in groupby(range(len(points)), key=lambda at: (points[at].call, plain(points[at].path))):
         series = list(group)
-        found += sorted({series[0], series[len(series) // 2], series[-1]})
-    return found
+        chosen += sorted({series[0], series[len(series) // 2], series[-1]})
+    calls = {"torn": {"write"}, "ENOSPC": GROWING}
+    return [
+        Fault(kind, at)
+        for kind in KINDS
+        for at in chosen
+        if kind not in calls or points[at].call in calls[kind]
+    ]
 
 
 def plain(path: str) -> str:
@@ -117,115 +111,71 @@ def plain(path: str) -> str:
     return re.sub(r"\.[0-9a-f]{8}\.partial", ".partial", path)
 
 
-def undated(path: str) -> str:
-    """A path without the digests of files of the cache and the random names of temporary files."""
-    return re.sub(r"[0-9a-f]{64}|(?<=[-/])(tmp)?[a-z0-9_]{8}(?=/|$)", "", path)
+def started(line: str, folder: Path, fault: Fault | None = None) -> Ending:
+    """Run a command in a forked process with output, cache and temporary files in a folder."""
+    (folder / TEMPORARY).mkdir(exist_ok=True)
+    words = [] if " --out " in line else ["--out", f"FOLDER/{OUT}"]
+    words = [word.replace("FOLDER", str(folder)) for word in (*line.split(), *words, "--quiet")]
+
+    def work() -> int:
+        os.environ.update(PINNRAY_CACHE=str(folder / CACHE), TMPDIR=str(folder / TEMPORARY))
+        tempfile.tempdir = None
+        from pinnray.cli import main
+
+        return main(words)
+
+    log = folder.parent / f"{folder.name}.log"
+    return supervised(work, [folder / each for each in WATCHED], log, fault=fault)
 
 
-def shown(point: Point, folder: Path) -> Point:
-    """A point with its path as seen from the folder of the run."""
-    return Point(point.call, plain(point.path).replace(f"{folder}/", ""))
+def ended_well(ending: Ending) -> Ending:
+    """The end of a run without a fault; a `RuntimeError` if it is none."""
+    if ending.code not in (0, NOT_CONVERGED) or "Traceback" in ending.text:
+        raise RuntimeError(f"it ends with {ending.code}: {ending.text.strip()[-300:]}")
+    return ending
 
 
-def faults(expected: Expected) -> list[Fault]:
-    """Every fault at every chosen point: writes are torn, and a full disk stops what needs more of it."""
-    calls = {"torn": {"write"}, "ENOSPC": GROWING}
-    return [
-        Fault(kind, at)
-        for kind in KINDS
-        for at in chosen(expected.points)
-        if kind not in calls or expected.points[at].call in calls[kind]
-    ]
-
-
-def copied(expected: Expected, place: Path) -> Path:
-    """A folder that is as it was before the run."""
-    shutil.rmtree(place / TRIAL, ignore_errors=True)
-    return Path(shutil.copytree(expected.folder, place / TRIAL))
-
-
-def trial(job: Job, expected: Expected, fault: Fault, folder: Path) -> Row:
-    """Try a fault in a folder that is as it was before the run."""
-    before = numbers(folder / OUT)
-    hit = started(job.arguments, folder, job.watched, fault)
-    wrong = [] if hit.struck else ["the point was not reached"]
-    if hit.orphans:
-        wrong.append(f"{hit.orphans} processes were left over")
-    wrong += [f"half written: {each}" for place in folder.glob("*out*") for each in broken(place)]
-    wrong += [f"poisoned: {each}" for each in broken(folder / CACHE)]
-    if fault.kind in ("ENOSPC", "EIO"):
-        wrong += _ended_badly(expected, hit, folder)
-    if job.whole:
-        wrong += _half_replaced(expected, before, folder / OUT)
-    if not job.again and WHOLE in hit.text:
-        wrong += differences(expected, numbers(folder / f"{OUT}.partial"))
-        (folder / f"{OUT}.partial").rename(folder / "moved")
-    again = started((*job.arguments, *job.again), folder, job.watched)
-    if again.code not in (0, NOT_CONVERGED) or TRACE in again.text:
-        wrong.append(f"the next run ends with {again.code}: {again.text.strip()[-300:]}")
-    else:
-        wrong += differences(expected, numbers(folder / OUT))
-    point = shown((hit.points if hit.struck else expected.points)[fault.at], folder)
-    left = [each for each in leftovers(folder) if not each.startswith("tmp")]
-    texts = (" | ".join(said).replace('"', "'").replace("\n", " ") for said in (wrong, left))
-    return Row(job.name, *fault, *point, hit.code, *texts)
-
-
-def differences(expected: Expected, found: dict[str, str]) -> list[str]:
-    """Files whose numbers are not those of the undisturbed run.
-
-    A file that the cache could not keep may lie in the output folder, with the numbers it has in the cache.
-    """
-    own = {
-        name: digest
-        for name, digest in found.items()
-        if name in expected.numbers or expected.cached.get(Path(name).name) != digest
+def trial(line: str, expected: dict[str, str], fault: Fault, folder: Path) -> list[str]:
+    """Try a fault in a folder that is as it was before the run, and return the promises broken."""
+    out, before, command = folder / OUT, numbers(folder / OUT), line.split()[0]
+    hit = started(line, folder, fault)
+    wrong = {
+        "the point was not reached": len(hit.points) <= fault.at,
+        f"{hit.orphans} processes were left over": hit.orphans > 0,
+        "the output folder holds neither the last result nor the new": command in REPLACING
+        and numbers(out) not in (before, expected),
     }
-    names = sorted(
-        name for name in own.keys() | expected.numbers if own.get(name) != expected.numbers.get(name)
-    )
-    return [f"other numbers: {', '.join(names)}"] if names else []
-
-
-def _ended_badly(expected: Expected, hit: Ending, folder: Path) -> list[str]:
-    """Broken promises in the end of a run that met an error."""
-    said = hit.text.strip()[-300:]
-    if hit.code < 0 or hit.code == 1 or TRACE in hit.text:
-        return [f"it ended with {hit.code}: {said}"]
-    if hit.code == REFUSED and sum(line.startswith("error:") for line in hit.text.splitlines()) != 1:
-        return [f"it did not say why in one line: {said}"]
-    return differences(expected, numbers(folder / OUT)) if hit.code == 0 else []
-
-
-def _half_replaced(expected: Expected, before: dict[str, str], out: Path) -> list[str]:
-    """Broken promises of an output folder, which has to be the last result or the new one."""
-    if not out.exists():
-        return ["the last result is no longer under its name"] if before else []
-    whole = numbers(out) in (before, expected.numbers)
-    return incomplete(out) + (
-        [] if whole else ["the output folder holds neither the last result nor the new"]
-    )
+    for place in (*folder.glob("*out*"), folder / CACHE):
+        wrong |= {f"half written: {place.name}/{name}": each == CUT for name, each in numbers(place).items()}
+    if fault.kind in ("ENOSPC", "EIO"):
+        told = sum(each.startswith("error:") for each in hit.text.splitlines())
+        wrong[f"it ended with {hit.code}: {hit.text.strip()[-300:]}"] = (
+            hit.code not in (0, BAD_INPUT, NOT_CONVERGED)
+            or "Traceback" in hit.text
+            or (hit.code == BAD_INPUT and told != 1)
+            or (hit.code == 0 and numbers(out) != expected)
+        )
+    try:
+        ended_well(started(f"{line} --resume" if command == "compare" else line, folder))
+        wrong["the next run has other numbers"] = numbers(out) != expected
+    except RuntimeError as error:
+        wrong[f"the next run: {error}"] = True
+    return [said for said, broken in wrong.items() if broken]
 
 
 @contextmanager
 def filled(folder: Path) -> Iterator[Path]:
     """A filled cache in a folder; in the block this process has imported what its forks need."""
-    if (ending := started(FEM, folder)).code:
-        raise RuntimeError(ending.text)
+    ended_well(started(FEM, folder))
     from pinnray.cli import main
     from pinnray.comparison.figures import gallery
     from pinnray.runtime.figure import Figure
 
     blank = gallery.Illustration(Figure(1.0), "Blank", "Blank.", "Blank.")
     drawings = {name: (what, lambda _: blank) for name, (what, _) in gallery.GALLERY.items()}
-    with (
-        # The same files with blank pictures, in a tenth of the time.
-        patch.object(gallery, "GALLERY", drawings),
-        patch("pinnray.runtime.figure.DPI", 20),
-        # Two processes work on any mesh, not only where that is worth its while.
-        patch("pinnray.comparison.pipeline.solving.LARGE", 0),
-    ):
+    # The same files with blank pictures, in a tenth of the time.
+    with patch.object(gallery, "GALLERY", drawings), patch("pinnray.runtime.figure.DPI", 20):
         with patch.dict(os.environ, PINNRAY_CACHE=str(folder / CACHE)):
-            main([each.replace("FOLDER", str(folder)) for each in FEM])
+            main([*FEM.split(), "--out", f"{folder}/out", "--quiet"])
         shutil.rmtree(folder / "out")
         yield folder / CACHE

@@ -17,54 +17,25 @@ TIMES = ("second", "started", "time", "rate_hz", "pace", "live")
 """Words in the names of entries that differ from run to run."""
 PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", ".safetensors", "run.json")
 """Ends of files of which only the presence is compared: they, or the files that they list, tell times."""
+CUT = "cut off"
 
 
 def numbers(folder: Path) -> dict[str, str]:
-    """A digest of the numbers in every file of a folder, by its path; empty for pages and pictures."""
-    return {
-        path.relative_to(folder).as_posix(): "" if path.name.endswith(PRESENT) else _digest(_content(path))
-        for path in _visible(folder)
-    }
-
-
-def broken(folder: Path) -> list[str]:
-    """Files under their final names that cannot be read to their end."""
-    found = []
-    for path in _visible(folder):
-        try:
-            if path.suffix != ".sqlite":  # what is half done there, the next to open it undoes
-                _content(path)
-        except Exception as error:  # whatever a reader says of half a file
-            found.append(f"{path.relative_to(folder)} ({type(error).__name__}: {error})")
+    """By path a digest of the numbers in every file of a folder, "" for pages and pictures, or `CUT`."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and not path.name.startswith("."):
+            found[path.relative_to(folder).as_posix()] = _digest(path)
     return found
 
 
-def incomplete(out: Path) -> list[str]:
-    """Reasons why a folder under its final name is no whole result: files that `run.json` lists and lack."""
-    if not (out / "run.json").exists():
-        return [f"{out.name} has no run.json"]
-    return [
-        f"{out.name}/{name} is not what run.json says"
-        for name, digest in json.loads((out / "run.json").read_text())["files_sha256"].items()
-        if not (out / name).is_file() or _digest((out / name).read_bytes()) != digest
-    ]
-
-
-def leftovers(folder: Path) -> list[str]:
-    """Temporary files, and folders of unfinished runs."""
-    return [path.relative_to(folder).as_posix() for path in folder.rglob("*") if ".partial" in path.name]
-
-
-def _visible(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
-
-
-def _content(path: Path) -> Any:
-    return READERS.get(path.suffix, Path.read_bytes)(path)
-
-
-def _digest(content: Any) -> str:
-    return hashlib.sha256(content if isinstance(content, bytes) else repr(content).encode()).hexdigest()
+def _digest(path: Path) -> str:
+    try:
+        content = READERS.get(path.suffix, Path.read_bytes)(path)
+    except Exception:  # whatever a reader says of half a file
+        # What is half done in a data base, the next to open it undoes.
+        return "" if path.suffix == ".sqlite" else CUT
+    return "" if path.name.endswith(PRESENT) else hashlib.sha256(repr(content).encode()).hexdigest()
 
 
 def _timeless(value: Any) -> Any:
@@ -77,11 +48,9 @@ def _timeless(value: Any) -> Any:
 
 def _csv(path: Path) -> Any:
     text = path.read_text(encoding="utf-8")
-    if not text.endswith("\n"):
-        raise ValueError("it ends within a line")
     lines = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
     rows = list(csv.DictReader(lines, strict=True))
-    if any(None in row or None in row.values() for row in rows):
+    if not text.endswith("\n") or any(None in row or None in row.values() for row in rows):
         raise ValueError("a row is cut off")
     return _timeless(rows)
 
@@ -102,14 +71,12 @@ def _journal(path: Path) -> Any:
         return connection.execute(query).fetchall()
 
 
-def _ended(word: bytes) -> Callable[[Path], bytes]:
-    def read(path: Path) -> bytes:
-        content = path.read_bytes()
-        if not content.rstrip().endswith(word):
-            raise ValueError(f"it does not end with {word.decode()}")
-        return content
-
-    return read
+def _ended(path: Path) -> bytes:
+    """The content of a file of elements, which the end of the outermost has to close."""
+    content = path.read_bytes()
+    if not content.rstrip().endswith((b"</html>", b"</VTKFile>", b"</svg>")):
+        raise ValueError("an element is open")
+    return content
 
 
 READERS: dict[str, Callable[[Path], Any]] = {
@@ -119,8 +86,6 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ".sqlite": _journal,
     ".parquet": lambda path: _timeless(pd.read_parquet(path).to_dict("list")),
     ".png": lambda path: Image.open(path).tobytes(),
-    ".html": _ended(b"</html>"),
-    ".vtu": _ended(b"</VTKFile>"),
-    ".svg": _ended(b"</svg>"),
+    **dict.fromkeys((".html", ".vtu", ".svg"), _ended),
 }
 """Readers by suffix; they raise an exception if a file is cut off."""

@@ -1,57 +1,101 @@
-"""Random fingers, drawings, settings, materials and loads: each a valid result or one line, in bounded time.
+"""Random fingers, settings, materials and loads: each a valid result or one line, in bounded time.
 
-`python -m benchmarks.reliability.inputs COUNT [SOLVER]` keeps the counts; needs Hypothesis.
+`python -m benchmarks.reliability.inputs COUNT [SOLVER]` counts the ends; needs Hypothesis.
 """
 
 import math
-import multiprocessing
-import resource
 import sys
-import tempfile
 import time
-import warnings
 from collections import Counter
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from math import inf, nan
+from typing import Any
 from unittest.mock import patch
 
-from benchmarks.tables import keep_rows, kept_rows
-from pinnray.geometry.cache import drawn_finger
-from pinnray.geometry.drawing.description import load_description
+from hypothesis import Phase, given, seed, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from pinnray.geometry.finger.parameters import Parameters, parameter_info
+from pinnray.geometry.finger.presets import load_design, preset_names
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
+from pinnray.solvers.registry import make_solver
+from pinnray.studies.sweep.job import Task
 from pinnray.studies.sweep.measurement import Measurement, measured
+from pinnray.studies.sweep.study import PHYSICS, parameter_limits
 
-if TYPE_CHECKING:
-    from benchmarks.reliability.strategies import Given
-
-ROWS = Path(__file__).with_name("inputs.csv")
-BLOCK = 250
-"""Inputs of a process; their seed is the number of the block."""
 LONGEST_S = 60.0
 """Time that a coarse finger may take, s."""
 
+WILD: tuple[Any, ...] = (
+    *(nan, inf, -inf, -1.0, 0, -0.0, 1e-300, 5e-324, 1e300, 2**63, 10**400, True, None, "", "2 mm", "nan"),
+    *("1e999", [], [1.0], {}, {"from": 1}, (1, 2), b"2", "é\n\x00", 1j),
+)
+"""Values that belong to no parameter."""
+WORDS = {
+    "rib_reference": ("front", "base"),
+    "marker_layout": ("front", "joints"),
+    "plane": ("strain", "stress"),
+    "law": ("linear", "neo-hookean", "st-venant-kirchhoff", "gent"),
+    "load": ("mean", "point", "patch", "cylinder"),
+    "slide": (True, False),
+}
+USUAL = {"young": 11.4, "poisson": 0.45, "stroke": 10.0, "radius": 5.0, "direction": 20.0}
+NAMES = [name for name in Parameters.model_fields if name != "name"]
 
-class Row(NamedTuple):
-    """Counts of the inputs of one solver by their end; seconds of the slowest, bytes of the largest."""
 
-    solver: str
-    inputs: int
-    done: int
-    not_converged: int
-    refused: int
-    wrong: int
-    slowest: float
-    peak: int
+def value_of(name: str) -> SearchStrategy[Any]:
+    """Values of a parameter within its limits, at them, or near its usual ones."""
+    if name in WORDS:
+        return st.sampled_from(WORDS[name])
+    field = Parameters.model_fields.get(name)
+    low, high = {"stroke": (1e-6, 1e3), "radius": (1e-3, 1e3)}.get(name) or (
+        (float(parameter_info(name, "low")), float(parameter_info(name, "high")))
+        if field
+        else parameter_limits(name)
+    )
+    if field and field.annotation is int:
+        return st.integers(int(low), int(high)) | st.integers(int(low), min(int(high), 10))
+    number = st.floats(low, high) | st.sampled_from((low, high))
+    if usual := field.default if field else USUAL.get(name):
+        number |= st.floats(0.3, 3).map(lambda factor: min(max(usual * factor, low), high))
+    return number
 
 
-class Outcomes(NamedTuple):
-    """Number of inputs by state, times, s, largest memory, bytes, and faults with an input each."""
+@st.composite
+def tasks(draw: DrawFn, solver: str = "fem") -> Task:
+    """A finger, its material, its load and the solver's settings.
 
-    states: Counter[str]
-    slowest: float
-    peak: int
-    wrong: dict[str, str]
+    Half of them are gentle, so that most have a result; of the others one in two has a wild value.
+    """
+    gentle = draw(st.booleans())
+    definition = dict(load_design(draw(st.sampled_from(preset_names()))).definition())
+    for name in draw(st.lists(st.sampled_from(NAMES), max_size=4, unique=True)):
+        near = gentle and isinstance(definition[name], float)
+        definition[name] = draw(_near(definition[name], 0.8) if near else value_of(name))
+    chosen = draw(st.lists(st.sampled_from(PHYSICS), max_size=3, unique=True))
+    physics = {name: draw(value_of(name)) for name in chosen}
+    own = {}
+    if not gentle:
+        usual = make_solver(solver).settings()
+        for name in draw(st.lists(st.sampled_from(sorted(usual)), max_size=2, unique=True)):
+            own[name] = draw(_near(usual[name], 0.1) | _near(usual[name], 0.1) | st.sampled_from(WILD))
+        if draw(st.booleans()):
+            name = draw(st.sampled_from([*NAMES, *PHYSICS]))
+            (physics if name in PHYSICS else definition)[name] = draw(st.sampled_from(WILD))
+    mesh, density = MeshSettings(size=draw(st.sampled_from((2.0, 4.0, 8.0, 20.0)))), draw(st.floats(1e-3, 30))
+    return Task(0, definition, mesh, physics, solver, own, density)
+
+
+def _near(now: Any, least: float) -> SearchStrategy[Any]:
+    """Values of the type of another one: a number times a factor from `least` on."""
+    if isinstance(now, bool):
+        return st.booleans()
+    if isinstance(now, int):
+        return st.integers(-1, 5)
+    if isinstance(now, float):
+        return st.floats(least, 1 / least).map(lambda factor: now * factor)
+    return st.just(now)
 
 
 def _one_line(error: UserError) -> str:
@@ -62,16 +106,10 @@ def _one_line(error: UserError) -> str:
     return text
 
 
-def answer_to(given: "Given", folder: Path) -> Measurement:
-    """The end of an input; a drawing is read as `--section` does it, through a file in the folder."""
-    task = given.task
+def answer_to(task: Task) -> Measurement:
+    """The end of a task."""
     with patch.object(UserError, "__str__", _one_line):
         try:
-            if given.sketch is not None:
-                path = folder / "sketch.svg"
-                path.write_text(given.sketch.svg, encoding="utf-8")
-                finger = drawn_finger(path, load_description(None, given.sketch.lines), cache_dir=folder)
-                task = replace(task, definition=finger.definition())
             return measured(task)
         except UserError as error:
             return Measurement(0, "refused", str(error), 0.0)
@@ -95,53 +133,24 @@ def fault_of(answer: Measurement, seconds: float) -> str:
     return next((said for said, wrong in faults.items() if wrong), "")
 
 
-def tried(count: int, solver: str = "fem", seed: int = 0) -> Outcomes:
-    """Try random inputs to the end, also after a fault."""
-    from hypothesis import HealthCheck, Phase, given, settings
-    from hypothesis import seed as seeded
+def tried(count: int, solver: str = "fem") -> tuple[Counter[str], dict[str, Task]]:
+    """Numbers of random tasks by their ends, and the first one of every fault."""
+    states, wrong = Counter[str](), dict[str, Task]()
 
-    from benchmarks.reliability.strategies import Given, inputs
+    @seed(0)
+    @settings(max_examples=count, database=None, deadline=None, phases=[Phase.generate])
+    @given(tasks(solver))
+    def one(task: Task) -> None:
+        started = time.perf_counter()
+        answer = answer_to(task)
+        states[answer.state] += 1
+        if (fault := fault_of(answer, time.perf_counter() - started)) and fault not in wrong:
+            wrong[fault] = task
+            print(fault, task, sep="\n  ", flush=True)
 
-    states, wrong, times = Counter[str](), dict[str, str](), [0.0]
-    quick = {"database": None, "deadline": None, "phases": [Phase.generate]}
-    with tempfile.TemporaryDirectory() as folder:
-
-        @seeded(seed)
-        @settings(max_examples=count, suppress_health_check=list(HealthCheck), **quick)
-        @given(inputs(solver))
-        def one(each: Given) -> None:
-            started = time.perf_counter()
-            answer = answer_to(each, Path(folder))
-            times.append(time.perf_counter() - started)
-            states[answer.state] += 1
-            if (fault := fault_of(answer, times[-1])) and fault not in wrong:
-                wrong[fault] = repr(each)
-                print(fault, each, sep="\n  ", flush=True)
-
-        one()
-    return Outcomes(states, max(times), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, wrong)
-
-
-def block(solver: str, seed: int) -> Outcomes:
-    """The outcomes of a block of inputs, without the warnings of libraries."""
-    warnings.simplefilter("ignore")
-    return tried(BLOCK, solver, seed)
-
-
-def main(count: int, solver: str = "fem") -> None:
-    """Try random inputs of a solver in blocks, each in a process of its own, and keep the counts."""
-    others = [each for each in kept_rows(ROWS, Row) if each.solver != solver]
-    blocks = range(-(-count // BLOCK))
-    with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
-        found = pool.starmap(block, [(solver, seed) for seed in blocks], chunksize=1)
-    states = sum((each.states for each in found), Counter[str]())
-    wrong = {said for each in found for said in each.wrong}
-    ends = [states[state] for state in ("done", "not converged", "refused")]
-    worst = (max(each.slowest for each in found), max(each.peak for each in found))
-    row = Row(solver, states.total(), *ends, len(wrong), *worst)  # type: ignore[call-arg]
-    keep_rows(ROWS, Row, [row, *others])
-    print(*row, flush=True)
+    one()
+    return states, wrong
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), *sys.argv[2:])
+    print(tried(int(sys.argv[1]), *sys.argv[2:])[0])

@@ -36,11 +36,11 @@ LIBRARIES = ("scipy.sparse.linalg", "dolfinx", "torch", "pyvista", "matplotlib.f
 PRODUCTS = "GFlop of products"
 NEEDED = {
     "factorisations": (
-        "pinnray.solvers.fem.linear_solvers:Factorisation.update",
+        "pinnray.solvers.fem.factorisation:Factorisation.update",
         "pinnray.solvers.pinn.finite_basis.sparse_cholesky:BlockMatrix.factorised",
     ),
     PRODUCTS: ("pinnray.solvers.pinn.finite_basis.energy:NetworkEnergy.hessian",),
-    "renders": ("pinnray.comparison.figures.pyvista_canvas:Canvas._cover",),
+    "renders": ("pinnray.comparison.figures.canvas:Canvas._cover",),
     "fields written": ("pinnray.comparison.report.output_files:_write",),
     "pictures encoded": ("PIL.Image:Image.save",),
 }

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.table import Table
 
-from benchmarks.tables import DOCS, fill, markdown, table_of
+from benchmarks.tables import DOCS, cells_of, fill, markdown
 from benchmarks.tracker.films import HIDDEN, Finger, Score, coverage, film_of, one_thread
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
@@ -48,7 +48,6 @@ REPORT = DOCS / "evidence" / "tracker_stress.md"
 FILMS = 2
 MOTION = Motion(rest=5, moving=3, held=5)
 JUMP = Motion(rest=5, moving=0, held=5)
-ROLLING = Motion(rest=5, moving=6, held=5, rolling=0.5)
 
 Hide = Callable[[Recording], Callable[[int], Sequence[Shape]]]
 
@@ -89,7 +88,7 @@ class Case:
     hide: Hide = lambda film: lambda frame: ()
     codec: str = ""
     paint: str = "dark"
-    printed: Mapping[str, float] = field(default_factory=dict)
+    irregular: float = 0.0
     picked: bool = False
     layout: str = "front"
     fiducials: bool = True
@@ -113,7 +112,6 @@ class Bumped(Recording):
         return Recording(**settings | {"pose": pose}).frame(number)
 
 
-FIVE = {"irregular": 0.05}
 CORNER = Case(exposure={"noise": 6, "blur": 1.5, "gradient": 0.3}, tilt=5)
 CASES: dict[tuple[str, str], Case] = {
     ("base", ""): Case(),
@@ -135,13 +133,10 @@ CASES: dict[tuple[str, str], Case] = {
     ("markers", "red, called dark"): Case(paint="red"),
     **{("markers", f"{paint}, picked"): Case(paint=paint, picked=True) for paint in ("red", "blue")},
     ("markers", "at the joints"): Case(layout="joints"),
-    **{("print, irregular", f"{x:.0%}"): Case(printed={"irregular": x}) for x in (0.03, 0.05, 0.08)},
-    ("print", "specks on 10 %, irregular 5 %"): Case(printed=FIVE | {"mottle": 0.1}),
-    ("print", "irregular 5 %, sharpened by 1.5"): Case(printed=FIVE, exposure={"sharpen": 1.5}),
-    ("print", "irregular 5 %, glare of 60"): Case(printed=FIVE, exposure={"glare": 60}),
-    ("print", "layers of 10 %, irregular 3 %"): Case(printed={"irregular": 0.03, "layers": 0.1}),
-    ("print", "irregular 5 %, white clipped"): Case(printed=FIVE, exposure={"white": 400}),
-    ("camera", "rolling shutter, half of a frame"): Case(motion=ROLLING),
+    **{("print, irregular", f"{x:.0%}"): Case(irregular=x) for x in (0.03, 0.05, 0.08)},
+    ("print", "irregular 5 %, sharpened by 1.5"): Case(irregular=0.05, exposure={"sharpen": 1.5}),
+    ("print", "irregular 5 %, glare of 60"): Case(irregular=0.05, exposure={"glare": 60}),
+    ("print", "irregular 5 %, white clipped"): Case(irregular=0.05, exposure={"white": 400}),
     ("camera", "monochrome"): Case(exposure={"monochrome": True}),
     ("camera", "upside down"): Case(turn=180),
     ("camera", "bumped"): Case(bumped=True),
@@ -197,8 +192,7 @@ def main(rows: str = "") -> Table:
 
 def reported() -> dict[tuple[str, str], list[str]]:
     """Rows of the page by the names of their cases."""
-    lines = [line.strip("|\n").split("|") for line in table_of(REPORT, "figures").splitlines()]
-    rows = [[cell.strip() for cell in line] for line in lines]
+    rows = cells_of(REPORT, "figures")
     return {(row[0], row[1]): row for row in rows if (row[0], row[1]) in CASES}
 
 
@@ -208,7 +202,7 @@ def filmed(case: Case, finger: Finger, number: int) -> Recording:
     camera = default_camera(*case.size)
     direction = 60.0 + 137.5 * number
     recording = Recording(
-        bench=Bench(finger.mesh, finger.design, workspace, case.paint, **case.printed),
+        bench=Bench(finger.mesh, finger.design, workspace, case.paint, case.irregular),
         displacement=finger.displacement,
         camera=camera,
         pose=viewing_pose(camera, workspace, tilt=case.tilt, direction=direction, turn=case.turn + number),

@@ -1,65 +1,69 @@
-"""docs/verification.md, from the measured cases and the words of `page.md`."""
+"""The tables of docs/verification.md, from the measured cases; less than a minute."""
 
 from collections.abc import Sequence
-from pathlib import Path
-from string import Template
 
-from benchmarks.verification.record import Case, Row
+from rich.table import Table
 
-PAGE = Path(__file__).parents[2] / "docs" / "verification.md"
+from benchmarks.tables import DOCS, cells_of, fill, markdown
+from benchmarks.verification.cases import CASES
+from benchmarks.verification.record import Case
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.tables import terminal_table
 
-
-def page(cases: Sequence[Case], before: str) -> str:
-    """The whole page; a case whose program is not installed stays as it was on the page before."""
-    sections = (section(case) if case.available else kept_section(case, before) for case in cases)
-    words = Template(Path(__file__).with_name("page.md").read_text(encoding="utf-8"))
-    return words.substitute(overview=overview(cases, before), sections="\n".join(sections))
-
-
-def kept_section(case: Case, before: str) -> str:
-    """The section of a case on an earlier page."""
-    return title(case) + before.partition(title(case))[2].partition("\n## ")[0]
+PAGE = DOCS / "verification.md"
+OVERVIEW = ("case", "answer", "elements", "plane states", "numbers", "")
+NUMBERS = ("element", "plane", "quantity", "measured", "expected", "")
 
 
-def title(case: Case) -> str:
-    """The line above a section."""
-    return f"## {case.name[0].upper()}{case.name[1:]}\n"
+def main() -> Table:
+    """Measure every case, fill the page and return its overview.
+
+    Raises:
+        UserError: If a number is out of its bounds.
+    """
+    for name, table in tables(CASES).items():
+        fill(PAGE, name, table)
+    missed = [
+        f"{case.name}: P{row.degree}, {row.plane}: {row.quantity}: {row.shown}, not {row.expected.words}"
+        for case in CASES
+        if case.available
+        for row in case.rows()
+        if not row.passed
+    ]
+    if missed:
+        raise UserError("; ".join(missed))
+    return terminal_table("Verification", OVERVIEW, cells_of(PAGE, "overview"), left=OVERVIEW)
 
 
-def overview(cases: Sequence[Case], before: str) -> str:
-    """One line a case."""
-    lines = ["| case | answer | elements | plane states | numbers | |", "|---|---|---|---|---|---|"]
-    for case in cases:
-        if not case.available:
-            lines += [line for line in before.splitlines() if line.startswith(f"| [{case.name}](")]
-            continue
-        rows = case.rows()
-        elements = ", ".join(f"P{degree}" for degree in sorted({row.degree for row in rows}))
-        planes = ", ".join(sorted({row.plane for row in rows}))
-        passed = sum(row.passed for row in rows)
-        anchor = "".join(letter for letter in case.name.lower() if letter.isalnum() or letter in " -")
-        link = f"[{case.name}](#{anchor.replace(' ', '-')})"
-        mark = "✓" if passed == len(rows) else f"✗ {passed}"
-        lines.append(f"| {link} | {case.answer} | {elements} | {planes} | {len(rows)} | {mark} |")
-    return "\n".join(lines) + "\n"
+def tables(cases: Sequence[Case]) -> dict[str, str]:
+    """Tables of the page by their marks; that of a case whose program is not installed stays."""
+    kept = {cells[0].partition("]")[0][1:]: cells for cells in cells_of(PAGE, "overview")}
+    overview = [summary(case) if case.available else kept[case.name] for case in cases]
+    return {"overview": markdown(OVERVIEW, overview, left=len(OVERVIEW))} | {
+        case.name: numbers(case) for case in cases if case.available
+    }
 
 
-def section(case: Case) -> str:
-    """A case with its explanation, source and numbers."""
-    header = ["| element | plane | quantity | measured | expected | |", "|---|---|---|---|---|---|"]
-    return "\n".join(
-        [
-            title(case),
-            case.text.strip() + "\n",
-            f"Source: {case.source}.\n",
-            *header,
-            *(line(row) for row in case.rows()),
-            "",
-        ]
-    )
+def summary(case: Case) -> list[str]:
+    """A case's line of the overview."""
+    rows = case.rows()
+    elements = ", ".join(f"P{degree}" for degree in sorted({row.degree for row in rows}))
+    planes = ", ".join(sorted({row.plane for row in rows}))
+    passed = sum(row.passed for row in rows)
+    anchor = "".join(letter for letter in case.name.lower() if letter.isalnum() or letter in " -")
+    link = f"[{case.name}](#{anchor.replace(' ', '-')})"
+    return [link, case.answer, elements, planes, str(len(rows)), mark(passed == len(rows))]
 
 
-def line(row: Row) -> str:
-    """A row of the table."""
-    mark = "✓" if row.passed else "✗"
-    return f"| P{row.degree} | {row.plane} | {row.quantity} | {row.shown} | {row.expected.words} | {mark} |"
+def numbers(case: Case) -> str:
+    """A case's numbers beside their bounds."""
+    rows = [
+        (f"P{row.degree}", row.plane, row.quantity, row.shown, row.expected.words, mark(row.passed))
+        for row in case.rows()
+    ]
+    return markdown(NUMBERS, rows, left=len(NUMBERS))
+
+
+def mark(passed: bool) -> str:
+    """The sign of a number within its bounds."""
+    return "✓" if passed else "✗"

@@ -73,16 +73,12 @@ class Case:
     Attributes:
         name: A few words.
         answer: Kind of the known answer.
-        source: Reference of the answer.
-        text: The problem and the reason of its bounds, in Markdown.
         measure: Solves it.
         needs: Program that it runs, if any.
     """
 
     name: str
     answer: str
-    source: str
-    text: str
     measure: Callable[[], tuple[Row, ...]]
     needs: str = ""
 

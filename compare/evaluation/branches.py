@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pinnray.comparison.evaluation.certificate import ROUNDING
-from pinnray.comparison.evaluation.evaluation import Evaluation, field_difference
+from pinnray.comparison.evaluation.differences import FieldDifference
+from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.runtime.tables import percent
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import MissingLibraryError, make_solver
@@ -80,7 +81,7 @@ def with_branches(evaluations: Sequence[Evaluation], problem: Problem) -> tuple[
 def _unlike(first: Evaluation, second: Evaluation) -> bool:
     """Whether displacements differ by more than both results say."""
     stated = [each.uncertainty.displacement.rel_l2 for each in (first, second) if each.uncertainty]
-    difference = field_difference(second.displacement, first.displacement, first.weights)
+    difference = FieldDifference.of(second.displacement, first.displacement, first.weights)
     return difference.rel_l2 > UNLIKE + sum(stated)
 
 

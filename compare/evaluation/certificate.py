@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 
+from pinnray.comparison.evaluation.differences import Number, Numbers
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import percent
 
@@ -40,16 +40,16 @@ ROUNDING = 1e-8
 """Relative difference that the rounding of a direct solver explains."""
 
 
-class Region(NamedTuple):
+class Region(Numbers):
     """The error in a part of the body.
 
     The squares of the L2 norms of all parts, relative to `fem` in the whole body, add up to the body's.
     """
 
-    area: float  #: Share of the body's area.
-    excess: float  #: Share of the excess energy; NaN where there is no excess to share.
-    rel_l2_displacement: float  #: L2 norm of the difference from `fem` here over the norm of `fem`.
-    rel_l2_von_mises: float  #: The like for the von Mises stress.
+    area: Number  #: Share of the body's area.
+    excess: Number  #: Share of the excess energy; NaN where there is no excess to share.
+    rel_l2_displacement: Number  #: L2 norm of the difference from `fem` here over the norm of `fem`.
+    rel_l2_von_mises: Number  #: The like for the von Mises stress.
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +74,7 @@ class Certificate:
     load: FloatArray  #: Largest deviation from the prescribed u and v, shape (2,), mm; NaN where free.
     work: float  #: Of the own reaction on the prescribed displacement; twice the energy in equilibrium.
     stroke: float  #: Largest prescribed displacement, mm.
-    regions: Mapping[
-        str, Region
-    ]  #: The error by region, see `pinnray.comparison.evaluation.certification.REGIONS`.
-    density: FloatArray  #: Energy density of the rest, its mean over each triangle, shape (t,), MPa.
+    regions: Mapping[str, Region]  #: The error by region, see `certification.REGIONS`.
 
     @property
     def rel_excess(self) -> float:
@@ -140,14 +137,3 @@ class Certificate:
                 f"(limit {percent(WORK_LIMIT, 1)})"
             )
         return [fault.replace("\N{NO-BREAK SPACE}", " ") for fault in found]  # for files and terminals
-
-    def numbers(self) -> dict[str, Any]:
-        """The numbers for `metrics.json`."""
-        plain = (
-            *("energy", "fem_energy", "excess", "rel_excess", "violation", "rel_violation"),
-            *("energy_norm_error", "weak_residual", "imbalance", "missed", "misses_energy", "work", "base"),
-        )
-        return {name: getattr(self, name) for name in plain} | {
-            "load": self.load.tolist(),
-            "regions": {name: region._asdict() for name, region in self.regions.items()},
-        }

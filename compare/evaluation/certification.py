@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pinnray.comparison.evaluation.certificate import ROUNDING, Certificate, Region
-from pinnray.comparison.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation, field_difference
+from pinnray.comparison.evaluation.differences import FieldDifference
+from pinnray.comparison.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation
 from pinnray.geometry.mesh.boundary import boundary_loops, mean_thickness, singular_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.runtime.arrays import BoolArray, FloatArray
@@ -25,14 +26,8 @@ NOT_FINITE = "its displacement or stress is not finite everywhere"
 REGION_RADIUS = 0.5
 """Radius of the regions around corners and contact, in mean wall thicknesses."""
 
-REGIONS = {
-    "corners": "at re-entrant corners and base ends",
-    "contact": "at the contact",
-    "tip": "in the tip",
-    "walls": "in the walls",
-    "rest": "in the rest of the body",
-}
-"""Every region by which errors are told apart, and how to say in words what is there."""
+REGIONS = ("corners", "contact", "tip", "walls", "rest")
+"""Every region by which errors are told apart: corners are re-entrant ones and the ends of the base."""
 
 
 def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
@@ -132,7 +127,6 @@ class Certifier:
             work=float(evaluation.reaction[load.prescribed] @ load.values),
             stroke=float(np.abs(load.values).max()),
             regions=self._by_region(evaluation, density),
-            density=evaluation.per_triangle(density),
         )
 
     def _energy(self, nodal: FloatArray) -> float:
@@ -178,14 +172,16 @@ class Certifier:
             here = np.repeat(triangles, len(weights) // len(triangles))
             share = energy[here].sum() / total if total > ROUNDING**2 * evaluation.energy else np.nan
             displacement, von_mises = (
-                field_difference(np.where(here, own.T, fem.T).T, fem, weights).rel_l2
+                FieldDifference.of(np.where(here, own.T, fem.T).T, fem, weights).rel_l2
                 for own, fem in (
                     (evaluation.displacement, self._displacement),
                     (evaluation.von_mises, self._von_mises),
                 )
             )
             area = weights[here].sum() / weights.sum()
-            regions[name] = Region(float(area), float(share), displacement, von_mises)
+            regions[name] = Region(
+                area=area, excess=share, rel_l2_displacement=displacement, rel_l2_von_mises=von_mises
+            )
         return regions
 
 

@@ -2,17 +2,11 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import (
-    MEANS,
-    force_error,
-    held_out_errors,
-    marker_errors,
-    reference_differences,
-    truth_differences,
-)
+from pinnray.comparison.evaluation.metrics import Scores
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -47,10 +41,10 @@ class Results:
     failed: Mapping[str, str] = field(default_factory=dict)  #: Exceptions, by the names of solvers.
     warnings: Sequence[str] = ()  #: Remarks of the marker tracking and on unlikely measurements.
 
-    @property
-    def left_out(self) -> Mapping[str, str]:
-        """Former name of `unsupported`."""
-        return self.unsupported
+    @cached_property
+    def scores(self) -> Scores:
+        """Every number of the run, computed once."""
+        return Scores.of(self)
 
     def __repr__(self) -> str:
         solvers, seen = ", ".join(each.solver for each in self.evaluations), self.observations
@@ -80,15 +74,14 @@ class Results:
         return [evaluation for evaluation in self.evaluations if not evaluation.converged]
 
     def table(self) -> "pd.DataFrame":
-        """The main numbers, a row a solver; units are in the names of the columns, as in `summary.csv`.
+        """The main numbers, a row a solver, as `summary.csv`; units are in the names of the columns.
 
         `in_sample` are errors at markers that the solver was given, `held_out` at markers that it was not;
         `to_reference` and `to_truth` are relative L2 distances over the body. NaN where there is no number.
         """
         import pandas as pd
 
-        rows = {evaluation.solver: self._row(evaluation) for evaluation in self.evaluations}
-        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("solver")
+        return pd.DataFrame(self.scores.rows()).set_index("solver")
 
     def figures(self) -> "pd.DataFrame":
         """What the finger does by each solver: force in N, tip, wrap, stress, compliance, mass.
@@ -102,24 +95,11 @@ class Results:
         rows = {solver: figures.columns() for solver, figures in known.items()}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("solver")
 
-    def _row(self, evaluation: Evaluation) -> dict[str, object]:
-        held_out = held_out_errors(evaluation, self.observations)
-        given = marker_errors(evaluation, self.observations) if evaluation.in_sample else None
-        row: dict[str, object] = {"converged": evaluation.converged}
-        for kind, errors in (("in_sample", given), ("held_out", held_out)):
-            row |= {f"{kind}_{name}_mm": getattr(errors, name, float("nan")) for name in MEANS}
-        to = reference_differences(evaluation, self.reference)
-        true = None if self.truth is None else truth_differences(evaluation, self.truth)
-        for kind, differences in (("to_reference", to), ("to_truth", true)):
-            for name in ("displacement", "von_mises"):
-                difference = getattr(differences, name, None)
-                row[f"{kind}_{name}_rel_l2"] = getattr(difference, "rel_l2", float("nan"))
-        row["to_truth_force_rel"] = (
-            float("nan") if self.truth is None else force_error(evaluation, self.truth)
-        )
-        row |= {"energy_N_mm_per_mm": evaluation.energy}
-        row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}
-        return row | {"seconds_s": evaluation.stats.get("seconds", float("nan"))}
+
+def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None) -> Evaluation:
+    """The evaluation called `wanted`, else `fem`, else the first."""
+    named = {evaluation.solver: evaluation for evaluation in evaluations}
+    return named.get(wanted or "fem", evaluations[0])
 
 
 def supported_solvers(

@@ -6,75 +6,27 @@ They are kept as an archive of NumPy arrays: a run is resumed, and a result comp
 import json
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import TypeAdapter
 
 from pinnray.comparison.evaluation.certificate import Certificate
+from pinnray.comparison.evaluation.differences import Differences
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_arrays
 from pinnray.runtime.notebook import brief
-from pinnray.solvers.finger_figures import FingerFigures
+from pinnray.solvers.finger_figures import FingerFigures, figures_of
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.solution import IdentifiedForce, SolidField, Solution
 
-
-class FieldDifference(NamedTuple):
-    """Difference of a field from the reference's, over the whole body."""
-
-    rel_l2: float  #: Area-weighted L2 norm of the difference over the norm of the reference.
-    mean: float  #: Area-weighted mean of the pointwise absolute difference, in the field's unit.
-    p95: float  #: Area-weighted 95th percentile of the pointwise absolute difference.
-
-
-class ReferenceDifferences(NamedTuple):
-    """Differences of a solver from the reference on the shared mesh, or of the exact solution from it."""
-
-    displacement: FieldDifference  #: Of the displacement vector, mm.
-    von_mises: FieldDifference  #: MPa.
-    stress: Mapping[str, FieldDifference]  #: Of the in-plane Cauchy stress components, by name, MPa.
-    strain: Mapping[str, FieldDifference]  #: Of the in-plane strain components, by name.
-    mae_markers: float  #: Mean over the markers of `|du| + |dv|`, mm.
-    energy: float  #: Relative difference of the energy, signed.
-
-
-def field_difference(values: FloatArray, reference: FloatArray, weights: FloatArray) -> FieldDifference:
-    """Difference of two fields given at quadrature points.
-
-    Args:
-        values: Shape (q,) or (q, k).
-        reference: Of the same shape.
-        weights: Quadrature weights, shape (q,), mm^2.
-    """
-    size = _magnitude(values - reference)
-    norm = np.sqrt((weights * _magnitude(reference) ** 2).sum())
-    return FieldDifference(
-        rel_l2=float(np.sqrt((weights * size**2).sum()) / norm) if norm > 0 else float("nan"),
-        mean=float((weights * size).sum() / weights.sum()),
-        p95=weighted_percentile(size, weights, 95),
-    )
-
-
-def weighted_percentile(values: FloatArray, weights: FloatArray, percent: float) -> float:
-    """The value below which `percent` of the total weight lies."""
-    order = np.argsort(values)
-    share = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(share, percent / 100 * share[-1])])
-
-
-def _magnitude(values: FloatArray) -> FloatArray:
-    return np.abs(values) if values.ndim == 1 else np.asarray(np.linalg.norm(values, axis=1))
-
-
 QUADRATURE_DEGREE = 2
-DIFFERENCES, FORCE = TypeAdapter(ReferenceDifferences | None), TypeAdapter(IdentifiedForce | None)
-FIGURES = TypeAdapter(FingerFigures | None)
+FORCE, FIGURES = TypeAdapter(IdentifiedForce | None), TypeAdapter(FingerFigures | None)
 IN_SAMPLE = "† was given these markers: its errors there are training errors"
 """Meaning of the mark in `Evaluation.label_at_markers`."""
 
@@ -102,7 +54,7 @@ class Evaluation:
     von_mises: FloatArray  #: Shape (q,), MPa.
     energy_density: FloatArray  #: Shape (q,), MPa.
     #: The solver's estimate of its own error: differences of the exact solution from its own.
-    uncertainty: ReferenceDifferences | None = None
+    uncertainty: Differences | None = None
     marker_uncertainty: FloatArray | None = None  #: That estimate at the markers, absolute, shape (m, 2), mm.
     in_sample: bool = False  #: Whether the solver was given the observations: errors there are of training.
     family: str | None = None  #: Kind of method, from `Traits`.
@@ -221,6 +173,7 @@ class Evaluation:
             elif entry.name not in ("history", "certificate"):
                 header[entry.name] = dict(value) if isinstance(value, Mapping) else value
         header["figures"] = self.figures and asdict(self.figures)
+        header["uncertainty"] = self.uncertainty and self.uncertainty.model_dump()
         arrays |= {f"history_{name}": column for name, column in self.history.items()}
         write_arrays(path, {"header": np.array(json.dumps(header)), **arrays})
 
@@ -238,7 +191,8 @@ class Evaluation:
             prefix = "history_"
             columns = [name for name in arrays if name.startswith(prefix)]
             header["history"] = {name.removeprefix(prefix): arrays.pop(name) for name in columns}
-            header["uncertainty"] = DIFFERENCES.validate_python(header["uncertainty"])
+            own = header["uncertainty"]
+            header["uncertainty"] = own and Differences.model_validate(own)
             header["identified"] = FORCE.validate_python(header["identified"])
             header["figures"] = FIGURES.validate_python(header["figures"])
             return cls(**header, **arrays)
@@ -247,3 +201,20 @@ class Evaluation:
                 f"{path} is damaged ({type(error).__name__}) and is made again", RuntimeWarning, stacklevel=2
             )
             return None
+
+
+def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> Evaluation:
+    """Evaluate a solution, with its figures, and its uncertainty if its solver estimates its error.
+
+    The uncertainty is the difference of the estimate's improved field from the solution. Under prescribed
+    displacements, the energy of the error is the error of the energy.
+    """
+    own, error = Evaluation.of(solution, mesh, markers), solution.error
+    if solution.problem.finger is not None and own.finite:
+        own = replace(own, figures=figures_of(solution))
+    if error is None:
+        return own
+    energy = solution.energy * (1 - error.energy_norm**2)
+    better = Evaluation.of(replace(solution, field=error.field, energy=energy, states=()), mesh, markers)
+    at_markers = np.abs(better.marker_displacement - own.marker_displacement)
+    return replace(own, uncertainty=Differences.between(better, own), marker_uncertainty=at_markers)

@@ -1,12 +1,9 @@
 """Checks a finger's walls, and measured marker displacements against finger, indenter's travel and `fem`.
 
-What is impossible is refused; what is unlikely is warned of, with what it looks like.
+What is impossible is refused, what is unlikely warned of, with what was read and what was expected.
 """
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
-import shapely
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -19,26 +16,18 @@ from pinnray.solvers.registry import MissingLibraryError, make_solver
 from pinnray.solvers.solver import NONE_SEEN
 from pinnray.vision.measurements import SMALLEST_DISTANCE
 
-UNITS = {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0, "micrometres": 0.001}
-"""Millimetres in other units."""
-MICROMETRES = "these look like micrometres"
+UNITS = (1000.0, 25.4, 10.0)
+"""Millimetres in a metre, an inch and a centimetre."""
 LOOKS_LIKE = "this looks like"
 """Words before the unit that a number is taken to have."""
-POSITION_MIXUPS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
-    "x and y look swapped": lambda points: points[:, ::-1],
-    "y looks reversed (the body lies below the front face, y = 0)": lambda points: points * [1.0, -1.0],
-} | {f"these look like {unit}": lambda points, f=factor: points * f for unit, factor in UNITS.items()}
-DISPLACEMENT_MIXUPS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
-    "the signs look reversed (u and v are final minus initial position)": lambda moved: -moved,
-    "the sign of v looks reversed (the indenter presses along -y)": lambda moved: moved * [1.0, -1.0],
-    "u and v look swapped": lambda moved: moved[:, ::-1],
-    "u and v look swapped and their signs reversed": lambda moved: -moved[:, ::-1],
-}
+CONVENTION = "u and v are final minus initial position, in mm, u towards the tip and v out of the front"
 UNLIKE = 0.5
 """Cosine between measured and linear displacements of all markers below which they are unlike. At finite
 strain it is 0.92 or more on five designs with strokes up to 15 mm, and at most 0.06 with u and v swapped."""
 SIZES = 3.0
 """Ratio of measured to linear displacements that is unlikely; at finite strain it is 0.86 to 1."""
+IMPOSSIBLE = 200.0
+"""Ratio that no other stroke explains: no camera sees one so much smaller, no finger bears a larger one."""
 SMALL = 0.1
 """Share of the stroke below which `fem`'s displacements at the markers say little of a direction."""
 
@@ -54,28 +43,22 @@ def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
     try:
         mesh.locate(points)
     except OutsideBodyError as error:
-        looks = [said for said, undone in POSITION_MIXUPS.items() if _inside(mesh, undone(points))]
-        far = np.abs(points).max() > 10 * np.abs(mesh.points).max()
-        if not far and MICROMETRES in looks:  # a thousandth of any finger is near the origin, in the body
-            looks.remove(MICROMETRES)
-        if not looks and _in_outline(mesh, points):
-            looks = ["it is in a cavity, as a marker of another design would be"]
-        hint = f"; {looks[0]}" if looks else ""
         raise UserError(
-            f"the measurements are not of this finger: {error}{hint}; "
-            "positions are those before loading, in the finger's frame, in mm"
+            f"the measurements are not of this finger: {error}; positions are those before loading, in the "
+            "finger's frame, in mm, x from base to tip and y < 0 below the front face"
         ) from None
     apart = np.linalg.norm(points[:, None] - points, axis=2)[np.triu_indices(len(points), 1)]
     if len(apart) and float(apart.min()) < SMALLEST_DISTANCE:
         first, second = (int(ends[apart.argmin()]) + 1 for ends in np.triu_indices(len(points), 1))
         raise UserError(f"the markers {first} and {second} are at one place; keep one")
     crowded = bool(len(apart)) and float(apart.min()) < 2 * observations.marker_radius
-    for unit, factor in UNITS.items():
-        if (crowded or unit == "metres") and factor > 1 and _inside(mesh, points * factor):
+    for factor in UNITS:  # so near the origin they may lie on the body by chance
+        if (crowded or factor == UNITS[0]) and _inside(mesh, points * factor):
             extent = float(np.abs(points).max())
             raise UserError(
                 f"the measurements are not of this finger: all markers lie within {extent:.3g} mm of its "
-                f"frame's origin; these look like {unit}; give positions and displacements in mm"
+                f"frame's origin, and would be on it {factor:g} times as far; give positions and "
+                "displacements in mm"
             )
 
 
@@ -144,22 +127,18 @@ def _compared(
     """
     own = _cosine(moved, expected) if apart else 1.0
     ratio = float(np.linalg.norm(moved) / np.linalg.norm(expected))
-    likeness = {said: _cosine(undone(moved), expected) for said, undone in DISPLACEMENT_MIXUPS.items()}
-    mixup = max(likeness, key=lambda said: likeness[said])
-    if own < UNLIKE and likeness[mixup] > 0.85:
+    other = max(_cosine(each, expected) for sign in (1.0, -1.0) for each in _mixups(sign * moved))
+    if own < UNLIKE and other > 0.85:
         raise UserError(
-            f"the measurements do not fit the load: {mixup}; so changed they would be much like those of "
-            f"fem (cosine {likeness[mixup]:.2f}), as they are they are not ({own:.2f})"
+            "the measurements do not fit the load: with other signs, or u and v exchanged, they would be "
+            f"much like those of fem (cosine {other:.2f}), as they are they are not ({own:.2f}); {CONVENTION}"
         )
     sized = f"the markers' displacements are {ratio:.3g} times those of fem for a stroke of {stroke:g} mm"
-    unit = next((unit for unit, factor in UNITS.items() if 1 / 1.5 < ratio * factor < 1.5), None)
-    # No other stroke explains a factor of a thousand: no camera sees a stroke so much smaller.
-    if unit in ("metres", "micrometres") and own > UNLIKE:
-        raise UserError(f"{sized}; these look like {unit}; give mm")
+    if own > UNLIKE and not 1 / IMPOSSIBLE < ratio < IMPOSSIBLE:
+        raise UserError(f"{sized}, which no other stroke explains; give mm")
     remarks = []
     if not 1 / SIZES < ratio < SIZES:
-        looks = f"these look like {unit}, or the stroke was another" if unit else "check unit and stroke"
-        remarks.append(f"{sized}; {looks}")
+        remarks.append(f"{sized}; check unit and stroke")
     elif (far := np.linalg.norm(moved, axis=1).max()) > SIZES * np.linalg.norm(expected, axis=1).max():
         number = numbers[np.linalg.norm(moved, axis=1).argmax()]
         remarks.append(f"marker {number} moved by {far:.4g} mm, {SIZES:g} times farther than any in fem")
@@ -167,11 +146,11 @@ def _compared(
     turned = moves_along and _cosine(moved[:, 0], expected[:, 0]) < -0.7  # at finite strain it falls to 0
     if own < UNLIKE:
         remarks.append(
-            f"the markers' displacements are unlike those of fem (cosine {own:.2f}); check markers, columns, "
-            "signs and load"
+            f"the markers' displacements are unlike those of fem (cosine {own:.2f}); check markers and load; "
+            f"{CONVENTION}"
         )
     elif turned:
-        remarks.append("u goes against that of fem: its sign looks reversed (u is positive towards the tip)")
+        remarks.append(f"u goes against that of fem; {CONVENTION}")
     if apart and not turned and (order := likely_order(moved, expected, MUCH_NEARER)) is not None:
         remarks.append(
             f"the markers' displacements are much nearer to those of fem {order_words(order, numbers)}; see "
@@ -201,11 +180,9 @@ def _cosine(one: FloatArray, other: FloatArray) -> float:
     return float((one * other).sum()) / sizes if sizes else 0.0
 
 
-def _in_outline(mesh: TriangleMesh, points: FloatArray) -> bool:
-    """Whether points lie in the body or its cavities."""
-    edges = shapely.linestrings(mesh.points[mesh.boundary_edges])
-    filled = shapely.union_all(shapely.polygonize(edges))
-    return bool(shapely.covers(filled, shapely.points(points)).all())
+def _mixups(moved: FloatArray) -> list[FloatArray]:
+    """Displacements with a sign of v changed, and with u and v exchanged, beside those that are given."""
+    return [moved, moved * [1.0, -1.0], moved[:, ::-1]]
 
 
 def _inside(mesh: TriangleMesh, points: FloatArray) -> bool:

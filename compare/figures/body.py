@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
+from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
@@ -21,8 +21,8 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 from PIL import Image
 
-from pinnray.comparison.evaluation.evaluation import weighted_percentile
-from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent, Pixels
+from pinnray.comparison.evaluation.differences import weighted_percentile
+from pinnray.comparison.figures.canvas import Canvas, Extent, Pixels
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.figure import INK, MUTED, SMALL
@@ -37,13 +37,11 @@ class ColourScale(NamedTuple):
     low: float  # value of the first colour
     high: float  # value of the last one
     colours: Colormap
-    log: bool = False  # whether the colours follow the logarithm of the value, which must be positive
 
     @property
     def mappable(self) -> ScalarMappable:
         """For a colour bar."""
-        norm = LogNorm if self.log else Normalize
-        return ScalarMappable(norm(self.low, self.high), self.colours)
+        return ScalarMappable(Normalize(self.low, self.high), self.colours)
 
     def paint(self, values: FloatArray) -> NDArray[np.uint8]:
         """Colours of values of shape (t,): red, green and blue, shape (t, 3)."""
@@ -258,8 +256,7 @@ def colour_bar(axes: Axes, scale: ColourScale, title: str, *, extend: str = "nei
     bar = figure.colorbar(scale.mappable, cax=axes, orientation="horizontal", extend=extend, extendfrac=0.03)
     bar.outline.set_linewidth(0.4)
     bar.ax.tick_params(length=2, width=0.5, pad=1.5, labelsize=SMALL, colors=INK)
-    if not scale.log:
-        bar.ax.locator_params(nbins=5)
-        bar.ax.ticklabel_format(scilimits=(-2, 3), useMathText=True)
+    bar.ax.locator_params(nbins=5)
+    bar.ax.ticklabel_format(scilimits=(-2, 3), useMathText=True)
     bar.ax.xaxis.get_offset_text().set(size=SMALL, color=MUTED)
     bar.set_label(title, size=SMALL, labelpad=2)

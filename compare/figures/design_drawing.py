@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from pinnray.comparison.figures import body
+from pinnray.comparison.figures.canvas import Extent
 from pinnray.comparison.figures.dimensions import CENTRE_LINE, Draughtsman, upright
-from pinnray.comparison.figures.pyvista_canvas import Extent
 from pinnray.comparison.figures.style import arrow, axes_at, write_heading
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger

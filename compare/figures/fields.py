@@ -1,30 +1,26 @@
-"""Fields of every solver on one colour scale: quantities with their differences, and the excess energy."""
+"""Fields of every solver on one colour scale, each with its differences."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 
 from pinnray.comparison.evaluation.comparison import TRUTH, Results
-from pinnray.comparison.evaluation.evaluation import Evaluation, field_difference, weighted_percentile
-from pinnray.comparison.evaluation.metrics import COMPONENTS
+from pinnray.comparison.evaluation.differences import COMPONENTS, FieldDifference
+from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import body
-from pinnray.comparison.figures.body import PERCENT, ColourScale, diverging, sequential, symmetric
-from pinnray.comparison.figures.pyvista_canvas import Canvas
+from pinnray.comparison.figures.body import ColourScale, diverging, sequential, symmetric
+from pinnray.comparison.figures.canvas import Canvas
 from pinnray.comparison.figures.style import axes_at, write_heading
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.figure import MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.figure import WIDTH, Figure, figure
 from pinnray.runtime.tables import percent, significant
 
 MARGIN = 0.1
 HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55
 """Heights in inches: heading; the name above a panel; the colour bars."""
-
-DECADES = 4
-"""Powers of ten on the colour scale of the excess energy."""
 
 
 class FieldQuantity(NamedTuple):
@@ -144,7 +140,8 @@ def draw_field(comparison: Results, quantity: FieldQuantity, solvers: Collection
     base = quantity.values(reference)
     largest = "largest magnitude" if quantity.signed else "largest"
 
-    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
+    canvas = Canvas(mesh, extent, width=body.PIXELS // 2)
+    with figure(total) as drawn:
         write_heading(drawn, f"{quantity.title}, undeformed body")
         for row, evaluation in enumerate(ordered):
             top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
@@ -154,16 +151,13 @@ def draw_field(comparison: Results, quantity: FieldQuantity, solvers: Collection
             name = _name(evaluation)
             note = f"{largest} {significant(np.abs(means).max(), 3)} {quantity.unit}"
             body.panel(axes, canvas, mesh, scale.paint(means), name, note)
-            beside = (2 * MARGIN + width, top, width, height)
             if evaluation is not reference:
-                axes = axes_at(drawn, beside)
+                axes = axes_at(drawn, (2 * MARGIN + width, top, width, height))
                 own = difference_scale(quantity, mesh, evaluation, reference)
-                distance = percent(field_difference(values, base, reference.weights).rel_l2)
+                distance = percent(FieldDifference.of(values, base, reference.weights).rel_l2)
                 title = f"minus {reference.solver}, ±{significant(own.high, 2)} {quantity.unit}"
                 colours = own.paint(evaluation.per_triangle(values - base))
                 body.panel(axes, canvas, mesh, colours, title, f"rel. L² {distance}", bold=False)
-            elif columns == 2:
-                _explain(drawn, beside, reference)
         body.scale_bar(axes, extent)
         bars = [
             (scale, f"${quantity.symbol}$, {quantity.unit}"),
@@ -182,88 +176,3 @@ def draw_field(comparison: Results, quantity: FieldQuantity, solvers: Collection
 
 def _name(evaluation: Evaluation) -> str:
     return f"{evaluation.label}, simulated" if evaluation.solver == TRUTH else evaluation.label
-
-
-def draw_differences(
-    comparison: Results, quantity: FieldQuantity = QUANTITIES[0], solvers: Collection[str] = ()
-) -> Figure | None:
-    """Draw every solver's difference from the truth, or the reference, on one scale; None if there is none.
-
-    The scale ends where that of the solver in the middle does: beside one that is far off all others would
-    be blank.
-    """
-    mesh, (base, *others) = comparison.mesh, drawn_solvers(comparison, solvers)
-    if not others:
-        return None
-    columns = min(len(others), 2)
-    rows = -(-len(others) // columns)
-    width = (WIDTH - MARGIN * (columns + 1)) / columns
-    extent = body.field_extent(mesh, width)
-    height = width * extent.height / extent.width
-    values = [triangle_values(quantity, each) - triangle_values(quantity, base) for each in others]
-    sizes = sorted(symmetric([each], mesh.areas).high for each in values)
-    scale = ColourScale(-(high := sizes[len(sizes) // 2]), high, diverging())
-    total = HEAD + rows * (PANEL_TITLE + height) + FOOT
-    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
-        write_heading(drawn, f"{quantity.title} minus {_name(base)}, one scale for all")
-        for number, (each, difference) in enumerate(zip(others, values, strict=True)):
-            row, column = divmod(number, columns)
-            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
-            axes = axes_at(drawn, (MARGIN + column * (width + MARGIN), top, width, height))
-            distance = field_difference(quantity.values(each), quantity.values(base), base.weights).rel_l2
-            note = f"rel. L² {percent(distance)}"
-            body.panel(axes, canvas, mesh, scale.paint(difference), each.label, note)
-        body.scale_bar(axes, extent)
-        bar = axes_at(drawn, (0.2 * WIDTH, total - FOOT + 0.1, 0.6 * WIDTH, 0.09))
-        body.colour_bar(bar, scale, f"difference of ${quantity.symbol}$, {quantity.unit}", extend="both")
-    return drawn
-
-
-def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: Evaluation) -> None:
-    axes = axes_at(drawn, box)
-    axes.set_axis_off()
-    text = (
-        f"Compared with: {_name(reference)}\n"
-        f"Scales end at the {PERCENT:g} % point of the area:\n"
-        "left of this field, right of each\ndifference, where ± above a panel is its\n"
-        "end. Values beyond have the end colours.\nLargest: of triangles’ means."
-    )
-    axes.text(0.02, 0.95, text, va="top", size=SMALL, color=MUTED, linespacing=1.35, transform=axes.transAxes)
-
-
-def excess_scale(mesh: TriangleMesh, densities: Sequence[FloatArray]) -> ColourScale:
-    """The logarithmic scale that every solver shares; it ends at the highest percentile of any of them."""
-    high = max(weighted_percentile(density, mesh.areas, PERCENT) for density in densities)
-    return ColourScale(high / 10**DECADES, high, mpl.colormaps["viridis"], log=True)
-
-
-def draw_excess(comparison: Results) -> Figure | None:
-    """Draw the density of the excess energy of every solver that has one; None if none has."""
-    mesh = comparison.mesh
-    entries = [
-        (evaluation.label, evaluation.certificate)
-        for evaluation in comparison.evaluations
-        if evaluation.certificate is not None and evaluation.certificate.has_excess
-    ]
-    if not entries:
-        return None
-    columns = min(len(entries), 2)
-    rows = -(-len(entries) // columns)
-    width = (WIDTH - MARGIN * (columns + 1)) / columns
-    extent = body.field_extent(mesh, width)
-    height = width * extent.height / extent.width
-    scale = excess_scale(mesh, [certificate.density for _, certificate in entries])
-    total = HEAD + rows * (PANEL_TITLE + height) + FOOT
-    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
-        write_heading(drawn, "Excess energy over finite elements, undeformed body")
-        for number, (label, certificate) in enumerate(entries):
-            row, column = divmod(number, columns)
-            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
-            axes = axes_at(drawn, (MARGIN + column * (width + MARGIN), top, width, height))
-            colours = scale.paint(np.maximum(certificate.density, scale.low))
-            note = f"{percent(certificate.rel_excess, 2)} of the energy"
-            body.panel(axes, canvas, mesh, colours, label, note)
-        body.scale_bar(axes, extent)
-        bar = axes_at(drawn, (0.2 * WIDTH, total - FOOT + 0.1, 0.6 * WIDTH, 0.09))
-        body.colour_bar(bar, scale, "density of the excess energy, MPa", extend="both")
-    return drawn

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import ForceCurve, follows_load
+from pinnray.comparison.evaluation.force_curves import ForceCurve, follows_load
 from pinnray.comparison.figures.style import (
     axes_at,
     legend_above,
@@ -29,8 +29,7 @@ def draw_force_displacement(
 
     A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line. The
     simulated finger's curve ends in a cross. A force that was identified from the markers, by the number of
-    its solver in the run, is a square with its interval of 95 % at the end of the travel, and where the force
-    at lesser loads is known, a dotted line leads there.
+    its solver in the run, is a square with its interval of 95 % at the end of the travel.
     """
     labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
     true_label = [_end_label(truth, "truth, simulated")] if truth else []
@@ -66,7 +65,7 @@ def draw_force_displacement(
             axes.plot(truth.travel, truth.force, color=MEASURED, lw=1.3, zorder=3)
         reach = (truth or curves[0]).travel[-1]
         for place, (number, label) in enumerate(zip(found, more, strict=True)):
-            (value, low, high), path = found[number][1].size, found[number][1].path
+            value, low, high = found[number][1].size
             # Beside each other: the intervals of several solvers would hide each other.
             x, apart = reach * (1 - 0.02 * (place + 1)), [[value - low], [high - value]]
             style: dict[str, Any] = {
@@ -76,9 +75,6 @@ def draw_force_displacement(
                 "color": solver_colour(number),
                 "zorder": 5,
             }
-            if path:
-                share, force = np.concatenate([np.zeros((1, 2)), np.array(path)]).T
-                axes.plot(reach * share, force, ":", color=style["color"], lw=1.3, zorder=4)
             axes.errorbar([x], [value], yerr=apart, fmt="s", label=label, **style)
         every = [*curves, truth] if truth else curves
         axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))

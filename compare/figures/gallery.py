@@ -8,27 +8,14 @@ import numpy as np
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import IN_SAMPLE, Evaluation
-from pinnray.comparison.evaluation.metrics import ForceCurve, force_curves, held_out_errors
+from pinnray.comparison.evaluation.force_curves import ForceCurve, force_curves
 from pinnray.comparison.figures.body import PERCENT
 from pinnray.comparison.figures.design_drawing import draw_design
-from pinnray.comparison.figures.fields import (
-    DECADES,
-    QUANTITIES,
-    FieldQuantity,
-    draw_differences,
-    draw_excess,
-    draw_field,
-    drawn_solvers,
-)
+from pinnray.comparison.figures.fields import QUANTITIES, FieldQuantity, draw_field, drawn_solvers
 from pinnray.comparison.figures.force_charts import draw_force_displacement
 from pinnray.comparison.figures.mesh_drawing import draw_mesh, mesh_numbers
 from pinnray.comparison.figures.overlay import draw_overlay
-from pinnray.comparison.figures.solver_charts import (
-    draw_convergence,
-    draw_energy,
-    draw_losses,
-    draw_marker_errors,
-)
+from pinnray.comparison.figures.solver_charts import draw_convergence, draw_losses, draw_marker_errors
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.figure import Figure
 
@@ -86,7 +73,7 @@ def _marker_errors(comparison: Results) -> Illustration | None:
         each_of(
             "Mean of |Δu| + |Δv| at markers that were not given, mm",
             comparison.evaluations,
-            lambda each: getattr(held_out_errors(each, observations), "mae_sum", float("nan")),
+            lambda each: getattr(comparison.scores[each.solver].held_out, "mae_sum", float("nan")),
         ),
     )
 
@@ -125,27 +112,6 @@ def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str
     )
 
 
-def _differences(comparison: Results, solvers: Collection[str] = ()) -> Illustration | None:
-    quantity = QUANTITIES[0]
-    if (figure := draw_differences(comparison, quantity, solvers)) is None:
-        return None
-    base, *others = drawn_solvers(comparison, solvers)
-    return Illustration(
-        figure,
-        "Differences on one scale",
-        f"{quantity.title} of every solver minus that of {base.label}, on one scale: it ends where that of "
-        f"the solver in the middle does, and values beyond have the end colours. Beside the fields each "
-        f"difference has a scale of its own.",
-        each_of(
-            f"Mean size of the difference, {quantity.unit}",
-            others,
-            lambda each: float(
-                np.average(np.abs(quantity.values(each) - quantity.values(base)), weights=each.weights)
-            ),
-        ),
-    )
-
-
 def _force_displacement(comparison: Results) -> Illustration | None:
     depth = comparison.design.depth
     if not (curves := force_curves(comparison.evaluations, comparison.load)):
@@ -156,8 +122,6 @@ def _force_displacement(comparison: Results) -> Illustration | None:
         cross = " Pink: the force on the simulated finger, the truth that the solvers should reach."
     found = {n: each for n, each in enumerate(comparison.evaluations) if each.identified}
     squares = " Squares: forces identified from the markers, with intervals of 95 %." if found else ""
-    if any(each.identified and each.identified.path for each in found.values()):
-        squares += " Dotted: the force on the finger that was found, at lesser loads."
     return Illustration(
         draw_force_displacement(curves, depth=depth, truth=truth, identified=found),
         "Force over displacement",
@@ -173,46 +137,16 @@ def _force_displacement(comparison: Results) -> Illustration | None:
     )
 
 
-def _excess(comparison: Results) -> Illustration | None:
-    if (figure := draw_excess(comparison)) is None:
-        return None
-    return Illustration(
-        figure,
-        "Excess energy",
-        f"Energy of the difference between each solver’s displacement, taken over to the elements of "
-        f"fem, and the displacement of least energy with the same values at base and contact: its mean "
-        f"over each triangle, on one logarithmic scale of {DECADES} powers of ten. {PERCENT:g} % of the "
-        f"area of every solver lie below its end. A solver without a certificate, or without any excess, "
-        f"is left out.",
-        each_of(
-            "Energy above the least, %",
-            [each for each in comparison.evaluations if each.certificate and each.certificate.has_excess],
-            lambda each: 100 * (each.certificate.rel_excess if each.certificate else 0.0),
-        ),
-    )
-
-
-def _energy(comparison: Results) -> Illustration | None:
-    if (figure := draw_energy(comparison)) is None:
-        return None
-    return Illustration(
-        figure,
-        "Energy",
-        "Elastic energy per unit depth along the load of each solver that follows it; over factors of the "
-        "markers’ weight, the energy that they add: assimilation never lowers the least energy.",
-        each_of("Energy at the end, N mm per mm", comparison.evaluations, lambda each: each.energy),
-    )
-
-
 def _convergence(comparison: Results) -> Illustration | None:
     if (figure := draw_convergence(comparison)) is None:
         return None
     return Illustration(
         figure,
         "Convergence",
-        f"Elastic energy per unit depth as each solver went on and, beside it, its relative distance "
-        f"from that of {comparison.reference.label} (dashed line). A solver that solves directly "
-        f"keeps no record. One that was given the markers pays energy for them.",
+        f"Elastic energy per unit depth: as each solver went on, with its relative distance from that of "
+        f"{comparison.reference.label} (dashed line) beside it; along the load; over factors of the markers’ "
+        f"weight, the energy that they add. A solver that solves directly keeps no record. One that was "
+        f"given the markers pays energy for them.",
         each_of("Energy at the end, N mm per mm", comparison.evaluations, lambda each: each.energy),
     )
 
@@ -260,21 +194,18 @@ def _mesh(comparison: Results) -> Illustration:
     )
 
 
-CHOOSING = (*(each.name for each in QUANTITIES), "differences")
+CHOOSING = tuple(each.name for each in QUANTITIES)
 """Pictures in which solvers can be chosen."""
 
 GALLERY: dict[str, tuple[str, Callable[..., Illustration | None]]] = {
     "overlay": ("picture of the deformed finger", _overlay),
     "marker_errors": ("chart of the errors at the markers", _marker_errors),
     **{each.name: (f"picture of {each.name}", partial(_field, quantity=each)) for each in QUANTITIES},
-    "differences": ("picture of the differences on one scale", _differences),
     "force_displacement": ("chart of force over displacement", _force_displacement),
-    "excess": ("picture of the excess energy", _excess),
-    "energy": ("chart of the energy", _energy),
-    "convergence": ("chart of the energy on the way to the solution", _convergence),
-    "losses": ("chart of the losses", _losses),
     "design": ("drawing of the design", _design),
     "mesh": ("picture of the mesh", _mesh),
+    "convergence": ("chart of the energy", _convergence),
+    "losses": ("chart of the losses", _losses),
 }
 """By file name: words for the progress line, and the function; it gives None if there is nothing to draw."""
 

@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Rectangle
 
 from pinnray.comparison.figures import body
-from pinnray.comparison.figures.pyvista_canvas import Extent
+from pinnray.comparison.figures.canvas import Extent
 from pinnray.comparison.figures.style import HALO, axes_at, write_heading
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh

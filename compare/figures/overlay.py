@@ -10,10 +10,10 @@ from matplotlib.patches import Circle
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import held_out_errors, marker_errors
+from pinnray.comparison.evaluation.metrics import SolverScores
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.body import ColourScale
-from pinnray.comparison.figures.pyvista_canvas import Canvas, Extent
+from pinnray.comparison.figures.canvas import Canvas, Extent
 from pinnray.comparison.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -45,7 +45,8 @@ def draw_overlay(comparison: Results) -> Figure:
     given = "\n".join(notes)
     head = HEAD + LEGEND_LINE * len(notes)
     total = head + rows * (PANEL_TITLE + height) + FOOT
-    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
+    canvas = Canvas(mesh, extent, width=body.PIXELS // columns)
+    with figure(total) as drawn:
         write_heading(drawn, "Deformed finger, true scale")
         for number, evaluation in enumerate(evaluations):
             row, column = divmod(number, columns)
@@ -115,7 +116,7 @@ def _panel(
     if observations.known:
         _error_vectors(axes, observed, evaluation, observations)
         frame = "" if evaluation.shown is None else "; the frame it found is taken off the markers"
-        body.write_note(axes, canvas.extent, errors_note(evaluation, observations) + frame)
+        body.write_note(axes, canvas.extent, errors_note(comparison.scores[evaluation.solver]) + frame)
 
 
 FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
@@ -147,12 +148,10 @@ def _error_vectors(
     axes.set_title(f"×{factor}", loc="right", size=SMALL, pad=3, y=1.0, color=MEASURED)
 
 
-def errors_note(evaluation: Evaluation, observations: Observations) -> str:
+def errors_note(own: SolverScores) -> str:
     """Mean absolute errors at the markers in words: held-out ones if the solver has them."""
-    errors, kind = held_out_errors(evaluation, observations), "held out"
-    if errors is None:
-        errors, kind = marker_errors(evaluation, observations), "training"
-    kind = f" {kind}" if evaluation.in_sample else ""
+    errors = own.most_telling
+    kind = "" if own.given is None else " held out" if own.held_out else " training"
     return f"MAE{kind}: u {errors.mae_u:.3f}, v {errors.mae_v:.3f} mm"
 
 

@@ -1,6 +1,6 @@
 """Charts of solvers: the record of each on the way to its solution, and its errors at the markers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
+from pinnray.comparison.evaluation.metrics import SolverScores
 from pinnray.comparison.figures.style import (
     axes_at,
     legend_above,
@@ -21,7 +21,6 @@ from pinnray.comparison.figures.style import (
     write_heading,
     write_letter,
 )
-from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 
@@ -52,30 +51,13 @@ def approaches_reference(group: Group) -> bool:
     return column == "energy" and not abscissa.startswith("load")
 
 
-def draw_energy(comparison: Results) -> Figure | None:
-    """Draw every record of another kind than energies of one problem, a lettered panel for each kind.
-
-    Along a load that grows, or over factors of the markers' weight. None without a record.
-    """
-    groups = records_by_kind(comparison.evaluations)
-    chosen = {group: members for group, members in groups.items() if not approaches_reference(group)}
-    return _draw_kinds(comparison, chosen, "Energy along the load and over the markers’ weight")
-
-
 def draw_convergence(comparison: Results) -> Figure | None:
-    """Draw energies on the way to the solution; beside them their distances from the reference's energy.
+    """Draw the records of energy, a row of lettered panels for each kind; None without a record.
 
-    None without such a record.
+    Energies on the way to a solution have their distances from the reference's energy beside them. Others are
+    along a load that grows, or over factors of the markers' weight.
     """
     groups = records_by_kind(comparison.evaluations)
-    chosen = {group: members for group, members in groups.items() if approaches_reference(group)}
-    return _draw_kinds(comparison, chosen, "Energy on the way to the solution")
-
-
-def _draw_kinds(
-    comparison: Results, groups: Mapping[Group, Sequence[Evaluation]], heading: str
-) -> Figure | None:
-    """Lettered panels in rows, one for each kind of record; None if there is none."""
     evaluations, reference = comparison.evaluations, comparison.reference
     if not groups:
         return None
@@ -87,7 +69,7 @@ def _draw_kinds(
         for group, members in groups.items()
     ]
     with figure(HEAD + sum(heights) + len(groups) * (height + foot)) as drawn:
-        write_heading(drawn, heading)
+        write_heading(drawn, "Records of the energy")
         for row, (group, members) in enumerate(groups.items()):
             others = [each for each in members if each is not reference and not each.in_sample]
             compared = others if approaches_reference(group) else []
@@ -206,7 +188,8 @@ def draw_marker_errors(comparison: Results) -> Figure:
     head, title, height, gap, foot = 0.62, 0.19, 0.5, 0.1, 0.4  # inches: with legend; a solver's name; ...
     left, step = 0.72, title + height + gap
     width = WIDTH / 2 - left - 1.02  # where the means stand
-    span = _span(evaluations, observations)
+    scores = [comparison.scores[evaluation.solver] for evaluation in evaluations]
+    span = _span(scores)
     with figure(head + len(evaluations) * step + foot) as drawn:
         write_heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
         fitted = any(evaluation.in_sample for evaluation in evaluations)
@@ -215,12 +198,10 @@ def draw_marker_errors(comparison: Results) -> Figure:
             Line2D([], [], **CIRCLE, color=MUTED, label="training: it was given this marker (†)"),
         ]
         legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
-        for row, evaluation in enumerate(evaluations):
-            held_out = held_out_errors(evaluation, observations)
-            given = marker_errors(evaluation, observations) if evaluation.in_sample else None
+        for row, (evaluation, own) in enumerate(zip(evaluations, scores, strict=True)):
             for column, symbol in enumerate("uv"):
                 axes = axes_at(drawn, (left + column * WIDTH / 2, head + title + row * step, width, height))
-                _draw_errors(axes, symbol, held_out, given, solver_colour(row), span[0])
+                _draw_errors(axes, symbol, own, solver_colour(row), span[0])
                 _set_scales(axes, observations.visible, span)
                 axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=SMALL)
                 if row == 0:
@@ -241,13 +222,11 @@ SMALLEST = 1e-6
 """Errors below this, mm, are those of rounding."""
 
 
-def _span(evaluations: Sequence[Evaluation], observations: Observations) -> tuple[float, float]:
+def _span(scores: Sequence[SolverScores]) -> tuple[float, float]:
     """Powers of ten around the errors of the solvers that converged (or of any), mm."""
-    chosen = [evaluation for evaluation in evaluations if evaluation.converged] or evaluations
-    errors = [
-        error(evaluation, observations) for evaluation in chosen for error in (marker_errors, held_out_errors)
-    ]
-    found = np.concatenate([np.append(each.ae_u, each.ae_v) for each in errors if each is not None])
+    chosen = [own for own in scores if own.converged] or scores
+    errors = [each for own in chosen for each in (own.markers, own.held_out) if each is not None]
+    found = np.concatenate([np.append(each.ae_u, each.ae_v) for each in errors])
     found = found[np.isfinite(found) & (found > SMALLEST)]
     if not len(found):
         return SMALLEST, 1e3 * SMALLEST
@@ -256,23 +235,16 @@ def _span(evaluations: Sequence[Evaluation], observations: Observations) -> tupl
     return 10 ** min(low, high - 1), 10**high
 
 
-def _draw_errors(
-    axes: Axes,
-    symbol: str,
-    held_out: MarkerErrors | None,
-    given: MarkerErrors | None,
-    colour: str,
-    floor: float,
-) -> None:
+def _draw_errors(axes: Axes, symbol: str, own: SolverScores, colour: str, floor: float) -> None:
     """The bars and circles of one solver and component, and their means beside; none is below the floor."""
     words = []
-    for errors, kind in ((held_out, "held out"), (given, "training")):
+    for errors, kind in ((own.held_out, "held out"), (own.given, "training")):
         if errors is None:
             continue
         values = np.maximum(getattr(errors, f"ae_{symbol}"), floor)  # a scale of powers has no zero
         marker = np.arange(1, len(values) + 1)
         seen = np.isfinite(values)
-        if errors is given:
+        if errors is own.given:
             axes.plot(marker[seen], values[seen], **CIRCLE, color=INK, clip_on=False, zorder=3)
         else:
             axes.bar(marker[seen], values[seen], 0.72, color=colour, edgecolor=colour, linewidth=0.6)

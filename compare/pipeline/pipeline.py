@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from pinnray.comparison.evaluation.branches import with_branches
-from pinnray.comparison.evaluation.comparison import Results, supported_solvers
+from pinnray.comparison.evaluation.comparison import Results, pick_reference, supported_solvers
 from pinnray.comparison.evaluation.deformed_body import with_body_checks
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import force_curves, pick_reference, write_force_displacement
+from pinnray.comparison.evaluation.force_curves import force_curves, write_force_displacement
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
 from pinnray.comparison.evaluation.truths import (
     TRUTHS,
@@ -18,13 +18,13 @@ from pinnray.comparison.evaluation.truths import (
     no_displacements,
     virtual_experiment,
 )
-from pinnray.comparison.figures import Picture, draw_all, pictures_beside
+from pinnray.comparison.figures import Picture, draw_all
 from pinnray.comparison.pipeline.job import Job, MarkerSource, checked
 from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
 from pinnray.comparison.pipeline.solving import ERRORS, solve_all
+from pinnray.comparison.report.comparison import Comparison
 from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.atomic import write_json
 from pinnray.runtime.content_hash import file_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
@@ -32,18 +32,17 @@ from pinnray.runtime.output_folder import check_output, replaced_folder, write_r
 from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.shared_work import SharedWork
 from pinnray.solvers.solver import Solver, Traits
 from pinnray.vision.measurements import write_measurements
 
 
-def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
+def run(job: Job, stages: Stages, pool: Pool | None = None) -> Comparison:
     """Make the comparison and write its output folder.
 
     Args:
         job: What to compare.
         stages: Is told what is done.
-        pool: A second process, which solves and draws beside this one.
+        pool: A second process, which solves beside this one.
 
     Raises:
         UserError: If the job cannot be done; the output folder is as it was.
@@ -54,17 +53,17 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Results:
     with replaced_folder(job.out, keep=kept) as folder:
         if not isinstance(job.measurements, MarkerSource):
             comparison = compute(job, stages, folder, pool)
-            _write(folder, job, comparison, stages, pool)
+            _write(folder, job, comparison, stages)
             return comparison
         measured = job.measurements.measured(job.design, folder, stages)
         comparison = compute(replace(job, measurements=measured.observations), stages, folder, pool)
         comparison = replace(comparison, warnings=[*measured.warnings, *comparison.warnings])
         photographs = [*measured.pictures, *measured.compared(comparison)]
-        _write(folder, job, comparison, stages, pool, photographs)
+        _write(folder, job, comparison, stages, photographs)
     return comparison
 
 
-def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) -> Results:
+def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) -> Comparison:
     """Mesh, solve and evaluate a checked job whose markers are known or simulated.
 
     Solutions and checkpoints go into the folder.
@@ -99,7 +98,7 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
     with stages.stage("checks"):
         evaluations, impossible = with_body_checks(list(outcome.evaluations.values()), mesh, truth)
         evaluations, branches = with_branches(evaluations, problem)
-    return Results(
+    return Comparison(
         design=job.design,
         mesh=mesh,
         observations=observations,
@@ -155,38 +154,33 @@ def _write(
     job: Job,
     comparison: Results,
     stages: Stages,
-    pool: Pool | None,
     photographs: Sequence[Picture] = (),
 ) -> None:
     """Write every file of a comparison but its solutions; photographs are for the report."""
     # They need the libraries of pictures.
-    from pinnray.comparison.report.html_report import viewer, write_report
-    from pinnray.comparison.report.output_files import metrics, write_vtu
+    from pinnray.comparison.report.html_report import write_report
+    from pinnray.comparison.report.output_files import write_vtu
 
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
-    figures, work = folder / "figures", SharedWork()
-    with pictures_beside(figures, comparison, job.picture_formats, pool) as beside, work.used():
-        with stages.stage("fields"):
-            for evaluation in comparison.shown_fields:
-                write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
-            viewed = viewer(comparison)
-        with stages.stage("tables"):
-            write_markers(folder / "markers.csv", comparison)
-            write_table_one(folder / "table1.csv", comparison)
-            write_summary(folder / "summary.csv", comparison)
-            if curves := force_curves(comparison.evaluations, job.load):
-                write_force_displacement(
-                    folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
-                )
-            numbers = metrics(comparison)
-            write_json(folder / "metrics.json", numbers)
-        with stages.stage("pictures") as progress:
-            pictures = draw_all(figures, comparison, progress, job.picture_formats, beside)
-    with stages.stage("report"), work.used():
+    comparison.scores.write(folder)
+    with stages.stage("fields"):
+        for evaluation in comparison.shown_fields:
+            write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
+    with stages.stage("tables"):
+        write_markers(folder / "markers.csv", comparison)
+        write_table_one(folder / "table1.csv", comparison)
+        write_summary(folder / "summary.csv", comparison)
+        if curves := force_curves(comparison.evaluations, job.load):
+            write_force_displacement(
+                folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
+            )
+    with stages.stage("pictures") as progress:
+        pictures = draw_all(folder / "figures", comparison, progress, job.picture_formats)
+    with stages.stage("report"):
         record = _provenance(folder, job, comparison, stages)
-        write_report(folder / "report.html", comparison, [*pictures, *photographs], record, numbers, viewed)
+        write_report(folder / "report.html", comparison, [*pictures, *photographs], record)
         write_run(folder, record)
 
 

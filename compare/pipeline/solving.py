@@ -12,8 +12,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from pinnray.comparison.evaluation.certification import with_certificates
-from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated
 from pinnray.comparison.pipeline.job import Job
 from pinnray.geometry.cache import expected_triangles
 from pinnray.geometry.finger.finger import Finger
@@ -53,7 +52,7 @@ SHARE = max(1, cores() // 2)
 """Threads of the linear algebra in each of two processes."""
 
 PICTURES = "pinnray.comparison.report.html_report"
-"""Module that imports the libraries of pictures, which both processes draw next."""
+"""Module that imports the libraries of pictures, which are drawn next."""
 
 Stage = Callable[[str], AbstractContextManager[Progress]]
 """Begins a stage of a run, as `Stages.stage`."""
@@ -178,7 +177,6 @@ def _answered(part: "_Part", report: Callable[..., None]) -> Outcome | UserError
         outcome = part.outcome(stage, SharedWork())
     except UserError as error:
         return UserError(str(error))
-    import_module(PICTURES)
     return outcome
 
 

@@ -1,12 +1,10 @@
 """The report: one HTML file that holds its pictures and a viewer of the fields, and needs nothing else.
 
-The browser draws the fields with Plotly.js (MIT licence), which comes with the Python package `plotly` and is
-packed into the page. Numbers have 16 bits: the range of a field, or of its difference, in 65,535 steps.
+Numbers have 16 bits: the range of a field, or of its difference, in 65,535 steps.
 """
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +14,7 @@ from jinja2 import Template
 from pinnray.comparison.evaluation.certification import REGION_RADIUS
 from pinnray.comparison.evaluation.comparison import TRUTH, Results, unsupported_remarks
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import (
-    force_error,
-    indistinct,
-    reference_differences,
-    truth_differences,
-)
 from pinnray.comparison.figures import Picture
-from pinnray.comparison.figures.body import diverging
 from pinnray.comparison.figures.fields import (
     QUANTITIES,
     VIEWED,
@@ -34,13 +25,12 @@ from pinnray.comparison.figures.fields import (
 )
 from pinnray.comparison.figures.overlay import contact_motion
 from pinnray.comparison.report import text
-from pinnray.comparison.report.output_files import metrics
+from pinnray.comparison.report.page_body import packed_body
 from pinnray.comparison.report.summary import answers
-from pinnray.comparison.report.tables import millimetres, printed_rows, seconds, table_one
-from pinnray.geometry.mesh.boundary import edge_paths
+from pinnray.comparison.report.tables import printed_rows, seconds, table_one
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_text
-from pinnray.runtime.html import Packed, base64_text, picture_urls, template_environment
+from pinnray.runtime.html import Packed, picture_urls, template_environment
 from pinnray.runtime.tables import distance, number, percent
 
 BUDGET = 6_000_000
@@ -48,7 +38,7 @@ BUDGET = 6_000_000
 
 
 def viewer(comparison: Results) -> dict[str, Any] | None:
-    """Manifest, packed arrays and library of the viewer; None where there is no field to show.
+    """Manifest and packed arrays of the viewer; None where there is no field to show.
 
     There are no solvers whose field is not finite, and no quantities beyond the `BUDGET`.
     """
@@ -60,11 +50,8 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
         return None
     packed = Packed()
     manifest = {
-        "points": packed.add(mesh.points.astype("<f4")),
-        "triangles": packed.add(mesh.triangles.astype("<u4")),
-        "outlines": [path.tolist() for path in edge_paths(mesh.boundary_edges)],
+        **packed_body(mesh, packed),
         "reference": reference.label,
-        "differences": [_stop(share) for share in np.linspace(0, 1, 17)],
         "quantities": [
             {
                 "name": quantity.name,
@@ -79,7 +66,7 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
         "solvers": [_solver(each, comparison, quantities, packed) for each in shown],
         "name": comparison.design.name,
     }
-    return {"manifest": manifest, "data": packed.text(), "library": _library(), "shown": shown}
+    return {"manifest": manifest, "data": packed.text()}
 
 
 def _solver(
@@ -151,52 +138,35 @@ def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
     return [0.0, 1.0], np.stack([np.zeros_like(end), end]), word
 
 
-def _stop(share: float) -> list[Any]:
-    """A stop of the colour scale of differences, as Plotly takes it."""
-    red, green, blue, _ = diverging()(share, bytes=True)
-    return [round(float(share), 4), f"rgb({red},{green},{blue})"]
-
-
-@cache
-def _library() -> str:
-    """Plotly.js, compressed, in Base64."""
-    return base64_text(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes())
-
-
 def write_report(
     path: Path,
     comparison: Results,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
-    numbers: Mapping[str, Any] | None = None,
-    viewed: Mapping[str, Any] | None = None,
 ) -> None:
     """Write the report as one HTML file, atomically; arguments as for `report_html`."""
-    write_text(path, report_html(comparison, pictures, provenance, numbers, viewed))
+    write_text(path, report_html(comparison, pictures, provenance))
 
 
 def report_html(
     comparison: Results,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
-    numbers: Mapping[str, Any] | None = None,
-    viewed: Mapping[str, Any] | None = None,
 ) -> str:
     """The report as HTML text.
 
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
-    `numbers` are the comparison's `metrics` and `viewed` its `viewer`, where they are known already.
     """
-    numbers = metrics(comparison) if numbers is None else numbers
-    design = comparison.design
+    design, scores = comparison.design, comparison.scores
     certificates = [each.certificate for each in comparison.evaluations if each.certificate]
-    fields = {*(quantity.name for quantity in QUANTITIES), "differences"}
+    fields = {quantity.name for quantity in QUANTITIES}
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
-        answers=answers(numbers, unsupported=comparison.unsupported, failed=comparison.failed),
-        own=comparison.reference.uncertainty,
-        table_one=table_one(comparison),
+        scores=scores,
+        answers=answers(scores),
+        own=scores[scores.reference].to_reference.reference_uncertainty,
+        table_one=table_one(scores),
         printed=printed_rows(design),
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
         unsupported=[*unsupported_remarks(comparison.unsupported), *comparison.failed.values()],
@@ -204,7 +174,7 @@ def report_html(
         regions={name for certificate in certificates for name in certificate.regions},
         near=REGION_RADIUS,
         text=text,
-        viewer=viewed or viewer(comparison),
+        viewer=viewer(comparison),
         urls=picture_urls([picture.path for picture in pictures]),
         pictures=[picture for picture in pictures if picture.path.stem not in fields],
         stills=[picture for picture in pictures if picture.path.stem in fields],
@@ -215,29 +185,21 @@ def report_html(
 @cache  # compiling takes a fifth of a second
 def _template() -> Template:
     environment = template_environment("pinnray.comparison")
-    filters = (millimetres, number, distance, percent)
+    filters = (number, distance, percent)
     environment.filters |= {each.__name__: each for each in filters}
     return environment.get_template("report.html.j2")
 
 
 def _entry(evaluation: Evaluation, comparison: Results) -> dict[str, object]:
     """One solver's part of the tables."""
-    reference, truth = comparison.reference, comparison.truth
-    differences = reference_differences(evaluation, reference)
+    own = comparison.scores[evaluation.solver]
     return {
         "label": evaluation.label,
-        "is_reference": evaluation is reference,
+        "is_reference": evaluation.solver == comparison.scores.reference,
         "evaluation": evaluation,
-        "to_truth": None if truth is None else truth_differences(evaluation, truth),
-        "force_to_truth": None if truth is None else force_error(evaluation, truth),
-        "differences": differences,
-        "indistinct": text.indistinct_sentence(
-            evaluation.label,
-            reference.label,
-            [] if evaluation is reference else indistinct(differences, reference.uncertainty),
-        ),
-        "reaction": text.without_rounding(evaluation.reaction),
-        "seconds": seconds(evaluation),
+        "own": own,
+        "reaction": text.without_rounding(own.reaction),
+        "seconds": seconds(own),
         "certificate": evaluation.certificate,
         "certificate_sentences": text.certificate_sentences(evaluation, comparison.load.kind),
     }

@@ -1,17 +1,15 @@
-"""The answers that a report opens with, in words and numbers from `metrics.json`.
+"""The answers that a report opens with, in words and numbers from its scores.
 
-Every number is read from the metrics; a question that they cannot answer is not asked.
+A question that they cannot answer is not asked.
 """
 
 from collections.abc import Mapping, Sequence
 from math import hypot, isfinite, nan
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from pinnray.comparison.evaluation.metrics import FigureScores, Scores, SolverScores
 from pinnray.runtime.tables import NONE, TextTable, number, percent
 from pinnray.solvers.finger_figures import break_warning
-
-Metrics = Mapping[str, Any]
-"""`metrics.json`, or a part of it, with NaN for a number that is not known."""
 
 TRUTH_FIELDS = ("displacement", "von Mises stress", "force")
 """Quantities that are compared with the simulated finger, in the order of `_to_truth`."""
@@ -26,37 +24,15 @@ class RunAnswer(NamedTuple):
     table: TextTable | None = None  # more numbers, if there are any
 
 
-def answers(
-    metrics: Metrics, *, unsupported: Mapping[str, str] | None = None, failed: Mapping[str, str] | None = None
-) -> list[RunAnswer]:
-    """The answers of a run, from its metrics.
-
-    Reasons why solvers do not support the problem, and messages of those that failed, come by their names.
-    """
-    label = {
-        name: name if own["status"] == "converged" else f"{name} (not converged)"
-        for name, own in metrics["solvers"].items()
-    }
-    solvers = {
-        label[name]: {**own, "twin": label.get(own.get("twin"))} for name, own in metrics["solvers"].items()
-    }
-    metrics = {**metrics, "solvers": solvers, "reference": label[metrics["reference"]]}
-    figures = _figures(metrics)
-    about_solvers = any(own.get("family") == "neural network" for own in solvers.values())
-    found = [
-        _warnings(metrics),
-        None if about_solvers else figures,
-        _trust(metrics),
-        _markers(metrics),
-        figures if about_solvers else None,
-        _convergence(metrics, unsupported or {}, failed or {}),
-    ]
-    return [answer for answer in found if answer is not None]
+def answers(scores: Scores) -> list[RunAnswer]:
+    """The answers of a run."""
+    asked = (_warnings, _figures, _trust, _markers, _convergence)
+    return [answer for ask in asked if (answer := ask(scores)) is not None]
 
 
-def _warnings(metrics: Metrics) -> RunAnswer | None:
-    """The warnings of the run, before any number of it; a run of an earlier version has kept none."""
-    said = [f"{text.rstrip('. ')}." for text in metrics.get("warnings", ())]
+def _warnings(scores: Scores) -> RunAnswer | None:
+    """The warnings of the run, before any number of it."""
+    said = [f"{text.rstrip('. ')}." for text in scores.warnings]
     count = "One warning" if len(said) == 1 else f"{len(said)} warnings"
     return RunAnswer("What speaks against these numbers?", f"{count}:", said) if said else None
 
@@ -69,8 +45,6 @@ FIGURES = (
     ("wrap_deg", "wrap of the front face", "deg"),
     ("compliance_across_mm_per_N", "compliance across, at rest", "mm/N"),
     ("compliance_along_mm_per_N", "compliance along, at rest", "mm/N"),
-    ("sideways_stiffness_N_per_mm", "sideways stiffness, at rest", "N/mm"),
-    ("torsional_stiffness_N_mm_per_rad", "torsional stiffness, at rest", "N mm/rad"),
     ("von_mises_MPa", "largest von Mises stress *", "MPa"),
     ("principal_strain", "largest principal strain *", ""),
     ("strain_energy_mJ", "strain energy", "mJ"),
@@ -80,17 +54,19 @@ FIGURES = (
 """Key in the metrics, words and unit of each figure that is shown."""
 
 
-def _figures(metrics: Metrics) -> RunAnswer | None:
+def _figures(scores: Scores) -> RunAnswer | None:
     """What the finger does: newtons, tip, wrap and stress by every solver."""
-    known = {name: own["figures"] for name, own in metrics["solvers"].items() if own.get("figures")}
+    known = {name: own.figures for name, own in scores.solvers.items() if own.figures}
     if not known:
         return None
-    measured = metrics["measurements"]["source"] == "measured"
-    found_force = [name for name in known if measured and metrics["solvers"][name].get("force")]
-    name = next(iter([*found_force, *(each for each in known if each == metrics["reference"]), *known]))
-    values = known[name]["values"]
+    measured = scores.measurements.source == "measured"
+    found_force = [name for name in known if measured and scores[name].force]
+    name = next(iter([*found_force, *(each for each in known if each == scores.reference), *known]))
+    values = known[name].values
     low, high = (values.get(f"force_{end}_N") for end in ("low", "high"))
-    interval = "" if low is None else f" (95 % interval {number(low, 3)} to {number(high, 3)} N)"
+    interval = (
+        "" if low is None or high is None else f" (95 % interval {number(low, 3)} to {number(high, 3)} N)"
+    )
     force, strain = values["force_N"], values["principal_strain"]
     moved = hypot(values["tip_u_mm"], values["tip_v_mm"])
     parts = {
@@ -99,7 +75,7 @@ def _figures(metrics: Metrics) -> RunAnswer | None:
         f"the largest strain away from corners is {percent(strain, 2)}": strain,
     }
     said = _listed([words for words, value in parts.items() if isfinite(value)])
-    shares = [each["values"].get("strain_over_break", nan) for each in known.values()]
+    shares = [each.values.get("strain_over_break", nan) for each in known.values()]
     broken = break_warning(max(filter(isfinite, shares), default=0.0))
     rows = []
     for key, words, unit in FIGURES:
@@ -109,100 +85,99 @@ def _figures(metrics: Metrics) -> RunAnswer | None:
     caption = "* At nodes that are a wall thickness away from re-entrant corners, base and contact."
     return RunAnswer(
         "What does the finger do?",
-        f"By {name} {said}." if said != NONE else f"{name} does not tell.",
+        f"By {scores.label(name)} {said}." if said != NONE else f"{scores.label(name)} does not tell.",
         [broken] if broken else [],
-        TextTable("", ["", *known], rows, caption, left=[""]),
+        TextTable("", ["", *map(scores.label, known)], rows, caption, left=[""]),
     )
 
 
-def _figure(known: Metrics, key: str) -> str:
+def _figure(known: FigureScores, key: str) -> str:
     """A figure with its interval, if there is one."""
-    value = known["values"].get(key)
+    value = known.values.get(key)
     if value is None or not isfinite(value):
         return NONE
     said = percent(value, 2) if key == "principal_strain" else number(value, 3)
     name, _, unit = key.rpartition("_")
-    low, high = (known["values"].get(f"{name}_{end}_{unit}") for end in ("low", "high"))
-    return said if low is None else f"{said} ({number(low, 3)} to {number(high, 3)})"
+    low, high = (known.values.get(f"{name}_{end}_{unit}") for end in ("low", "high"))
+    return said if low is None or high is None else f"{said} ({number(low, 3)} to {number(high, 3)})"
 
 
-def _trust(metrics: Metrics) -> RunAnswer | None:
+def _trust(scores: Scores) -> RunAnswer | None:
     """Whether the networks that were given no markers solve the equations of the reference."""
-    solvers, reference = metrics["solvers"], metrics["reference"]
-    networks = {name: own for name, own in solvers.items() if own.get("family") == "neural network"}
-    if not networks or reference in networks:
+    networks = {name: own for name, own in scores.solvers.items() if own.family == "neural network"}
+    if not networks or scores.reference in networks:
         return None
-    plain = {name: own for name, own in networks.items() if not own["markers"]["in_sample"]}
-    verdicts = [_verdict(name, own, metrics) for name, own in plain.items()]
-    sentences = [said for name, own in plain.items() for said in _against_reference(name, own, metrics)]
-    for name, own in networks.items():
-        if name not in plain and (twin := own["twin"]):
-            sentences.append(_beside_twin(name, own, twin, solvers[twin], metrics["measurements"]["source"]))
+    plain = [name for name, own in networks.items() if not own.markers.in_sample]
+    verdicts = [_verdict(name, scores) for name in plain]
+    sentences = [said for name in plain for said in _against_reference(name, scores)]
+    sentences += [_beside_twin(name, scores) for name in networks if name not in plain]
     return RunAnswer("May the network be trusted here?", " ".join(verdicts), list(filter(None, sentences)))
 
 
-def _verdict(name: str, own: Metrics, metrics: Metrics) -> str:
-    reference, to = metrics["reference"], own["to_reference"]
-    if own["status"] != "converged":
+def _verdict(solver: str, scores: Scores) -> str:
+    name, reference = scores.label(solver), scores.label(scores.reference)
+    own, to = scores[solver], scores[solver].to_reference
+    if not own.converged:
         return f"No, not with {name}."
-    if own["law"] != metrics["solvers"][reference]["law"]:
+    if own.law != scores[scores.reference].law:
         return f"{name} has another material law than {reference}, so that this run does not tell."
-    if not isfinite(to["rel_l2_displacement"]):
+    if not isfinite(to.rel_l2_displacement):
         return f"How far {name} is from {reference} in displacement is not known."
-    known = to["reference_uncertainty"]
-    if known and to["rel_l2_displacement"] < known["rel_l2_displacement"]:
+    known = to.reference_uncertainty
+    if known and to.rel_l2_displacement < known.rel_l2_displacement:
         return (
             f"Yes, as a solver: {name} and {reference} differ by less than {reference}’s own error in "
             "displacement."
         )
-    away = percent(to["rel_l2_displacement"], 2)
+    away = percent(to.rel_l2_displacement, 2)
     return f"As a solver to {away}: that far is {name} from {reference} in displacement."
 
 
-def _against_reference(name: str, own: Metrics, metrics: Metrics) -> list[str]:
-    reference, to, certificate = metrics["reference"], own["to_reference"], own["certificate"]
-    known = to["reference_uncertainty"] or {}
+def _against_reference(solver: str, scores: Scores) -> list[str]:
+    name, reference = scores.label(solver), scores.label(scores.reference)
+    own, to, true = scores[solver], scores[solver].to_reference, scores[solver].to_truth
     fields = [
-        f"{_plus_minus(to[key], known.get(key, nan))} in {field}"
+        f"{_plus_minus(getattr(to, key), getattr(to.reference_uncertainty, key, nan))} in {field}"
         for key, field in (("rel_l2_displacement", "displacement"), ("rel_l2_von_mises", "von Mises stress"))
-        if isfinite(to[key])
+        if isfinite(getattr(to, key))
     ]
     own_error = f"; after ± the estimated error of {reference} itself" if "±" in str(fields) else ""
     away = f"{name} is {', '.join(fields)} away from {reference} (relative L² over the body{own_error})."
     said = [away] if fields else []
-    if certificate and certificate["rel_excess"] > 0:
-        above = percent(certificate["rel_excess"], 2)
+    if own.certificate and own.certificate.rel_excess > 0:
+        above = percent(own.certificate.rel_excess, 2)
         said.append(f"On the shared mesh its energy is {above} above the least that is possible.")
-    true, model = own["to_truth"], metrics["solvers"][reference]
     if true:
         sentence = (
             f"In displacement, von Mises stress and force, {name} is {_truth_numbers(own)} away from the "
-            f"simulated finger, {reference} {_truth_numbers(model)}."
+            f"simulated finger, {reference} {_truth_numbers(scores[scores.reference])}."
         )
-        if to["rel_l2_displacement"] < 0.1 * true["displacement"]["rel_l2"]:
+        if to.rel_l2_displacement < 0.1 * true.displacement.rel_l2:
             sentence += " That is the error of the model and its load, not of the network."
         said.append(sentence)
     return said
 
 
-def _beside_twin(name: str, own: Metrics, twin: str, other: Metrics, source: str) -> str:
-    if not (own["held_out"] and other["held_out"]):
+def _beside_twin(solver: str, scores: Scores) -> str:
+    own, twin = scores[solver], scores.solvers.get(scores[solver].twin or "")
+    if not (twin and own.held_out and twin.held_out):
         return ""
-    off, of_twin = own["held_out"]["mae_sum"], other["held_out"]["mae_sum"]
+    off, of_twin = own.held_out.mae_sum, twin.held_out.mae_sum
     if not isfinite(off + of_twin):
         return ""
     return (
-        f"{name}, which is given the markers, is {off:.3f} mm off (mean |Δu| + |Δv|) at held-out {source} "
-        f"markers; {twin}, its twin by finite elements, {of_twin:.3f} mm."
+        f"{scores.label(solver)}, which is given the markers, is {off:.3f} mm off (mean |Δu| + |Δv|) at "
+        f"held-out {scores.measurements.source} markers; {scores.label(own.twin or '')}, its twin by finite "
+        f"elements, {of_twin:.3f} mm."
     )
 
 
-def _markers(metrics: Metrics) -> RunAnswer | None:
+def _markers(scores: Scores) -> RunAnswer | None:
     """Whether solvers that were given the markers are nearer than the reference, at held-out markers."""
-    solvers, reference = metrics["solvers"], metrics["reference"]
-    plain, source = solvers[reference], metrics["measurements"]["source"]
-    given = {name: own for name, own in solvers.items() if own["markers"]["in_sample"]}
-    if not given or plain["markers"]["in_sample"] or not plain["held_out"]:
+    reference, source = scores.label(scores.reference), scores.measurements.source
+    plain = scores[scores.reference]
+    given = {scores.label(name): own for name, own in scores.solvers.items() if own.given}
+    if not given or plain.given or not plain.held_out:
         return None
     told = {name: own for name, own in given.items() if isfinite(_held_out(own)[0] + _held_out(plain)[0])}
     listed = {reference: plain, **given}
@@ -213,7 +188,7 @@ def _markers(metrics: Metrics) -> RunAnswer | None:
         columns += [list(column) for column in zip(*map(_held_out_cells, listed.values()), strict=True)]
         better = [name for name, own in told.items() if _held_out(own)[0] < _held_out(plain)[0]]
         nearer.append(f"at held-out {source} markers {_those(better, told)}")
-    for place, field in enumerate(TRUTH_FIELDS if plain["to_truth"] else ()):
+    for place, field in enumerate(TRUTH_FIELDS if plain.to_truth else ()):
         found = {name: _to_truth(own)[place] for name, own in listed.items()}
         heads.append(field)
         columns.append([_signed(share, field == "force") for share in found.values()])
@@ -228,50 +203,48 @@ def _markers(metrics: Metrics) -> RunAnswer | None:
         "from pinnray crossval."
     )
     sentences = [held_out] if told else []
-    if not plain["to_truth"]:
+    if not plain.to_truth:
         sentences.append("Whether stress and force are nearer is unknown: no camera tells them.")
-    sentences += filter(None, (_force_interval(name, own, metrics) for name, own in given.items()))
+    sentences += filter(None, (_force_interval(name, own, scores) for name, own in given.items()))
     verdict = f"nearer than {reference}: {'; '.join(nearer)}." if nearer else "this run does not tell."
     if len(given) > 1:
         verdict = f"of {len(given)} solvers that were given markers, {verdict}"
     verdict = verdict[0].upper() + verdict[1:]
     caption = f"Errors at {source} markers that were not given"
-    if plain["to_truth"]:
+    if plain.to_truth:
         caption += ", and distance from the simulated finger over the whole body"
     rows = [list(row) for row in zip(*columns, strict=True)]
     return RunAnswer("Did the markers help?", verdict, sentences, TextTable(caption, heads, rows))
 
 
-def _held_out(own: Metrics) -> tuple[float, float, float]:
+def _held_out(own: SolverScores) -> tuple[float, float, float]:
     """Mean, least and largest |Δu| + |Δv| at held-out markers, mm; NaN where there are none."""
-    means = own["held_out"]
-    if not means:
+    if not (errors := own.held_out):
         return nan, nan, nan
-    pairs = zip(means.get("ae_u", ()), means.get("ae_v", ()), strict=True)
-    each = [u + v for u, v in pairs if isfinite(u + v)] or [nan]
-    return means["mae_sum"], min(each), max(each)
+    each = [u + v for u, v in zip(errors.ae_u, errors.ae_v, strict=True) if isfinite(u + v)] or [nan]
+    return errors.mae_sum, min(each), max(each)
 
 
-def _held_out_cells(own: Metrics) -> list[str]:
+def _held_out_cells(own: SolverScores) -> list[str]:
     mean, least, largest = _held_out(own)
     return [f"{mean:.3f}", f"{least:.3f} to {largest:.3f}"] if isfinite(mean + least) else [NONE, NONE]
 
 
-def _force_interval(name: str, own: Metrics, metrics: Metrics) -> str:
+def _force_interval(name: str, own: SolverScores, scores: Scores) -> str:
     """The force that a solver found, with its 95 % interval, beside the true one where that is known."""
-    if not own.get("force") or not isfinite(own["force"]["size"]["value"]):
+    if not own.force or not isfinite(own.force.size.value):
         return ""
-    (size, low, high), place = own["force"]["size"].values(), own["force"]["position"]
-    source, depth = metrics["measurements"]["source"], metrics["design"].get("depth")
+    size, low, high = own.force.size.value, own.force.size.low, own.force.size.high
+    source, depth = scores.measurements.source, scores.design.get("depth")
     interval = f"95 % interval {number(low, 3)} to {number(high, 3)}"
     said = f"{name} finds a force of {number(size, 3)} N/mm ({interval})"
     if depth:
         said += f", {number(size * depth, 3)} N over the depth of {depth:g} mm,"
-    if place:
-        middle, start, end = (number(place[key], 3) for key in ("value", "low", "high"))
+    if place := own.force.position:
+        middle, start, end = (number(each, 3) for each in (place.value, place.low, place.high))
         said += f" at x = {middle} mm ({start} to {end} mm)"
     said += f" from the {source} markers"
-    true = hypot(*own["reaction"]) / (1 + own["force_to_truth_rel"])
+    true = hypot(*own.reaction) / (1 + own.force_to_truth_rel)
     if not isfinite(true):
         return f"{said}."
     where = "inside" if low <= true <= high else "outside"
@@ -279,48 +252,43 @@ def _force_interval(name: str, own: Metrics, metrics: Metrics) -> str:
     return f"{said}; that of the simulated finger is {number(true, 3)}{placed}."
 
 
-def _convergence(metrics: Metrics, unsupported: Mapping[str, str], failed: Mapping[str, str]) -> RunAnswer:
+def _convergence(scores: Scores) -> RunAnswer:
     """The solvers that did not converge, and how far the others are from the exact solution."""
-    solvers, reference = metrics["solvers"], metrics["reference"]
-    faulty = {name: own["message"] for name, own in solvers.items() if own["status"] != "converged"}
-    sentences = [f"{name}: {message.rstrip('. ')}." for name, message in faulty.items()]
-    sentences += [f"{name} failed: {message.rstrip('. ')}." for name, message in failed.items()]
-    sentences += [f"{name} was left out: {message.rstrip('. ')}." for name, message in unsupported.items()]
-    bad = [*faulty, *failed]
-    count = len(solvers) + len(failed)
+    faulty = {scores.label(name): own for name, own in scores.solvers.items() if not own.converged}
+    sentences = [f"{name}: {own.message.rstrip('. ')}." for name, own in faulty.items()]
+    for what, reasons in (("failed", scores.failed), ("was left out", scores.left_out)):
+        sentences += [f"{name} {what}: {message.rstrip('. ')}." for name, message in reasons.items()]
+    bad = [*faulty, *scores.failed]
+    count = len(scores.solvers) + len(scores.failed)
     met = "the solver met its" if count == 1 else f"all {count} solvers met their"
     verdict = f"{len(bad)} of {count} solvers: {_listed(bad)}." if bad else f"Nothing: {met} own criterion."
-    own = solvers[reference]["uncertainty"]
-    if own:
+    if own := scores[scores.reference].uncertainty:
         sentences.append(
-            f"The mesh is a limit too: {reference} estimates its own error as "
-            f"{percent(own['rel_l2_displacement'], 2)} in displacement, "
-            f"{percent(own['rel_l2_von_mises'], 2)} in von Mises stress (relative L²), "
-            f"{percent(own['energy_norm'], 2)} in the energy norm."
+            f"The mesh is a limit too: {scores.label(scores.reference)} estimates its own error as "
+            f"{percent(own.rel_l2_displacement, 2)} in displacement, "
+            f"{percent(own.rel_l2_von_mises, 2)} in von Mises stress (relative L²), "
+            f"{percent(own.energy_norm, 2)} in the energy norm."
         )
-    certified = {
-        name: entry["certificate"]["rel_excess"]
-        for name, entry in solvers.items()
-        if entry["certificate"] and entry["certificate"]["rel_excess"] > 0
-    }
-    if certified:
-        each = ", ".join(f"{name} {percent(excess, 2)}" for name, excess in certified.items())
+    certificates = {scores.label(name): own.certificate for name, own in scores.solvers.items()}
+    above = [(name, each.rel_excess) for name, each in certificates.items() if each and each.rel_excess > 0]
+    if above:
+        each = ", ".join(f"{name} {percent(excess, 2)}" for name, excess in above)
         sentences.append(
             f"Energy above the least on the shared mesh, which no solver can argue away: {each}."
         )
-    without = [name for name, entry in solvers.items() if not entry["certificate"]]
-    if without:
+    if without := [name for name, each in certificates.items() if not each]:
         sentences.append(f"By their own criterion alone, without a certificate: {_listed(without)}.")
     return RunAnswer("What is not converged?", verdict, sentences)
 
 
-def _to_truth(own: Metrics) -> tuple[float, float, float]:
+def _to_truth(own: SolverScores) -> tuple[float, float, float]:
     """Relative distances from the simulated finger in displacement, von Mises stress and force."""
-    true = own["to_truth"]
-    return true["displacement"]["rel_l2"], true["von_mises"]["rel_l2"], own["force_to_truth_rel"]
+    if own.to_truth is None:
+        return nan, nan, nan
+    return own.to_truth.displacement.rel_l2, own.to_truth.von_mises.rel_l2, own.force_to_truth_rel
 
 
-def _truth_numbers(own: Metrics) -> str:
+def _truth_numbers(own: SolverScores) -> str:
     return _listed(
         [_signed(share, field == "force") for share, field in zip(_to_truth(own), TRUTH_FIELDS, strict=True)]
     )

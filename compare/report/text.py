@@ -1,18 +1,15 @@
 """Words, numbers and sentences of the report."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 
 import numpy as np
 from markupsafe import Markup
 
 from pinnray.comparison.evaluation.certificate import Certificate
-from pinnray.comparison.evaluation.certification import REGIONS
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import force_error, truth_differences
+from pinnray.comparison.evaluation.metrics import Scores
 from pinnray.geometry.finger.finger import Finger
-from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import distance, number, percent
 from pinnray.solvers.problem import Load
 
@@ -154,10 +151,10 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:].rstrip(". ") + "."
 
 
-def without_rounding(force: FloatArray) -> tuple[float, float]:
-    """A force of shape (2,) without the component that rounding left, 1e-9 of the other or less."""
-    size = np.abs(force).max()
-    u, v = (float(component) if abs(component) > 1e-9 * size else 0.0 for component in force)
+def without_rounding(force: Sequence[float]) -> tuple[float, float]:
+    """A force without the component that rounding left, 1e-9 of the other or less."""
+    size = max(map(abs, force))
+    u, v = (component if abs(component) > 1e-9 * size else 0.0 for component in force)
     return u, v
 
 
@@ -174,27 +171,16 @@ def beside(value: float, own: float | None) -> Markup:
     )
 
 
-def own_error_sentence(evaluation: Evaluation) -> str:
-    """Sentence on a solver's estimate of its own error."""
-    own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
-    if own is None or markers is None:
-        return f"{evaluation.label} gives no estimate of its own error."
+def own_error_sentence(scores: Scores) -> str:
+    """Sentence on the reference's estimate of its own error."""
+    label, own = scores.label(scores.reference), scores[scores.reference].uncertainty
+    if own is None:
+        return f"{label} gives no estimate of its own error."
     return (
-        f"The error of {evaluation.label} itself, by its own estimate: {percent(own.displacement.rel_l2)} in "
-        f"the displacement, {percent(own.von_mises.rel_l2)} in the von Mises stress (relative L²), "
-        f"{percent(np.sqrt(abs(own.energy)))} in the energy norm, {distance(markers.max())} mm at most at a "
-        "marker."
-    )
-
-
-def indistinct_sentence(label: str, reference: str, names: Sequence[str]) -> str:
-    """Sentence on differences that are smaller than the reference's own error; empty without any."""
-    if not names:
-        return ""
-    said = ", ".join(names[:-1]) + (" and " if names[:-1] else "") + names[-1]
-    return (
-        f"{label} differs from {reference} by less than the own error of {reference} in: {said}. There the "
-        "comparison does not say which of the two is nearer to the exact solution."
+        f"The error of {label} itself, by its own estimate: {percent(own.rel_l2_displacement)} in the "
+        f"displacement, {percent(own.rel_l2_von_mises)} in the von Mises stress (relative L²), "
+        f"{percent(own.energy_norm)} in the energy norm, "
+        f"{distance(max(*own.markers_u, *own.markers_v))} mm at most at a marker."
     )
 
 
@@ -216,23 +202,12 @@ def certificate_sentences(evaluation: Evaluation, load: str = "mean") -> str:
         return f"{label} is the finite-element solution itself: nothing is left out of balance."
     excess, residual = percent(certificate.rel_excess), percent(certificate.weak_residual)
     verdict = f"is converged to {excess} of the energy" if evaluation.converged else "is not to be relied on"
-    base, contact = distance(certificate.base), distance(certificate.off_at_contact)
-    sentences = [
+    said = (
         f"{label} {verdict}: its displacement, taken over to the elements of fem, has {excess} more energy "
         "than the least with the same values at base and contact, and its own stress is out of balance by "
-        f"{residual} in the energy norm.",
-        _where(certificate),
-        f"At the base it is off by at most {base} mm, at the contact by {contact} mm.",
-        _reported(certificate),
-    ]
-    return " ".join(filter(None, sentences))
-
-
-def _where(certificate: Certificate) -> str:
-    if not certificate.has_excess:
-        return ""
-    name, region = max(certificate.regions.items(), key=lambda item: item[1].excess)
-    return f"{percent(region.excess)} of the excess sits {REGIONS[name]}, {percent(region.area)} of the area."
+        f"{residual} in the energy norm."
+    )
+    return f"{said} {_reported(certificate)}".rstrip()
 
 
 def _reported(certificate: Certificate) -> str:
@@ -245,48 +220,3 @@ def _reported(certificate: Certificate) -> str:
         else "it is nearer to the exact solution than fem on this mesh, or its quadrature misses a little"
     )
     return f"It reports {percent(missed)} less energy than that least: {reason}."
-
-
-def truth_sentences(comparison: Results) -> list[str]:
-    """Sentences on the change that given markers make to displacement and stress, against the reference.
-
-    Empty without a truth, without such a solver, or if the reference was given the markers too.
-    """
-    reference, truth = comparison.reference, comparison.truth
-    given = [evaluation for evaluation in comparison.evaluations if evaluation.in_sample]
-    if truth is None or reference.in_sample or not given:
-        return []
-    label, plain = reference.label, _distances(reference, truth)
-    found = {evaluation.label: _distances(evaluation, truth) for evaluation in given}
-    sizes = ", ".join(f"{field} {percent(before)}" for field, before in plain.items())
-    sentences = [f"{label}, which was given none: {sizes} away from the simulated finger."]
-    for name, own in found.items():
-        changes = [
-            f"{field} {percent(own[field])}"
-            + (f" ({words})" if (words := _nearer(own[field], before)) else "")
-            for field, before in plain.items()
-        ]
-        sentences.append(f"{name}, given the markers: {', '.join(changes)}.")
-    nearer = {}
-    for field, before in plain.items():
-        known = {name: words for name, own in found.items() if (words := _nearer(own[field], before))}
-        names = ", ".join(name for name, words in known.items() if words == "nearer")
-        nearer[field] = names or ("none" if known else "unknown")
-    answer = f"Nearer than {label} in displacement: {nearer['displacement']}. "
-    answer += f"Nearer in von Mises stress: {nearer['von Mises stress']}. "
-    return [*sentences, f"{answer}Nearer in the indenter's force: {nearer['force']}."]
-
-
-def _nearer(own: float, before: float) -> str:
-    """Whether a distance is shorter than another one, in a word; empty if either is not known."""
-    return ("nearer" if own < before else "farther") if isfinite(own + before) else ""
-
-
-def _distances(evaluation: Evaluation, truth: Evaluation) -> dict[str, float]:
-    """Relative L2 distances from the truth by field, and the relative error of the force."""
-    differences = truth_differences(evaluation, truth)
-    return {
-        "displacement": differences.displacement.rel_l2,
-        "von Mises stress": differences.von_mises.rel_l2,
-        "force": abs(force_error(evaluation, truth)),
-    }

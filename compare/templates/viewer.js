@@ -1,16 +1,15 @@
 // The field viewer: one canvas for solver x quantity x field or difference, and the body along the load.
-// Numbers come packed in the page (viewer_fields.js), and so does Plotly.js, unpacked when the viewer is first in sight.
+// Numbers come packed in the page (viewer_fields.js), unpacked when the viewer is first in sight.
 "use strict";
 (() => {
   const byId = (name) => document.getElementById(name);
   const box = byId("viewer");
   if (!box) return;
   const canvas = byId("viewer-canvas");
-  const { manifest, unpacked, others } = pinnrayFields;
-  const { traces, shape, way, scaleOf, ink } = pinnrayTraces;
+  const { manifest, others, values, markers, displacement } = pinnrayFields;
+  const { FOOT, ink, digits, sheet, view, placed, paint, outline, lines, seen, word, colourBar, scaleBar } = pinnrayBody;
   let points, triangles;
   const chosen = (name) => byId(name)?.value;
-  const FOOT = 80; // pixels below the body, for the colour bars
 
   // One panel or two: of what solver, which quantity, and minus what.
   function state() {
@@ -24,8 +23,14 @@
     return { panels, number, quantity: manifest.quantities[number], load: Number(chosen("viewer-load")) / 100 };
   }
 
-  const digits = (value) => String(Number(value.toPrecision(3))).replace("-", "−");
   const named = ({ solver, against }) => solver.label + (against ? ` minus ${against === "truth" ? "truth" : manifest.reference}` : "");
+
+  // The scale that a panel's colours have, and whether it is symmetric about zero.
+  function scaleOf({ solver, number, against }) {
+    const quantity = manifest.quantities[number];
+    const high = against ? solver.scales[against][number] : quantity.high;
+    return { low: against ? -high : quantity.low, high, signed: Boolean(against) || quantity.signed };
+  }
 
   // What the numbers mean, beside the canvas; the page's words for those who do not see it.
   function describe({ panels, quantity, load }) {
@@ -46,10 +51,8 @@
       same.map(({ solver }) => ` ${solver.label} is what the others are compared with.`).join("");
   }
 
-  // View: `range` are the data's limits; the scene scales them to `size`, which zooms, around the camera's centre.
-  let range, size, centre;
-
   // Everything that any solver shows at any load, and a little room around it.
+  let range;
   function fit() {
     const found = { x: [Infinity, -Infinity], y: [Infinity, -Infinity] };
     const meet = (axis, value) => {
@@ -57,11 +60,10 @@
     };
     for (const solver of manifest.solvers) {
       for (const load of [0, ...solver.fractions]) {
-        const { x, y } = shape(solver, load);
-        for (const value of x) meet("x", value);
-        for (const value of y) meet("y", value);
+        const moved = displacement(solver, load);
+        points.forEach((value, k) => meet(k % 2 ? "y" : "x", value + moved[k]));
       }
-      for (const [x, y] of [...solver.observed, ...way(solver, 1, 0)]) {
+      for (const [x, y] of [...solver.observed, ...solver.contact]) {
         meet("x", x);
         meet("y", y);
       }
@@ -71,98 +73,101 @@
   }
 
   const span = (axis) => range[axis][1] - range[axis][0];
+  const breadth = () => canvas.clientWidth / state().panels.length;
   const height = () => canvas.clientHeight - FOOT;
-  const breadth = () => canvas.clientWidth / state().panels.length - 8;
-  const perMillimetre = () => (height() / 2) * (size.x / span("x")); // the camera shows a height of 2
 
-  // The whole body in its panel.
+  // What the middle of each panel shows, mm, and pixels a mm.
+  let look;
   function showAll() {
-    const scale = 1.94 * Math.min(breadth() / height() / span("x"), 1 / span("y"));
-    size = { x: span("x") * scale, y: span("y") * scale, z: 0.01 };
-    centre = { x: 0, y: 0, z: 0 };
+    const middle = (axis) => (range[axis][0] + range[axis][1]) / 2;
+    look = { scale: Math.min((breadth() - 12) / span("x"), (height() - 4) / span("y")), x: middle("x"), y: middle("y") };
   }
 
-  const camera = () => ({
-    projection: { type: "orthographic" }, up: { x: 0, y: 1, z: 0 }, center: { ...centre }, eye: { ...centre, z: 2 },
-  });
-
-  // A bar of a round length at the lower right, and its words.
-  function scaleBar() {
-    const wanted = (0.15 * breadth()) / perMillimetre();
-    const power = 10 ** Math.floor(Math.log10(wanted));
-    const length = [5, 2, 1].find((step) => step * power <= wanted) * power;
-    const share = (length * perMillimetre()) / canvas.clientWidth;
-    const line = { type: "line", xref: "paper", yref: "paper", x0: 0.99 - share, x1: 0.99, y0: 0.02, y1: 0.02 };
-    return {
-      shapes: [{ ...line, line: { color: ink("--ink"), width: 3 } }],
-      annotations: [{
-        xref: "paper", yref: "paper", x: 0.99, y: 0.03, xanchor: "right", yanchor: "bottom", showarrow: false,
-        text: `${Number(length.toPrecision(1))} mm`, font: { color: ink("--ink"), size: 12 },
-      }],
-    };
-  }
-
-  function layout(count) {
-    const axis = { visible: false, showspikes: false };
-    const scene = (left, right) => ({
-      xaxis: { ...axis, range: range.x }, yaxis: { ...axis, range: range.y }, zaxis: { ...axis, range: [-1, 1] },
-      aspectmode: "manual", aspectratio: { ...size }, dragmode: "pan", camera: camera(), domain: { x: [left, right] },
-    });
-    return {
-      margin: { l: 0, r: 0, t: 0, b: FOOT }, paper_bgcolor: "rgba(0,0,0,0)", showlegend: false, ...scaleBar(),
-      scene: scene(0, count > 1 ? 0.495 : 1), ...(count > 1 ? { scene2: scene(0.505, 1) } : {}),
-    };
+  // An arrow from where the contact is at rest to where it has come, with a head of a tenth of the finger's height.
+  function way({ contact: [start, end] }, load) {
+    const tip = [0, 1].map((axis) => start[axis] + load * (end[axis] - start[axis]));
+    const length = Math.hypot(tip[0] - start[0], tip[1] - start[1]) || 1;
+    const [x, y] = [0, 1].map((axis) => (0.1 * span("y") * (tip[axis] - start[axis])) / length);
+    const barb = (turn) => [tip[0] - 0.9 * x + turn * 0.45 * y, tip[1] - 0.9 * y - turn * 0.45 * x];
+    return [start, tip, barb(1), tip, barb(-1)];
   }
 
   let shown;
-  async function draw() {
+  function render(context, now, width) {
+    const each = width / now.panels.length;
+    shown = now.panels.map((panel, number) => {
+      const { solver } = panel;
+      const at = view(look, [(number + 0.5) * each, height() / 2]);
+      const moved = displacement(solver, now.load);
+      const field = values(panel, now.load);
+      const { low, high, signed } = scaleOf(panel);
+      const colours = signed ? manifest.differences : manifest.colours;
+      context.save();
+      context.beginPath();
+      context.rect(number * each, 0, each, height());
+      context.clip();
+      outline(context, manifest.outlines, placed(points, undefined, at), ink("--rule"));
+      const places = placed(points, moved, at);
+      paint(context, triangles, places, (t) => (field[t] - low) / (high - low), colours);
+      outline(context, manifest.outlines, places, ink("--ink"));
+      const marks = { seen: [], crosses: [], way: [] };
+      if (byId("viewer-marks").checked) {
+        Object.assign(marks, { seen: solver.observed, crosses: markers(solver, now.load), way: way(solver, now.load) });
+        seen(context, marks.seen, at);
+        const arm = 0.013 * span("y");
+        for (const [x, y] of marks.crosses) {
+          for (const turn of [1, -1]) lines(context, [[x - arm, y - turn * arm], [x + arm, y + turn * arm]], at, ink("--ink"), 2);
+        }
+        lines(context, marks.way, at, ink("--ink"), 2);
+      }
+      context.restore();
+      const unit = `${panel.against ? "difference, " : ""}${now.quantity.unit}`;
+      const ends = [digits(low), digits(high), unit];
+      colourBar(context, [number * each + 8, height()], Math.min(0.5 * each, 260), colours, ends);
+      return { panel, at, places, field, marks };
+    });
+    return scaleBar(context, [width - 8, height()], look.scale, 0.15 * each);
+  }
+
+  function draw() {
     const now = state();
-    const count = now.panels.length;
     describe(now);
-    const found = now.panels.map((panel, number) => traces(panel, now.load, {
-      scene: number ? "scene2" : "scene",
-      bar: { x: (number + 0.5) / count, len: 0.7 / count },
-      head: 0.1 * span("y"),
-      marks: byId("viewer-marks").checked,
-    }));
-    shown = { ...found[0], panel: now.panels[0], unit: now.quantity.unit };
-    await Plotly.react(canvas, found.flatMap(({ drawn }) => drawn), layout(count),
-      { displayModeBar: false, responsive: true, scrollZoom: true, logging: 0 });
+    const bar = render(sheet(canvas, canvas.clientWidth, canvas.clientHeight), now, canvas.clientWidth);
+    window.pinnrayViewer = { shown, look: { ...look }, bar };
     if (probed !== undefined) probe(probed);
   }
 
-  function moved() {
-    const change = { ...scaleBar() };
-    for (const scene of state().panels.length > 1 ? ["scene", "scene2"] : ["scene"]) {
-      change[`${scene}.aspectratio`] = { ...size };
-      change[`${scene}.camera`] = camera();
-    }
-    return Plotly.relayout(canvas, change);
-  }
+  let asked;
+  const later = () => {
+    asked ??= requestAnimationFrame(() => {
+      asked = undefined;
+      draw();
+    });
+  };
 
-  function zoom(factor) {
-    for (const axis of ["x", "y"]) {
-      size[axis] *= factor;
-      centre[axis] *= factor;
-    }
-    moved();
+  function zoom(factor, [x, y] = [look.x, look.y]) {
+    look = { scale: look.scale * factor, x: x + (look.x - x) / factor, y: y + (look.y - y) / factor };
+    draw();
   }
 
   function pan(x, y) {
-    centre.x += 0.2 * x;
-    centre.y += 0.2 * y;
-    moved();
+    look.x += (0.1 * x * breadth()) / look.scale;
+    look.y += (0.1 * y * breadth()) / look.scale;
+    draw();
   }
 
   // The picture as it stands, with its title, at twice the size of the screen.
-  async function save() {
+  function save() {
     const [title, room] = [byId("viewer-title").textContent, 34];
-    const page = { ...canvas.layout, paper_bgcolor: ink("--paper"), margin: { l: 0, r: 0, t: room, b: FOOT } };
-    page.title = { text: title, x: 0.01, xanchor: "left", font: { size: 14, color: ink("--ink") } };
-    const image = await Plotly.toImage({ data: canvas.data, layout: page },
-      { format: "png", width: canvas.clientWidth, height: canvas.clientHeight + room, scale: 2 });
+    const page = document.createElement("canvas");
+    const context = sheet(page, canvas.clientWidth, canvas.clientHeight + room, 2);
+    context.fillStyle = ink("--paper");
+    context.fillRect(0, 0, canvas.clientWidth, canvas.clientHeight + room);
+    word(context, title, 8, 10, "left");
+    context.translate(0, room);
+    render(context, state(), canvas.clientWidth);
     const link = document.createElement("a");
-    link.href = image;
+    link.href = page.toDataURL("image/png");
     link.download = `${manifest.name} ${title}`.replace(/[^\w.-]+/g, "-") + ".png";
     link.click();
   }
@@ -173,29 +178,29 @@
     probed = triangle;
     const nodes = [0, 1, 2].map((k) => triangles[3 * triangle + k]);
     const mean = (axis) => nodes.reduce((sum, node) => sum + points[2 * node + axis], 0) / 3;
-    const what = shown.panel.against ? "difference" : "value";
+    const what = shown[0].panel.against ? "difference" : "value";
+    const { unit } = manifest.quantities[shown[0].panel.number];
     byId("viewer-probe").textContent =
-      `x = ${digits(mean(0))} mm, y = ${digits(mean(1))} mm (undeformed): ${what} ${digits(shown.shown[triangle])} ${shown.unit}`;
+      `x = ${digits(mean(0))} mm, y = ${digits(mean(1))} mm (undeformed): ${what} ${digits(shown[0].field[triangle])} ${unit}`;
   }
 
-  function probeMiddle() {
-    const at = (axis) => (range[axis][0] + range[axis][1]) / 2 + (centre[axis] / size[axis]) * span(axis);
-    const [x, y] = [at("x"), at("y")];
-    let best = 0;
-    let least = Infinity;
+  // The triangle of the first panel whose middle is nearest to a place on the canvas, and how far it is, pixels.
+  function nearest([x, y]) {
+    const { places } = shown[0];
+    let [best, least] = [0, Infinity];
     for (let t = 0; t < triangles.length / 3; t += 1) {
-      const nodes = [0, 1, 2].map((k) => triangles[3 * t + k]);
-      const off = Math.hypot(
-        nodes.reduce((sum, node) => sum + shown.x[node], 0) / 3 - x,
-        nodes.reduce((sum, node) => sum + shown.y[node], 0) / 3 - y);
+      const middle = (axis) => [0, 1, 2].reduce((sum, k) => sum + places[2 * triangles[3 * t + k] + axis], 0) / 3;
+      const off = Math.hypot(middle(0) - x, middle(1) - y);
       if (off < least) [best, least] = [t, off];
     }
-    probe(best);
+    return { best, least };
   }
+
+  const probeMiddle = () => probe(nearest([breadth() / 2, height() / 2]).best);
 
   const keys = {
     ArrowLeft: () => pan(-1, 0), ArrowRight: () => pan(1, 0), ArrowUp: () => pan(0, 1), ArrowDown: () => pan(0, -1),
-    "+": () => zoom(1.4), "=": () => zoom(1.4), "-": () => zoom(1 / 1.4), 0: () => { showAll(); moved(); },
+    "+": () => zoom(1.4), "=": () => zoom(1.4), "-": () => zoom(1 / 1.4), 0: () => { showAll(); draw(); },
   };
 
   // From rest to the full load in four seconds, again and again, until it is pressed once more.
@@ -209,7 +214,7 @@
       while (playing && !document.hidden) {
         const time = ((performance.now() - began) / 4000) % 1.25;
         load.value = Math.round(100 * Math.min(1, time));
-        await draw();
+        draw();
         await new Promise((next) => setTimeout(() => requestAnimationFrame(next), 50)); // leave the page some time
       }
       toggle(false);
@@ -232,37 +237,52 @@
   }
 
   // A wheel or a finger that passes over the picture scrolls the page; with Ctrl, or after a click, it zooms.
-  function entering() {
-    let entered = false;
+  function pointing() {
+    let [entered, held] = [false, undefined];
     const enter = (yes) => {
       entered = yes;
       canvas.classList.toggle("entered", yes);
     };
+    const place = ({ offsetX, offsetY }) => [offsetX, offsetY];
     document.addEventListener("pointerdown", (event) => enter(canvas.contains(event.target)));
     document.addEventListener("keydown", (event) => event.key === "Escape" && enter(false));
-    const pass = (event) => {
-      if (!entered && !event.ctrlKey) event.stopPropagation();
-    };
-    for (const kind of ["wheel", "touchstart", "touchmove"]) box.addEventListener(kind, pass, { capture: true, passive: true });
+    canvas.addEventListener("wheel", (event) => {
+      if (!entered && !event.ctrlKey) return;
+      event.preventDefault();
+      const [x, y] = place(event);
+      const off = [(x % breadth()) - breadth() / 2, y - height() / 2];
+      zoom(1.0015 ** -event.deltaY, [look.x + off[0] / look.scale, look.y - off[1] / look.scale]);
+    }, { passive: false });
+    canvas.addEventListener("pointerdown", (event) => {
+      held = place(event);
+      canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointerup", () => { held = undefined; });
+    canvas.addEventListener("pointermove", (event) => {
+      const [x, y] = place(event);
+      if (held) {
+        look.x -= (x - held[0]) / look.scale;
+        look.y += (y - held[1]) / look.scale;
+        held = [x, y];
+        later();
+      } else if (x < breadth()) {
+        const { best, least } = nearest([x, y]);
+        if (least < 8 + look.scale) probe(best);
+      }
+    });
   }
 
   async function start() {
-    const library = document.createElement("script");
-    library.textContent = await (await unpacked("viewer-library")).text();
-    document.head.append(library);
     ({ points, triangles } = await pinnrayFields.load());
     fit();
     showAll();
-    await draw();
+    draw();
     for (const name of ["viewer-solver", "viewer-quantity", "viewer-show", "viewer-load", "viewer-marks"]) {
-      byId(name)?.addEventListener("input", draw);
+      byId(name)?.addEventListener("input", later);
     }
-    byId("viewer-beside")?.addEventListener("input", () => {
-      showAll();
-      draw();
-    });
+    byId("viewer-beside")?.addEventListener("input", keys[0]);
     byId("viewer-save").addEventListener("click", save);
-    entering();
+    pointing();
     byId("viewer-in").addEventListener("click", () => zoom(1.4));
     byId("viewer-out").addEventListener("click", () => zoom(1 / 1.4));
     byId("viewer-all").addEventListener("click", keys[0]);
@@ -272,50 +292,28 @@
       keys[event.key]();
       probeMiddle();
     });
-    canvas.on("plotly_hover", ({ points: [found] }) => {
-      if (found.data.scene !== "scene2") probe(found.pointNumber);
-    });
-    canvas.on("plotly_relayout", (change) => {
-      if (change.shapes) return; // by this page itself
-      for (const scene of ["scene", "scene2"]) {
-        const [aspect, seen] = [change[`${scene}.aspectratio`], change[`${scene}.camera`]];
-        if (aspect) size = { ...size, ...aspect };
-        if (seen) centre = { ...seen.center };
-        if (aspect || seen) moved();
-      }
-    });
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-    let width = canvas.clientWidth;
-    new ResizeObserver(() => {
-      if (canvas.clientWidth === width || canvas.clientWidth === 0) return;
-      width = canvas.clientWidth;
-      keys[0]();
-    }).observe(canvas);
+    new ResizeObserver(() => canvas.clientWidth && keys[0]()).observe(canvas);
     animation();
     box.dataset.ready = "yes";
   }
 
-  // Without WebGL the page stays as it is without scripts: the still pictures show the fields.
-  function supported() {
-    const canvas = document.createElement("canvas");
-    return "DecompressionStream" in window && Boolean(canvas.getContext("webgl2") ?? canvas.getContext("webgl"));
-  }
-
+  // Without a canvas the page stays as it is without scripts: the still pictures show the fields.
   function give(up) {
     box.hidden = up;
     byId("viewer-absent").hidden = !up;
     if (byId("stills")) byId("stills").open = up;
   }
 
-  if (!supported()) return;
+  if (!("DecompressionStream" in window && canvas.getContext("2d"))) return;
   give(false);
-  const seen = new IntersectionObserver((entries) => {
+  const sight = new IntersectionObserver((entries) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;
-    seen.disconnect();
+    sight.disconnect();
     start().catch((error) => {
       console.error(error);
       give(true);
     });
   }, { rootMargin: "400px" });
-  seen.observe(box);
+  sight.observe(box);
 })();

@@ -4,7 +4,7 @@ const pinnrayFields = (() => {
   const byId = (name) => document.getElementById(name);
   const manifest = JSON.parse(byId("viewer-manifest").textContent);
 
-  const { unpacked, reader } = pinnrayPacked;
+  const { reader } = pinnrayPacked;
   let numbers;
 
   let points, triangles;
@@ -97,9 +97,8 @@ const pinnrayFields = (() => {
     numbers = await reader("viewer-data");
     points = numbers(manifest.points);
     triangles = numbers(manifest.triangles);
-    pinnrayFields.mesh = { points, triangles };
-    return pinnrayFields.mesh;
+    return { points, triangles };
   }
 
-  return { manifest, unpacked, load, kept, others, values, markers, displacement };
+  return { manifest, load, others, values, markers, displacement };
 })();

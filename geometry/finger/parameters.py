@@ -8,7 +8,6 @@ import reprlib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from textwrap import shorten
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
@@ -18,12 +17,17 @@ from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
 
 
-def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meaning: str) -> Any:
-    """A bounded number of a model, with its description for messages and help texts."""
+def bounded(
+    default: Any, low: float, high: float, unit: str, symbol: str, meaning: str, **limits: float
+) -> Any:
+    """A bounded number of a model, with its description for messages and help texts.
+
+    With other `limits` of pydantic, the bounds are those that a study may span.
+    """
+    ends: Any = limits or {"ge": low, "le": high}
     return Field(
         default=default,
-        ge=low,
-        le=high,
+        **ends,
         description=f"{meaning} [{unit}]" if unit else meaning,
         json_schema_extra={"unit": unit, "symbol": symbol, "low": low, "high": high},
     )
@@ -41,10 +45,9 @@ class CheckedModel(BaseModel):
             if a value is given without its name.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    # Its schema is built when it is used, as `--help` only lists its fields.
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
     other_words: ClassVar[tuple[str, ...]] = ()  # which `__init__` turns into parameters
-    #: Words that are not understood, which messages answer with the parameter's name.
-    synonyms: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     if not TYPE_CHECKING:  # type checkers see the parameters instead, each with its type
 
@@ -81,8 +84,6 @@ class Parameters(CheckedModel):
     places and the line that their slope is measured from, roundings, the foot, the contact's width and the
     markers: those values are this project's.
     """
-
-    synonyms = MappingProxyType({"ribs": "rib_count", "length": "height", "width": "base_width"})
 
     name: str = Field(
         default="default",
@@ -225,28 +226,17 @@ def by_parameter_name(values: Mapping[str, Any], model: type[BaseModel] = Parame
     return named
 
 
-def unknown_parameter(
-    key: str,
-    *models: type[CheckedModel],
-    besides: Sequence[str] = (),
-    synonyms: Mapping[str, str] = MappingProxyType({}),
-) -> str:
+def unknown_parameter(key: str, *models: type[CheckedModel], besides: Sequence[str] = ()) -> str:
     """The message for a parameter that no model has: near matches, or the whole list.
 
     Args:
         key: The unknown word.
         models: Models that were searched.
         besides: Further words that would have been understood.
-        synonyms: Words for these that messages answer with the right one, besides those of the models.
     """
     titles = {name: with_symbol(name, model) for model in models for name in model.model_fields}
     titles |= {name: name for name in besides}
-    word = key.lower()
-    meant = {other: name for model in models for other, name in model.synonyms.items()} | dict(synonyms)
-    near = [meant[word]] if meant.get(word) in titles else []
-    near = near or difflib.get_close_matches(word, titles, n=3, cutoff=0.6)
-    if len(word) > 2:  # a single letter is part of nearly every name
-        near = near or [name for name in titles if word in name or word[:3] == name[:3]]
+    near = difflib.get_close_matches(key.lower(), titles, n=3, cutoff=0.6)
     said = ", ".join(titles[name] for name in near or titles)
     return f"unknown parameter {key!r}; {f'did you mean {said}?' if near else f'there are {said}'}"
 

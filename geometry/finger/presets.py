@@ -2,10 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 from pinnray.geometry.finger.design import Design
-from pinnray.geometry.finger.keywords import FingerKeywords
 from pinnray.geometry.finger.parameters import (
     SYMBOLS,
     Parameters,
@@ -29,7 +28,7 @@ def preset_names() -> list[str]:
 def load_design(
     name_or_path: str | Path = "default",
     overrides: Mapping[str, Any] | None = None,
-    **parameters: Unpack[FingerKeywords],
+    **parameters: Any,
 ) -> Design:
     """A preset, or the design in a TOML file, with some parameters changed: `load_design(rib_count=6)`.
 

@@ -1,7 +1,5 @@
 """Settings of the mesh: element sizes."""
 
-from types import MappingProxyType
-
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
 
 
@@ -11,8 +9,6 @@ class MeshSettings(CheckedModel):
     Sizes are upper limits: walls and ribs that are thin for `size` get the smaller elements that put at least
     three across them.
     """
-
-    synonyms = MappingProxyType(dict.fromkeys(("mesh_size", "element_size", "elements"), "size"))
 
     size: float = bounded(0.25, 0.02, 20, "mm", "", "Largest element in the walls and ribs")
     coarsening: float = bounded(

@@ -4,6 +4,7 @@ from inspect import cleandoc
 from pathlib import Path
 
 from cyclopts import App
+from docstring_parser.attrdoc import AttributeDocstrings
 
 from pinnray.commands.launch import EXIT_CODES
 from pinnray.options.file import take_options
@@ -13,10 +14,14 @@ COMMANDS = (
     *("comparison.compare", "comparison.report"),
     *("finger.design", "finger.mesh", "finger.material", "finger.solve", "finger.sensitivity"),
     *("finger.export", "studies.sweep", "studies.predict", "studies.explore", "studies.app"),
-    *("studies.optimise", "studies.gridsearch", "comparison.crossval", "comparison.solvers"),
+    *("studies.optimise", "studies.crossval", "comparison.solvers"),
     *("camera.fiducials", "camera.calibrate", "camera.pick", "camera.points", "camera.rig", "camera.track"),
 )
 """Modules of this package with a function `command`; each is imported when its command is asked for."""
+
+
+AttributeDocstrings.get_attr_docs = lambda *_: {}  # type: ignore[method-assign]
+"""No option has a docstring below it: to look for some in pydantic's sources would double `--help`'s time."""
 
 
 def described(module: str) -> str:

@@ -1,4 +1,4 @@
-"""Runs a command, in one process or on the ranks of `mpirun`, and turns errors into exit codes."""
+"""Runs a command and turns errors into exit codes."""
 
 import logging
 import os
@@ -6,13 +6,9 @@ import sys
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from errno import EDQUOT, ENOSPC
-from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
-from resource import RLIM_INFINITY, RLIMIT_FSIZE, RLIMIT_NOFILE, getrlimit, setrlimit
-from shutil import disk_usage
-from tempfile import TemporaryFile, gettempdir
+from tempfile import TemporaryFile
 from typing import Any, TextIO
 
 from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
@@ -26,31 +22,13 @@ EXIT_CODES = (
     "130 interrupted; 141 the output went into a pipe that nobody reads any more."
 )
 
-SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
-"""Variables in which Open MPI and the relatives of MPICH give the number of ranks."""
-
-MIN_FILES = 128
-"""Open files that a run needs: a comparison has opened up to 40 at once, MPI's included."""
-
-MIN_LENGTH = 2**24
-"""Bytes that a file must be allowed to have: MPI needs between 4 and 12 million."""
-
-MIN_SPACE = 2**20
-"""Bytes left on a disk below which it counts as full."""
-
 
 def launched(command: Callable[[], Any]) -> int:
-    """Run a command and return its exit code; of several ranks one runs it, the others serve its solves."""
+    """Run a command and return its exit code."""
     _write_any_letter()
     _give_libraries_a_cache()
     _leave_signals_alone()
-    command = partial(_with_enough_files, command)
-    return guarded(lambda: _on_ranks(command) if on_ranks() else command())
-
-
-def on_ranks() -> bool:
-    """Whether `mpirun` started the program on more than one rank."""
-    return any(os.environ.get(name, "1") != "1" for name in SIZES)
+    return guarded(command)
 
 
 def guarded(command: Callable[[], Any]) -> int:
@@ -94,7 +72,7 @@ def _with_messages(command: Callable[[], Any]) -> int:
         except BrokenPipeError:
             raise
         except OSError as error:
-            say(f"error: {error.filename or _written_to(error)}: {error.strerror or error}")
+            say(f"error: {error.filename or 'input or output'}: {error.strerror or error}")
         except KeyboardInterrupt as interrupt:
             say(f"interrupted; {interrupt}" if interrupt.args else "interrupted")
             return INTERRUPTED
@@ -109,21 +87,6 @@ def _flush(stream: TextIO) -> None:
         with suppress(OSError), open(os.devnull, "wb") as nowhere:
             os.dup2(nowhere.fileno(), stream.fileno())
         raise
-
-
-def _written_to(error: OSError) -> str:
-    """The folders that may have caused an error without a file name: those on a full disk."""
-    if error.errno not in (ENOSPC, EDQUOT):
-        return "input or output"
-    libraries = os.environ.get("XDG_CACHE_HOME") or "~/.cache"  # DOLFINx compiles there
-    folders = dict.fromkeys([Path.cwd(), Path(libraries).expanduser(), Path(gettempdir())])
-    return " or ".join(str(folder) for folder in folders if _space(folder) < MIN_SPACE) or "a disk"
-
-
-def _space(folder: Path) -> int:
-    """Bytes left on the disk where a folder is, or would be made."""
-    there = next(place for place in (folder, *folder.parents) if place.exists())
-    return disk_usage(there).free
 
 
 def _write_any_letter() -> None:
@@ -161,33 +124,3 @@ def _leave_signals_alone() -> None:
     options = os.environ.get("PETSC_OPTIONS", "")
     if "-no_signal_handler" not in options:
         os.environ["PETSC_OPTIONS"] = f"{options} -no_signal_handler".strip()
-
-
-def _with_enough_files(command: Callable[[], Any]) -> Any:
-    """Run a command, with the limit of open files raised as far as needed: MPI aborts without a reason.
-
-    So it does where files may not become long, of which `ulimit -f` sets the hard limit, too. DOLFINx, while
-    it is imported, fails on arguments that are not UTF-8, and JSON files cannot hold them.
-    """
-    for given in sys.argv:
-        if given != given.encode(errors="replace").decode():
-            raise UserError(f"the argument {given!a} is not UTF-8; take another name")
-    if -1 < (longest := getrlimit(RLIMIT_FSIZE)[1]) < MIN_LENGTH:  # -1: RLIM_INFINITY
-        raise UserError(
-            f"files may not become longer than {longest} bytes; allow {MIN_LENGTH} (ulimit -f 16384)"
-        )
-    own, most = getrlimit(RLIMIT_NOFILE)
-    if most != RLIM_INFINITY and most < MIN_FILES:
-        raise UserError(f"the limit of open files is {most}; allow {MIN_FILES} (ulimit -n {MIN_FILES})")
-    if own != RLIM_INFINITY and own < MIN_FILES:
-        setrlimit(RLIMIT_NOFILE, (MIN_FILES, most))
-    return command()
-
-
-def _on_ranks(command: Callable[[], Any]) -> int:
-    from pinnray.solvers.registry import make_solver
-
-    make_solver("fem")  # or says which library is missing
-    from pinnray.solvers.fem.ranks import lead
-
-    return lead(command, guarded)

@@ -1,9 +1,8 @@
 """The option --from: options of `compare` out of a file, which may be the `run.json` of an earlier run."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cyclopts import App, ArgumentCollection
 
@@ -11,6 +10,9 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
 from pinnray.runtime.machine import package_versions
 from pinnray.runtime.text_files import read_json, read_toml
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 OPTION = "--from"
 INPUTS = ("design", "mesh", "measurements")
@@ -55,18 +57,17 @@ def read_options_file(file: Path) -> dict[str, Any]:
     return content
 
 
-def given_options(*groups: Any, **others: object) -> dict[str, object]:
-    """The options that are not as by default, by their names on the command line, for `run.json`.
+def given_options(*groups: "BaseModel", **others: object) -> dict[str, object]:
+    """The options that are given, by their names on the command line, for `run.json`.
 
     Args:
-        groups: Data classes of options.
+        groups: Groups of options.
         others: Options by name; their default is nothing.
     """
     values = {name: value for name, value in others.items() if value}
     for group in groups:
-        own = {field.name: (getattr(group, field.name), field.default) for field in fields(group)}
-        values |= {name: value for name, (value, default) in own.items() if value != default}
-    return {name.replace("_", "-"): _plain(value) for name, value in values.items()}
+        values |= group.model_dump(mode="json", exclude_unset=True)
+    return {name.replace("_", "-"): value for name, value in values.items()}
 
 
 def note_versions(file: Path, earlier: Mapping[str, Any]) -> None:
@@ -93,9 +94,3 @@ def note_inputs(file: Path, earlier: Mapping[str, Any], run: Path) -> None:
     keys = {name: f"{name}_sha256" for name in INPUTS}
     if changed := [name for name, key in keys.items() if earlier.get(key, new[key]) != new[key]]:
         say(f"note: not the same as in {file}: {', '.join(changed)}")
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, tuple):
-        return list(value)
-    return str(value) if isinstance(value, Path) else value

@@ -4,17 +4,19 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
+from pydantic import Field
 
+from pinnray.film.film import FilmSettings
+from pinnray.geometry.finger.parameters import CheckedModel
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import errors_of_interruption, say
 from pinnray.runtime.machine import cores
 from pinnray.runtime.text_files import parse_toml
-from pinnray.solvers.names import LawName, LoadKind
+from pinnray.solvers.physics import LoadKind, Physics
 
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
     from pinnray.geometry.finger.design import Design
@@ -31,6 +33,7 @@ OUTPUT = Group("Output", sort_key=4, default_parameter=Parameter(negative="", sh
 
 Repeated = Annotated[tuple[str, ...], Parameter(negative="", show_default=False)]
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
+FilmOptions = Annotated[FilmSettings, Parameter(name="*", group=Group("Camera", sort_key=4))]
 OutputFlag = Annotated[bool, Parameter(group=OUTPUT)]
 OutputPath = Annotated[Path, Parameter(group=OUTPUT, show_default=True)]
 OptionalOutputPath = Annotated[Path | None, Parameter(group=OUTPUT)]
@@ -38,8 +41,7 @@ Adapt = Annotated[float | None, Parameter(group=FINGER)]
 
 
 @Parameter(name="*", group=FINGER)
-@dataclass(frozen=True, kw_only=True)
-class FingerOptions:
+class FingerOptions(CheckedModel):
     """The finger and its mesh.
 
     Attributes:
@@ -110,20 +112,11 @@ class FingerOptions:
             check_mesh_cost(finger, mesh, solvers, simulated=simulated)
 
     def _designed(self) -> "Design":
-        from pinnray.geometry.finger.design import Design
-        from pinnray.geometry.finger.parameters import SYMBOLS, symbols
         from pinnray.geometry.finger.presets import load_design, parse_overrides
-        from pinnray.solvers.physics import Physics
 
         for option in ("clamp", "contact", "markers"):
             if getattr(self, option) is not None:
                 raise UserError(f"--{option} belongs to a drawing; give it by --section FILE")
-        for key in (setting.partition("=")[0].strip() for setting in self.set):
-            name = symbols(Physics).get(key, key)
-            if key not in {*SYMBOLS, *Design.model_fields} and name in Physics.model_fields:
-                raise UserError(
-                    f"{key} is no parameter of the finger, but of material and load: give --{name}"
-                )
         changes = parse_overrides(self.set)
         design = load_design(self.design, changes)
         if changes and "name" not in changes:  # so that it has its own output folder
@@ -168,75 +161,48 @@ def _changed_name(design: "Design", changes: Mapping[str, object]) -> str:
     return name if len(name) <= 64 else f"{name[:55]}-{design.digest[:8]}"
 
 
-@Parameter(name="*", group=PHYSICS)
-@dataclass(frozen=True, kw_only=True)
-class PhysicsOptions:
-    """Material and load.
+@Parameter(name="*", group=PHYSICS, negative="")
+class PhysicsOptions(Physics):
+    """Material and load."""
 
-    Attributes:
-        material: Name of a filament or silicone, whose modulus and Poisson's ratio are taken unless they are
-            given; `pinnray material` lists them. Default: none.
-        young: Young's modulus, MPa, default 11.4.
-        poisson: Poisson's ratio, default 0.45.
-        plane: Plane strain, or plane stress as in the paper.
-        law: Material law of the solvers that have it; default: each solver's own.
-        load: Indenter. mean (default): prescribed weighted mean displacement of the contact; point: one
-            prescribed point, as in the paper, which has no limit under refinement; patch: rigid patch;
-            cylinder: rigid cylinder.
-        radius: Radius of --load cylinder, mm, default 5.
-        friction: Coefficient of friction of --load cylinder.
-        stroke: Travel of the indenter, mm.
-        direction: Direction of the travel, degrees: 0 into the finger, 90 along it to the tip.
-        slide: Let the contact slide along the finger (u free).
-    """
+    material: str | None = Field(
+        default=None,
+        description="Name of a filament or silicone, whose modulus and Poisson's ratio are taken unless they "
+        "are given; `pinnray material` lists them",
+    )
 
-    material: str | None = None
-    young: float | None = None
-    poisson: float | None = None
-    plane: Literal["strain", "stress"] = "strain"
-    law: LawName | None = None
-    load: LoadKind | None = None
-    radius: float | None = None
-    friction: float = 0.0
-    stroke: float = 10.0
-    direction: float = 0.0
-    slide: Flag = False
+    def read(self, preset: str | None = None, usual_load: LoadKind | None = None) -> "tuple[Material, Load]":
+        """Material and load; the command or a preset of the solvers may choose the kind that is usual."""
+        material, load = Physics(**self.values(preset, usual_load)).parts
+        return material.made_of(self._known.substance if self._known else None), load
 
-    def read(self, preset: str | None = None) -> "tuple[Material, Load]":
-        """Material and load; a preset of the solvers may choose the kind of load."""
-        from pinnray.solvers.physics import Physics
-
-        material, load = Physics(**self.values(preset)).parts
-        if self.material is None:
-            return material, load
-        from pinnray.solvers.materials.presets import preset as material_preset
-
-        return material.made_of(material_preset(self.material).material.substance), load
-
-    def values(self, preset: str | None = None) -> dict[str, Any]:
-        """Material and load by the names of a study."""
+    def values(self, preset: str | None = None, usual_load: LoadKind | None = None) -> dict[str, Any]:
+        """What is not as by default, by the names of a study."""
         from pinnray.options.preset_jobs import job_defaults
 
-        given = {**asdict(self), "load": self.load or job_defaults(preset).load}
-        if (name := given.pop("material")) is not None:
-            from pinnray.solvers.materials.presets import preset as material_preset
+        usual: dict[str, Any] = {"load": usual_load or job_defaults(preset).load}
+        if self._known:
+            usual |= {"young": self._known.young, "poisson": self._known.poisson}
+        return usual | self.model_dump(exclude_unset=True, exclude={"material"})
 
-            known = material_preset(name).material
-            for constant in ("young", "poisson"):
-                if given[constant] is None:
-                    given[constant] = getattr(known, constant)
-        return {name: value for name, value in given.items() if value is not None}
+    @property
+    def _known(self) -> "Material | None":
+        """The material that goes by a name."""
+        if self.material is None:
+            return None
+        from pinnray.solvers.materials.presets import preset
+
+        return preset(self.material).material
 
     def check_law(self, solvers: "Sequence[Solver]") -> None:
-        """Raise a `UserError` if none of the solvers has the law."""
-        if self.law is not None and not any(self.law in solver.laws for solver in solvers):
+        """Raise a `UserError` if none of the solvers has the law that is given."""
+        if "law" in self.model_fields_set and not any(self.law in solver.laws for solver in solvers):
             known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
             raise UserError(f"--law {self.law}: none of the solvers has it ({known})")
 
 
 @Parameter(name="*", group=TRAINING)
-@dataclass(frozen=True, kw_only=True)
-class SolverOptions:
+class SolverOptions(CheckedModel):
     """Settings of the chosen solvers.
 
     Attributes:
@@ -261,66 +227,39 @@ class SolverOptions:
         Raises:
             UserError: If a solver, preset or setting does not exist or a text cannot be read.
         """
-        from pinnray.solvers.registry import PRESETS
+        from pinnray.options.solver_choice import made_solvers
 
         if self.seed < 0:
             raise UserError(f"--seed {self.seed}: give a whole number from 0")
         chosen = comma_list(names)
-        given = _settings(chosen, self.solver_set)
-        if self.preset is not None:
-            having = [name for name in given if self.preset in PRESETS.get(name, ())]
-            if not having:
-                known = "; ".join(f"{name} has {', '.join(presets)}" for name, presets in PRESETS.items())
-                raise UserError(f"--preset {self.preset}: none of the solvers {names} has it ({known})")
-            for name in having:
-                given[name].setdefault("preset", self.preset)
-        shared: dict[str, object] = {"seed": self.seed}
-        if self.device is not None:
-            shared["device"] = self.device
-        solvers = [_made(name, given[name], shared) for name in chosen]
-        if "device" in shared and not any("device" in solver.settings() for solver in solvers):
-            able = {preset for name in chosen for preset in _presets_with_device(name)}
-            hint = f"; with --preset {' or '.join(sorted(able))} one can" if able else ""
-            raise UserError(f"--device {self.device}: none of the solvers {names} can choose a device{hint}")
+        shared = {"seed": self.seed} | ({} if self.device is None else {"device": self.device})
+        solvers = made_solvers(chosen, self.preset, self.settings(chosen), **shared)
+        if self.device is not None and not any("device" in solver.settings() for solver in solvers):
+            raise UserError(f"--device {self.device}: none of the solvers {names} can choose a device")
         return solvers
 
-
-def _presets_with_device(name: str) -> list[str]:
-    """The presets of a solver that can choose a device."""
-    from pinnray.solvers.registry import PRESETS, make_solver
-
-    presets = PRESETS.get(name, ())
-    return [preset for preset in presets if "device" in make_solver(name, preset=preset).settings()]
-
-
-def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, object]]:
-    """The settings of each solver from texts such as `pinn-std.neurons=7`."""
-    given: dict[str, dict[str, object]] = {name: {} for name in names}
-    for text in texts:
-        target, dot, rest = text.partition(".")
-        key, equals, value = rest.partition("=")
-        if not (dot and equals and key and value):
-            raise UserError(f"cannot read {text!r}; write solver.setting=value, such as pinn-std.neurons=7")
-        if target not in given:
-            raise UserError(f"{text!r} is for {target!r}, which is not among the solvers {', '.join(names)}")
-        if key in given[target]:
-            raise UserError(f"{target}.{key} is set twice; set it once")
-        given[target][key] = value
-    return given
-
-
-def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) -> "Solver":
-    """The solver with its own settings and those of the shared settings that it has."""
-    from pinnray.solvers.registry import make_solver
-
-    solver = make_solver(name, **given)
-    had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
-    return make_solver(name, **given, **had)
+    def settings(self, names: "Sequence[str]") -> dict[str, dict[str, object]]:
+        """The settings of each of these solvers from texts such as `pinn-std.neurons=7`."""
+        given: dict[str, dict[str, object]] = {name: {} for name in names}
+        for text in self.solver_set:
+            target, dot, rest = text.partition(".")
+            key, equals, value = rest.partition("=")
+            if not (dot and equals and key and value):
+                raise UserError(
+                    f"cannot read {text!r}; write solver.setting=value, such as pinn-std.neurons=7"
+                )
+            if target not in given:
+                raise UserError(
+                    f"{text!r} is for {target!r}, which is not among the solvers {', '.join(names)}"
+                )
+            if key in given[target]:
+                raise UserError(f"{target}.{key} is set twice; set it once")
+            given[target][key] = value
+        return given
 
 
 @Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class StudyOptions:
+class StudyOptions(CheckedModel):
     """Workers, pictures and folder of a study.
 
     Attributes:

@@ -22,5 +22,5 @@ const pinnrayPacked = (() => {
     };
   }
 
-  return { unpacked, reader };
+  return { reader };
 })();

@@ -99,23 +99,6 @@ class Estimate:
         a = self.sensitivities
         return np.linalg.inv(a.T @ a + np.eye(a.shape[1]))
 
-    @cached_property
-    def singular_values(self) -> FloatArray:
-        """Singular values of A, shape (p,), descending; below one, the prior dominates."""
-        found = np.linalg.svd(self.sensitivities, compute_uv=False)
-        return np.append(found, np.zeros(len(self.z) - len(found)))
-
-    @property
-    def least_determined(self) -> FloatArray:
-        """The combination of z, of unit length, that the observations determine least, shape (p,)."""
-        return np.asarray(np.linalg.svd(self.sensitivities)[2][-1])
-
-    @property
-    def condition(self) -> float:
-        """Ratio of the largest to the smallest singular value."""
-        largest, smallest = (float(self.singular_values[end]) for end in (0, -1))
-        return largest / smallest if smallest else np.inf
-
     @property
     def values(self) -> FloatArray:
         """Values of the parameters, shape (p,)."""

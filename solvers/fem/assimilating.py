@@ -26,7 +26,6 @@ from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.fem.ranks import on_all_ranks
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status
@@ -80,7 +79,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
         """Solve for the minimiser; see `Solver`. Without markers it is `fem` or `fem-nonlinear`."""
         check_problem(self, problem)
         if self.weighting.misfit(problem) is not None:
-            return on_all_ranks(self._solve, problem, progress)
+            return self._solve(problem, progress)
         said = "without markers, or with weights of zero, this is"
         if problem.material.law in FemSolver.laws:
             plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
@@ -170,7 +169,6 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
                 "unknowns": nodal.size,
                 "triangles": len(problem.mesh.triangles),
                 "degree": self.degree,
-                "ranks": finger.equilibrium.distributed.comm.size,
                 "weight_factor": factor,
                 "misfit": factor * misfit.value(misfit.observed - fit.residual),
                 "marker_force": float(np.linalg.norm(fit.forces, axis=1).max()),

@@ -24,7 +24,6 @@ from mpi4py import MPI
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.solvers.elasticity import Lame
 from pinnray.solvers.extrusion import NodalSpace
-from pinnray.solvers.fem.ranks import communicator
 from pinnray.solvers.lagrange import LagrangeSpace
 
 # DOLFINx and FFCx read their option files once: here, from a folder without any. A file of others in the
@@ -42,10 +41,10 @@ DOLFINX_EDGES = {
 ABANDONED_S = 120.0
 """Age at which a form that is not compiled has been given up, s."""
 CLOCK_STEP_S = 0.02
-"""How far the time of a file's last change may lag behind `time.time()`, s: two ticks of a kernel at 100 Hz."""
+"""How far the time of a file's last change may lag behind `time.time()`, s: two ticks at 100 Hz."""
 
 
-def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> Any:
+def _create_mesh(cells: IntArray, points: FloatArray) -> Any:
     dimension = points.shape[1]
     cell = {2: "triangle", 3: "tetrahedron"}[dimension]
     if hasattr(ufl, "VectorElement"):  # until 0.6
@@ -57,7 +56,7 @@ def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> Any:
     domain = ufl.Mesh(element)
     names = inspect.signature(dolfinx.mesh.create_mesh).parameters
     return dolfinx.mesh.create_mesh(
-        comm, cells=cells, x=points, **{"domain" if "domain" in names else "e": domain}
+        MPI.COMM_SELF, cells=cells, x=points, **{"domain" if "domain" in names else "e": domain}
     )
 
 
@@ -74,7 +73,7 @@ def _scalar_space(mesh: Any) -> Any:
 
 
 def _nodes_of_dofs(space: NodalSpace, domain: Any, dolfinx_space: Any) -> IntArray:
-    """The node of the `NodalSpace` at every blocked degree of freedom of this rank.
+    """The node of the `NodalSpace` at every blocked degree of freedom.
 
     A cell of DOLFINx has them at its corners and, for degree 2, at the middles of `DOLFINX_EDGES`.
     """
@@ -113,7 +112,7 @@ def _compiled(build: Callable[[], Built]) -> Built:
         while True:
             try:
                 return build()
-            except TimeoutError:  # of FFCx, which has waited; several ranks have another error
+            except TimeoutError:  # of FFCx, which has waited
                 _forget_abandoned.cache_clear()
                 _forget_abandoned()
     except KeyboardInterrupt:  # of other exceptions FFCx takes care
@@ -141,21 +140,19 @@ def _forget_half_compiled(chosen: Callable[[float], bool]) -> None:
 SpaceT = TypeVar("SpaceT", bound=NodalSpace)
 
 
-class DistributedSpace(Generic[SpaceT]):
-    """A DOLFINx vector space on the shared mesh, or its extrusion, distributed over ranks.
+class DolfinxSpace(Generic[SpaceT]):
+    """A DOLFINx vector space on the shared mesh, or its extrusion.
 
-    Nodal arrays of shape (N, d), in the numbering of the elements in NumPy, `space`, are the same on every
-    rank of `comm`. Forms are written with `function`.
+    Nodal arrays of shape (N, d) have the numbering of the elements in NumPy, `space`, and those of PETSc that
+    of DOLFINx. Forms are written with `function`.
     """
 
     def __init__(self, space: SpaceT) -> None:
-        self.space, self.comm, self.dimension = space, communicator(), space.nodes.shape[1]
-        share = slice(None) if self.comm.rank == 0 else slice(0, 0)
-        self.domain = _create_mesh(self.comm, space.cells[share], space.nodes[space.vertices][share])
+        self.space, self.dimension = space, space.nodes.shape[1]
+        self.domain = _create_mesh(space.cells, space.nodes[space.vertices])
         self.dolfinx_space = _compiled(lambda: _vector_space(self.domain, space.degree))
         self.function = dolfinx.fem.Function(self.dolfinx_space)
         self._node_of_dof = _nodes_of_dofs(space, self.domain, self.dolfinx_space)
-        self._owned = self.dolfinx_space.dofmap.index_map.size_local
 
     def move(self, points: FloatArray) -> None:
         """Put the corners of the cells at other points, shape (n, d), mm."""
@@ -215,24 +212,22 @@ class DistributedSpace(Generic[SpaceT]):
 
     def add_blocks(self, matrix: PETSc.Mat, nodes: IntArray, blocks: FloatArray) -> None:
         """Add blocks of shape (m, d, d) to a matrix, each on the diagonal of one of m different nodes."""
-        row_of_node = np.full(len(self.space.nodes), -1, dtype=np.int32)
-        row_of_node[self._node_of_dof[: self._owned]] = np.arange(self._owned)
+        row_of_node = np.empty(len(self.space.nodes), dtype=np.int32)
+        row_of_node[self._node_of_dof] = np.arange(len(row_of_node))
         for row, block in zip(row_of_node[nodes], blocks, strict=True):
-            if row >= 0:
-                matrix.setValuesBlockedLocal(row, row, block, addv=PETSc.InsertMode.ADD_VALUES)
+            matrix.setValuesBlockedLocal(row, row, block, addv=PETSc.InsertMode.ADD_VALUES)
         matrix.assemble()
 
     def assemble_nodal(self, form: Any) -> FloatArray:
         """A linear form on every shape function, shape (N, d)."""
         vector = dolfinx.fem.petsc.assemble_vector(form)
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        nodal = self.gather(vector)
+        nodal = self.nodal(vector.array_r)
         vector.destroy()  # petsc4py would keep it for ever
         return nodal
 
     def assemble_scalar(self, form: Any) -> float:
         """An integral over the whole body."""
-        return float(self.comm.allreduce(dolfinx.fem.assemble_scalar(form), op=MPI.SUM))
+        return float(dolfinx.fem.assemble_scalar(form))
 
     def node_function(self, degree: int = 1) -> "NodeFunction":
         """A continuous vector field of a degree in every triangle, that forms can be written with; zero."""
@@ -242,18 +237,16 @@ class DistributedSpace(Generic[SpaceT]):
 
     def set_function(self, values: FloatArray) -> None:
         """Give `function` nodal values of shape (N, d)."""
-        self.function.x.array[:] = values[self._node_of_dof].ravel()
+        self.function.x.array[:] = self.dofs(values)
 
-    def distribute(self, values: FloatArray, vector: PETSc.Vec) -> None:
-        """Fill a PETSc vector from nodal values of shape (N, d)."""
-        vector.array[:] = values[self._node_of_dof[: self._owned]].ravel()
+    def dofs(self, values: FloatArray) -> FloatArray:
+        """Degrees of freedom, shape (..., d N), of nodal values, (..., N, d)."""
+        return values[..., self._node_of_dof, :].reshape(*values.shape[:-2], -1)
 
-    def gather(self, vector: PETSc.Vec) -> FloatArray:
-        """Nodal values of shape (N, d) of a PETSc vector, the same on every rank."""
-        values = np.zeros(self.space.nodes.shape)
-        values[self._node_of_dof[: self._owned]] = vector.array.reshape(-1, self.dimension)
-        if self.comm.size > 1:
-            self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
+    def nodal(self, dofs: FloatArray) -> FloatArray:
+        """Nodal values, shape (..., N, d), of degrees of freedom, (..., d N)."""
+        values = np.empty((*dofs.shape[:-1], *self.space.nodes.shape))
+        values[..., self._node_of_dof, :] = dofs.reshape(values.shape)
         return values
 
 

@@ -20,9 +20,8 @@ from pinnray.solvers.cylinder_contact import ContactState, CylinderContact
 from pinnray.solvers.elasticity import deformation_jacobian, energy_density_of
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_conditions
-from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
-from pinnray.solvers.fem.linear_solvers import Factorisation, LinearSolver, Multigrid
-from pinnray.solvers.fem.ranks import communicator
+from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace
+from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.shared_work import is_shared, shared
@@ -30,14 +29,6 @@ from pinnray.solvers.stability import ShiftedStep
 
 QUADRATURE_DEGREE = 4
 """For laws of finite strain: exact for their quadratic part on quadratic elements."""
-
-ITERATIVE_BEYOND = 10_000_000
-"""Unknowns beyond which "auto" means "iterative" for the linear law.
-
-MUMPS is ten times as fast at 3.9 million, but its memory (1.8 GB a million there) grows faster than the
-iterations' (1.4 GB).
-"""
-
 
 SHARED_UP_TO = 300_000
 """Unknowns up to which factors, half a GB there, are kept for the next solver."""
@@ -51,7 +42,7 @@ class LoadState(ContactState):
 
 
 class DiscreteEquilibrium:
-    """The discrete problem; nodal arrays of shape (N, d) are the same on every rank.
+    """The discrete problem; nodal arrays have the shape (N, d).
 
     `clamped` is the mask of components with a Dirichlet condition, and `prescribed` their displacement under
     the full load, mm; `elimination` solves with the constraints and the tangent factorised last, which is the
@@ -65,55 +56,44 @@ class DiscreteEquilibrium:
         problem: Problem,
         space: NodalSpace,
         constraints: DisplacementConstraints | None = None,
-        linear_solver: LinearSolver = "auto",
     ) -> None:
         """Compile the forms; what needs factors first makes them. Constraints are the load's by default."""
         self.problem, self.linear = problem, problem.material.law == "linear"
-        self.iterative = linear_solver == "iterative"
-        if linear_solver == "auto" and self.linear:
-            self.iterative = space.nodes.size > ITERATIVE_BEYOND
-        self.distributed = DistributedSpace(space)
+        self.elements = DolfinxSpace(space)
         self.clamped, self.prescribed = dirichlet_conditions(problem, space)
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
-        material, gradient = problem.material, ufl.grad(self.distributed.function)
+        material, gradient = problem.material, ufl.grad(self.elements.function)
         cells = None if problem.mesh.moduli is None else np.arange(len(problem.mesh.triangles))
-        lame = problem.lame(cells, solid=self.distributed.dimension == 3)
-        moduli = self.distributed.moduli(lame)
-        self._moduli: tuple[Any, Any] = moduli[:2]
+        lame = problem.lame(cells, solid=self.elements.dimension == 3)
+        moduli = self.elements.moduli(lame)
         density = energy_density_of(material.law, gradient, moduli, ufl.ln)
         measure = ufl.dx if self.linear else ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
         self._integrand = density / space.thickness * measure
         self._inside_out = ufl.conditional(ufl.gt(deformation_jacobian(gradient), 0), 0.0, 1.0) * measure
-        self._force, self.tangent = self.distributed.derivatives(self._integrand)
+        self._force, self.tangent = self.elements.derivatives(self._integrand)
         self.factors = self.factorised(self.clamped)
         self._eliminated: ConstrainedElimination | None = None
 
     @cached_property
     def _energy(self) -> Any:
-        return self.distributed.form(self._integrand)
+        return self.elements.form(self._integrand)
 
     @cached_property
     def _inverted(self) -> Any:
-        return self.distributed.form(self._inside_out)
+        return self.elements.form(self._inside_out)
 
-    def factorised(self, clamped: BoolArray) -> Factorisation | Multigrid:
+    def factorised(self, clamped: BoolArray) -> Factorisation:
         """Factors of the tangent at the displacements set last, with a mask of clamped components, (N, d)."""
-        self._conditions = self.distributed.clamp(clamped)
-        self.matrix = self.distributed.assemble_matrix(self.tangent, self._conditions)
-        system = self.distributed, self.matrix, clamped
-        if not self.iterative:
-            return Factorisation(*system, positive_definite=self.linear)
-        if self.linear:
-            return Multigrid(*system)
-        # What a step of Newton's method leaves, the next one takes.
-        return Multigrid(*system, tolerance=1e-4, tangent=True)
+        self._conditions = self.elements.clamp(clamped)
+        self.matrix = self.elements.assemble_matrix(self.tangent, self._conditions)
+        return Factorisation(self.elements, self.matrix, clamped, positive_definite=self.linear)
 
     def prescribe(self, problem: Problem) -> None:
         """Take another load of a body of linear law; keeps the factors and responses that still hold."""
         if problem.load == self.problem.load:
             return
-        space, functionals = self.distributed.space, self.constraints.functionals
+        space, functionals = self.elements.space, self.constraints.functionals
         clamped, self.prescribed = dirichlet_conditions(problem, space)
         self.problem, self.constraints = problem, DisplacementConstraints.of(problem, space)
         if not np.array_equal(clamped, self.clamped):
@@ -123,29 +103,15 @@ class DiscreteEquilibrium:
             return
         self._eliminated = None
 
-    def vary(self, problem: Problem) -> None:
-        """Take a problem that is a little different, on the same plane elements; keeps the factors.
-
-        Its mesh may have other points, its material other constants, its load another way or radius.
-        """
-        space = LagrangeSpace(problem.mesh, self.distributed.space.degree)
-        self.distributed.move(space.nodes[space.vertices])
-        self.problem, self.constraints = problem, DisplacementConstraints.of(problem, space)
-        _, self.prescribed = dirichlet_conditions(problem, space)
-        if self.contact is not None:
-            self.contact = CylinderContact.of(problem, space)
-        for constant, value in zip(self._moduli, problem.lame()[:2], strict=True):
-            constant.value = value
-
     def energy(self, nodal: FloatArray) -> float:
         """Elastic energy per depth, N mm / mm."""
-        self.distributed.set_function(nodal)
-        return self.distributed.assemble_scalar(self._energy)
+        self.elements.set_function(nodal)
+        return self.elements.assemble_scalar(self._energy)
 
     def internal_force(self, nodal: FloatArray) -> FloatArray:
         """Derivative of the elastic energy, shape (N, d), N/mm."""
-        self.distributed.set_function(nodal)
-        return self.distributed.assemble_nodal(self._force)
+        self.elements.set_function(nodal)
+        return self.elements.assemble_nodal(self._force)
 
     def _stiff(self, nodal: FloatArray) -> FloatArray:
         """Stiffness at rest times displacements, shape (N, d), N/mm."""
@@ -165,17 +131,17 @@ class DiscreteEquilibrium:
 
     def factorise(self, state: LoadState, shift: float = 0.0) -> None:
         """Factorise the tangent at a state, with a shift of its diagonal, N/mm per mm."""
-        self.distributed.set_function(state.nodal)
-        self.distributed.assemble_matrix(self.tangent, self._conditions, into=self.matrix)
+        self.elements.set_function(state.nodal)
+        self.elements.assemble_matrix(self.tangent, self._conditions, into=self.matrix)
         if self.contact is not None:
             free = ~self.clamped[self.contact.nodes]
             inner = self.contact.tangent(state)
-            blocks = np.pad(inner, ((0, 0), *2 * ((0, self.distributed.dimension - inner.shape[1]),)))
+            blocks = np.pad(inner, ((0, 0), *2 * ((0, self.elements.dimension - inner.shape[1]),)))
             blocks *= free[:, :, None] & free[:, None, :]
-            self.distributed.add_blocks(self.matrix, self.contact.nodes, blocks)
+            self.elements.add_blocks(self.matrix, self.contact.nodes, blocks)
         if shift:
             self.matrix.shift(shift)
-        self.factors.update(state.nodal)
+        self.factors.update()
         self._eliminated = None
 
     @property
@@ -207,10 +173,8 @@ class DiscreteEquilibrium:
         return self.elimination.solution(nodal, values)
 
     @property
-    def unstable(self) -> int | None:
-        """Number of directions in which the energy falls at the state factorised last; None if iterated."""
-        if not isinstance(self.factors, Factorisation):
-            return None
+    def unstable(self) -> int:
+        """Number of directions in which the energy falls at the state factorised last."""
         return self.elimination.unstable(self.factors.negative)
 
     def softest(self) -> FloatArray:
@@ -232,7 +196,7 @@ class DiscreteEquilibrium:
             force = np.where(self.clamped, 0.0, -self.internal_force(nodal))
             gaps = about.fraction * self.constraints.targets - self.constraints.values(nodal)
             change, _ = self.elimination.solution(self.factors.solve(force), gaps)
-            return ShiftedStep(change, self.unstable or 0)
+            return ShiftedStep(change, self.unstable)
 
         return step
 
@@ -252,8 +216,8 @@ class DiscreteEquilibrium:
         """Whether the deformation turns no quadrature point inside out."""
         if not np.isfinite(nodal).all():
             return False
-        self.distributed.set_function(nodal)
-        return self.distributed.assemble_scalar(self._inverted) == 0
+        self.elements.set_function(nodal)
+        return self.elements.assemble_scalar(self._inverted) == 0
 
     @property
     def rest(self) -> LoadState:
@@ -297,23 +261,20 @@ class DiscreteEquilibrium:
         return replace(rest, nodal=nodal)
 
 
-def linear_equilibrium(
-    problem: Problem, degree: int, linear_solver: LinearSolver = "auto"
-) -> DiscreteEquilibrium:
+def linear_equilibrium(problem: Problem, degree: int) -> DiscreteEquilibrium:
     """The discrete problem of a linear law on plane elements, made and factorised once where work is shared.
 
-    Under a mean or point load the factors are those of the body with its base clamped. On several ranks
-    nothing is shared, as rank 0 alone knows what it keeps.
+    Under a mean or point load the factors are those of the body with its base clamped.
     """
     space = LagrangeSpace(problem.mesh, degree)
 
     def made() -> DiscreteEquilibrium:
-        return DiscreteEquilibrium(problem, space, linear_solver=linear_solver)
+        return DiscreteEquilibrium(problem, space)
 
     small = space.nodes.size <= SHARED_UP_TO and problem.load.kind in ("mean", "point")
-    if not (small and is_shared() and communicator().size == 1):
+    if not (small and is_shared()):
         return made()
-    key = ("equilibrium", problem.mesh.digest, repr(problem.material), degree, linear_solver)
+    key = ("equilibrium", problem.mesh.digest, repr(problem.material), degree)
     found = shared(key, made)
     found.shared = True
     found.prescribe(problem)

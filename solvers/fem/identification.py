@@ -1,7 +1,7 @@
 """`fem-id`: contact, walls and law from the markers, by finite elements at finite strain with moved walls."""
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
@@ -16,24 +16,21 @@ from pinnray.geometry.registration import Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import COST_CHANGE
-from pinnray.solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
+from pinnray.solvers.elasticity import Lame, deformation_jacobian, energy_density_of
 from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions
-from pinnray.solvers.fem.dolfinx_compat import DistributedSpace, NodeFunction
+from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace, NodeFunction
 from pinnray.solvers.fem.equilibrium import QUADRATURE_DEGREE
+from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
-from pinnray.solvers.fem.linear_solvers import Factorisation
 from pinnray.solvers.identification.body import Linearised
-from pinnray.solvers.identification.contradiction import with_doubts
-from pinnray.solvers.identification.field import IdentifiedField
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
 from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.identification.settings import IdentifyingSolver
-from pinnray.solvers.identification.tracker import ForceTracker, LawTracker
-from pinnray.solvers.identification.transfer import force_path
-from pinnray.solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
+from pinnray.solvers.identification.tracker import ForceTracker
+from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import Solution, Status
@@ -50,31 +47,31 @@ class FemBody:
         problem, motion = unknowns.problem, unknowns.motion
         space = LagrangeSpace(problem.mesh, degree)
         self.space, self._motion = space, motion
-        self._distributed = DistributedSpace(space)
+        self._elements = DolfinxSpace(space)
         self._clamped, _ = dirichlet_conditions(Problem(problem.mesh, problem.material, Load()), space)
         rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = space.shape_gradients(rule.location)
         self._wall_gradients = motion.gradients()[:, rule.location.cells]
-        moduli = self._distributed.moduli(problem.material.lame)
+        moduli = self._elements.moduli(problem.material.lame)
         self._moduli: tuple[Any, Any] = moduli[:2]
-        self._moved, self._direction = (self._distributed.node_function() for _ in range(2))
+        self._moved, self._direction = (self._elements.node_function() for _ in range(2))
         shift = ufl.Identity(2) + ufl.grad(self._moved.function)
-        gradient = ufl.dot(ufl.grad(self._distributed.function), ufl.inv(shift))
+        gradient = ufl.dot(ufl.grad(self._elements.function), ufl.inv(shift))
         density = energy_density_of(problem.material.law, gradient, moduli, ufl.ln)
         energy = density * ufl.det(shift) * ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
-        self._energy = self._distributed.form(energy)
-        function = self._distributed.function
+        self._energy = self._elements.form(energy)
+        function = self._elements.function
         force = ufl.derivative(energy, function, ufl.TestFunction(function.function_space))
         tangent = ufl.derivative(force, function, ufl.TrialFunction(function.function_space))
         slope = ufl.derivative(force, self._moved.function, self._direction.function)
-        self._force, self._tangent, self._wall_slope = map(self._distributed.form, (force, tangent, slope))
-        self._base_motion = self._distributed.node_function(degree)
+        self._force, self._tangent, self._wall_slope = map(self._elements.form, (force, tangent, slope))
+        self._base_motion = self._elements.node_function(degree)
         by_base = ufl.derivative(force, function, self._base_motion.function)
-        self._base_slope = self._distributed.form(by_base)
+        self._base_slope = self._elements.form(by_base)
         at_base = self._clamped.all(axis=1)
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
         self.feet[:, at_base] = unknowns.feet.motions(space.nodes[at_base])
-        self._conditions = self._distributed.clamp(self._clamped)
+        self._conditions = self._elements.clamp(self._clamped)
         self._factors: Factorisation | None = None
         self._sampled: dict[bytes, LocatedPoints] = {}
 
@@ -95,7 +92,7 @@ class FemBody:
         if not self.admissible(state, changes):
             return None
         self._set(state, lame, changes)
-        force = np.where(self._clamped, 0.0, self._distributed.assemble_nodal(self._force))
+        force = np.where(self._clamped, 0.0, self._elements.assemble_nodal(self._force))
         try:
             factors = self._factorised()
         except UserError:  # a singular tangent
@@ -105,10 +102,10 @@ class FemBody:
     def _factorised(self) -> Factorisation:
         """Factors of the tangent at the state that was set last."""
         if self._factors is None:
-            matrix = self._distributed.assemble_matrix(self._tangent, self._conditions)
-            self._factors = Factorisation(self._distributed, matrix, self._clamped, positive_definite=False)
+            matrix = self._elements.assemble_matrix(self._tangent, self._conditions)
+            self._factors = Factorisation(self._elements, matrix, self._clamped, positive_definite=False)
         else:
-            self._distributed.assemble_matrix(self._tangent, self._conditions, into=self._factors.matrix)
+            self._elements.assemble_matrix(self._tangent, self._conditions, into=self._factors.matrix)
             self._factors.update()
         return self._factors
 
@@ -122,7 +119,7 @@ class FemBody:
         of_moduli = np.zeros((2, *self.shape))
         for found, unit in zip(of_moduli, np.eye(2), strict=True):
             self._set_moduli(unit)
-            found[:] = self._distributed.assemble_nodal(self._force)
+            found[:] = self._elements.assemble_nodal(self._force)
         self._set_moduli(lame[:2])
         return of_walls, of_moduli, of_feet
 
@@ -131,7 +128,7 @@ class FemBody:
         found = np.zeros((len(nodal), *self.shape))
         for slope, values in zip(found, nodal, strict=True):
             direction.set(values)
-            slope[:] = self._distributed.assemble_nodal(form)
+            slope[:] = self._elements.assemble_nodal(form)
         return found
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
@@ -146,7 +143,7 @@ class FemBody:
     def energy(self, state: FloatArray, lame: Lame, changes: FloatArray) -> float:
         """By quadrature; see `Body`."""
         self._set(state, lame, changes)
-        return self._distributed.assemble_scalar(self._energy)
+        return self._elements.assemble_scalar(self._energy)
 
     def field(self, state: FloatArray) -> LagrangeField:
         """The finite-element field."""
@@ -166,7 +163,7 @@ class FemBody:
         return found.swapaxes(0, 1)
 
     def _set(self, state: FloatArray, lame: Lame, changes: FloatArray) -> None:
-        self._distributed.set_function(state)
+        self._elements.set_function(state)
         self._moved.set(np.einsum("k,knx->nx", changes, self._motion.nodal))
         self._set_moduli(lame[:2])
 
@@ -190,7 +187,6 @@ def _both_components(values: FloatArray) -> FloatArray:
 class FemIdSolver(IdentifyingSolver):
     """Finite elements whose contact, walls and law are found from the markers."""
 
-    model: str = "fem-nonlinear"  # The only one: finite strain under an unknown force
     degree: int = 2  # Of the elements, 1 or 2
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
@@ -200,13 +196,6 @@ class FemIdSolver(IdentifyingSolver):
     cost: ClassVar[Cost] = Cost(per_triangle=275)
 
     def __post_init__(self) -> None:
-        if self.model == "fem":
-            raise UserError(
-                "fem-id: the linear model is gone; leave out model for finite strain, or take fem-asm, which "
-                "corrects fem by the markers"
-            )
-        if self.model != "fem-nonlinear":
-            raise UserError(f"fem-id: model must be fem-nonlinear, got {self.model!r}; leave it out")
         if self.degree not in (1, 2):
             raise UserError(f"fem-id has elements of degree 1 and 2, not {self.degree}")
         super().__post_init__()
@@ -216,28 +205,11 @@ class FemIdSolver(IdentifyingSolver):
         check_problem(self, problem)
         if problem.observations is None:
             plain = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
-            said = f"without markers, this is {self.model}: {plain.status.message}"
+            said = f"without markers, this is fem-nonlinear: {plain.status.message}"
             return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
-        found = with_doubts(
-            lambda given: self.refitter(problem)(given, progress),
-            problem.observations,
-            lambda given: self._identifier(coarser(problem) or problem).expected(given),
-        )
-        found = self._with_path(found)
+        found = self.refitter(problem)(problem.observations, progress)
         progress(1.0, found.force_phrase)
         return found
-
-    def _with_path(self, solution: Solution) -> Solution:
-        """The solution with its force at lesser loads, on a coarse mesh: the markers tell the end alone."""
-        if solution.identified is None or not isinstance(solution.field, IdentifiedField):
-            return solution
-        best = solution.field.members[0]
-        problem = best.model.unknowns.problem
-        unknowns = Unknowns(coarser(problem) or problem, self.unknowns)
-        size = solution.identified.size.value
-        shares = force_path(ResponseModel(FemBody(unknowns, self.degree), unknowns), best.response.values)
-        path = [(motion, share * size) for motion, share in shares]
-        return replace(solution, identified=solution.identified._replace(path=path))
 
     def refitter(self, problem: Problem) -> Callable[..., Solution]:
         """A function that finds the unknowns for other observations; see `Refittable`.
@@ -276,24 +248,19 @@ class FemIdSolver(IdentifyingSolver):
         return Identifier(self, problem, body, cost_change=cost_change, flexibility=flexibility)
 
 
-def fem_law_tracker(
-    problem: Problem, points: FloatArray, radius: float, laws: Sequence[LawName] = LAWS, *, degree: int = 2
-) -> LawTracker:
-    """The force tracker of a finger by the most probable of some laws of finite strain.
+def fem_force_tracker(
+    problem: Problem, points: FloatArray, radius: float, *, degree: int = 2
+) -> ForceTracker:
+    """The force tracker of a finger.
 
     Args:
-        problem: The finger; its load only gives the drawn contact.
+        problem: The finger, with a law of finite strain; its load only gives the drawn contact.
         points: Markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of the markers' discs, mm; less is taken where one is nearer to the boundary.
-        laws: The laws.
         degree: Of the elements, 1 or 2.
     """
-    trackers = {}
-    for law in laws:
-        material = problem.material.model_copy(update={"law": law})
-        unknowns = Unknowns(replace(problem, material=material, observations=None), DEFAULT)
-        trackers[law] = ForceTracker(ResponseModel(FemBody(unknowns, degree), unknowns), points, radius)
-    return LawTracker(trackers)
+    unknowns = Unknowns(replace(problem, observations=None), DEFAULT)
+    return ForceTracker(ResponseModel(FemBody(unknowns, degree), unknowns), points, radius)
 
 
 def _interpolated(fit: Fit, model: ResponseModel) -> Response:

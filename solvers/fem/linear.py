@@ -2,14 +2,10 @@
 
 import time
 from dataclasses import dataclass, replace
-from typing import get_args
 
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, linear_equilibrium
 from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from pinnray.solvers.fem.linear_solvers import LinearSolver
-from pinnray.solvers.fem.ranks import on_all_ranks
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import ErrorEstimate, Solution, Status
@@ -26,9 +22,6 @@ class FemSolver(ElementSettings):
     """
 
     estimate: bool = True  # Whether to estimate the discretisation error, at half the cost of the solution
-    # "direct" (MUMPS), "iterative" (conjugate gradients with algebraic multigrid) or "auto", which iterates
-    # beyond ten million unknowns
-    linear_solver: LinearSolver = "auto"
     name = "fem"
     family = "finite elements"
     laws = ("linear",)
@@ -36,23 +29,13 @@ class FemSolver(ElementSettings):
     parts = True
     cost = Cost(per_triangle=55)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.linear_solver not in get_args(LinearSolver):
-            known = ", ".join(get_args(LinearSolver))
-            raise UserError(f"fem has the linear solvers {known}, not {self.linear_solver!r}")
-
-    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Solve the linear problem; see `Solver`."""
-        check_problem(self, problem)
-        return on_all_ranks(self._solve, problem, progress)
-
     def prepare(self, problem: Problem) -> "FactorisedProblem":
         """Assemble and factorise once, to solve for many loads."""
         check_problem(self, problem)
-        return FactorisedProblem(self, problem, linear_equilibrium(problem, self.degree, self.linear_solver))
+        return FactorisedProblem(self, problem, linear_equilibrium(problem, self.degree))
 
-    def _solve(self, problem: Problem, progress: Progress) -> Solution:
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Solve the linear problem; see `Solver`."""
         started = time.perf_counter()
         prepared = self.prepare(problem)
         seconds = time.perf_counter() - started
@@ -88,9 +71,8 @@ class FactorisedProblem:
         smooth = load.kind != "point" and problem.mesh.moduli is None  # and the gradient does not jump
         if self._solver.estimate and smooth and load.values.any():
             error = self._estimator.estimate(nodal, equilibrium.response)
-        factors = equilibrium.factors
         sentence = [
-            factors.message,
+            "solved directly",
             _uncertainty(problem, error),
             locking_advice(space.degree, problem.material),
         ]
@@ -107,8 +89,6 @@ class FactorisedProblem:
                 "unknowns": nodal.size,
                 "triangles": len(problem.mesh.triangles),
                 "degree": space.degree,
-                "ranks": equilibrium.distributed.comm.size,
-                **factors.stats,
             },
             error=error,
         )

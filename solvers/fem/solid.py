@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -15,11 +15,8 @@ from pinnray.runtime.machine import free_memory_gb
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.equilibrium import LoadState
-from pinnray.solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
-from pinnray.solvers.fem.lateral import lateral_stiffness
-from pinnray.solvers.fem.linear_solvers import LinearSolver
-from pinnray.solvers.fem.ranks import communicator, on_all_ranks
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status, unstable_phrase
 from pinnray.solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
@@ -69,47 +66,22 @@ class FaceField:
         return np.stack([dx @ self.values, dy @ self.values, dz], axis=-1)
 
 
-class SolvingCost(NamedTuple):
-    """The linear solver and its price."""
+def affordable(unknowns: int, levels: int, free_gb: float) -> tuple[float, str]:
+    """Memory that factors of nodes on so many levels need, GB, and the price in words.
 
-    iterative: bool  # Whether multigrid solves, not factors
-    memory_gb: float
-    words: str  # Unknowns, method, memory and time of a Newton step on one core
-
-
-def _cost(unknowns: int, levels: int, iterative: bool) -> SolvingCost:
-    """The price of nodes on so many levels, fitted to the default finger with 235,000 to 812,000 unknowns.
-
-    Other bodies may differ by a factor of two.
+    It was fitted to the default finger with 235,000 to 812,000 unknowns; other bodies may differ by a factor
+    of two. A `UserError` says that the memory that is free does not suffice; a solution may take 70 % of it.
     """
-    if iterative:
-        how, memory, seconds = "iterative", 3.4e-6 * unknowns, 110 * (1e-6 * unknowns) ** 1.17
-    else:
-        entries = unknowns * (100 + 33 * levels) * (unknowns / (3 * levels) / 8500) ** 0.25  # of the factors
-        memory = 2.4e-6 * unknowns + 1e-8 * entries
-        how, seconds = "direct", 2e-5 * unknowns + 1.3e-10 * entries**2 / unknowns
+    entries = unknowns * (100 + 33 * levels) * (unknowns / (3 * levels) / 8500) ** 0.25  # of the factors
+    memory = 2.4e-6 * unknowns + 1e-8 * entries
+    if memory > 0.7 * free_gb:
+        raise UserError(
+            f"fem-3d would need about {memory:.1f} GB for {unknowns:,} unknowns, and {free_gb:.1f} GB are "
+            "free; take fewer layers or a coarser mesh"
+        )
+    seconds = 2e-5 * unknowns + 1.3e-10 * entries**2 / unknowns
     step = f"{max(1.0, seconds):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
-    words = f"{unknowns:,} unknowns, {how}: about {memory:.1f} GB, {step} a Newton step"
-    return SolvingCost(iterative, memory, words)
-
-
-def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) -> SolvingCost:
-    """The linear solver that is asked for or, if "auto", direct where memory allows it.
-
-    A `UserError` says that the memory that is free does not suffice; a solution may take 70 % of it.
-    """
-    methods = {"auto": (False, True), "direct": (False,), "iterative": (True,)}[asked]
-    costs = [_cost(unknowns, levels, iterative) for iterative in methods]
-    for cost in costs:
-        if cost.memory_gb <= 0.7 * free_gb:
-            return cost
-    advice = "take fewer layers or a coarser mesh"
-    if asked == "direct":
-        advice = f"take linear_solver=iterative, {advice.removeprefix('take ')}"
-    raise UserError(
-        f"fem-3d would need about {costs[-1].memory_gb:.1f} GB for {unknowns:,} unknowns, "
-        f"and {free_gb:.1f} GB are free; {advice}"
-    )
+    return memory, f"{unknowns:,} unknowns: about {memory:.1f} GB, {step} a Newton step"
 
 
 def _plane_guide(problem: Problem, space: ExtrudedSpace, progress: Progress) -> Callable[[float], LoadState]:
@@ -149,14 +121,6 @@ class Fem3dSolver(FieldSettings):
     grading: float = 0.25  # Thickness of the layer at the side face over that at the middle plane
     face: Face = "side"  # Plane of the field: the "side" face or the "middle" plane
     sides: Literal["free", "held"] = "free"  # Side faces that are "held" do not move along z: plane strain
-    # "direct" (MUMPS), "iterative" (conjugate gradients with algebraic multigrid) or "auto", which is direct
-    # where memory allows it
-    linear_solver: LinearSolver = "auto"
-    lateral: bool = False  # Whether to find the sideways and torsional stiffness, by one factorisation more
-    max_step: float = 1.0  # Largest fraction of the load in one step, at finite strain
-    min_step: float = 1e-2  # Fraction of the load below which the solver gives up
-    tolerance: float = 1e-8  # Largest residual force over the largest internal force
-    max_iterations: int = 20  # Newton iterations in one step
     name = "fem-3d"
     family = "finite elements"
     laws = ("linear", "neo-hookean", "st-venant-kirchhoff")
@@ -174,20 +138,14 @@ class Fem3dSolver(FieldSettings):
         for said, value, known in (
             ("the field of the faces", self.face, get_args(Face)),
             ("the sides", self.sides, ("free", "held")),
-            ("the linear solvers", self.linear_solver, get_args(LinearSolver)),
         ):
             if value not in known:
                 raise UserError(f"fem-3d has {said} {', '.join(known)}, not {value!r}")
-        if self.lateral and self.sides == "held":
-            raise UserError("fem-3d has no sideways stiffness between held sides; take sides=free")
-        if not 0 < self.min_step <= self.max_step <= 1:
-            raise UserError("fem-3d needs 0 < min_step <= max_step <= 1")
-        check_tolerance(self.name, self.tolerance)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the problem in three dimensions; see `Solver`. A `UserError` says if memory is short."""
         check_problem(self, problem)
-        return on_all_ranks(self._solve, problem, progress)
+        return self._solve(problem, progress)
 
     def space(self, problem: Problem) -> ExtrudedSpace:
         """The elements of a problem."""
@@ -196,64 +154,52 @@ class Fem3dSolver(FieldSettings):
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         space, linear = self.space(problem), problem.material.law == "linear"
-        free = communicator().bcast(free_memory_gb())
-        cost = affordable(space.nodes.size, len(space.levels), self.linear_solver, free)
-        progress(0.0, cost.words)
-        guide, step = None, 1.0
+        memory, words = affordable(space.nodes.size, len(space.levels), free_memory_gb())
+        progress(0.0, words)
+        guide = None
         if not linear:
             guide = _plane_guide(problem, space, lambda done, text: progress(0.1 * done, f"plane: {text}"))
-            step = self.max_step
         path = LoadPath(
             problem,
             space,
             guide=guide,
-            iterative=cost.iterative,
-            first_step=step,
-            max_step=step,
-            min_step=self.min_step,
-            tolerance=self.tolerance,
-            max_iterations=self.max_iterations,
+            first_step=1.0,  # the guide is near, so that one step is often enough
+            max_step=1.0,
+            min_step=0.01,
+            tolerance=1e-8,
+            max_iterations=20,
         )
         path.follow(lambda done, text: progress(0.1 + 0.9 * done, text))
         last, history = path.points[-1], path.history()
         unstable = 0 if linear else path.equilibrium.unstable
         region, abscissa = path.region(last), path.force_abscissa(last)
         path.close()
-        lateral = None
-        if self.lateral:
-            progress(1.0, "sideways and torsional stiffness")
-            lateral = lateral_stiffness(problem, space, iterative=cost.iterative)
         return Solution(
             solver=self.name,
             problem=problem,
             field=FaceField(space, last.nodal, self.face),
             energy=float(history["energy"][-1]),
             reaction=np.array([history["reaction_x"][-1], history["reaction_y"][-1]]),
-            status=self._status(path, cost, region, unstable),
+            status=self._status(path, region, unstable),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": last.nodal.size,
                 "layers": self.layers,
                 "depth_mm": problem.mesh.depth,
                 **path.stats,
-                **({} if unstable is None else {"unstable_directions": unstable}),
+                "unstable_directions": unstable,
                 "left_unstable": path.left,
-                **path.equilibrium.factors.stats,
                 **(region.stats() if region else {}),
-                "estimated_memory_GB": cost.memory_gb,
+                "estimated_memory_GB": memory,
                 **({} if abscissa is None else {"force_abscissa_mm": abscissa}),
-                "ranks": path.equilibrium.distributed.comm.size,
             },
             history=history,
             states=[FaceField(space, point.nodal, self.face) for point in path.points],
             contact=contact_of(problem, abscissa, region),
-            lateral=lateral,
         )
 
-    def _status(
-        self, path: LoadPath, cost: SolvingCost, region: ContactRegion | None, unstable: int | None
-    ) -> Status:
-        """Success at the full load, or advice; `unstable` is None where multigrid cannot tell."""
+    def _status(self, path: LoadPath, region: ContactRegion | None, unstable: int) -> Status:
+        """Success at the full load, or advice."""
         if path.points[-1].fraction < 1:
             return Status(False, f"{path.phrase}; take a finer mesh, a wider contact or a smaller stroke")
         if region and region.at_end:
@@ -261,10 +207,8 @@ class Fem3dSolver(FieldSettings):
         if unstable:
             return Status(False, f"all of the load applied, but {unstable_phrase(unstable)}")
         place = "side face" if self.face == "side" else "middle plane"
-        how = "by multigrid" if cost.iterative else "solved directly"
-        checked = "" if unstable is not None else " and its stability not checked"
         return Status(
             True,
-            f"{path.phrase}, {how}; the field is that of the {place}; its discretisation error was not "
-            f"estimated{checked}",
+            f"{path.phrase}, solved directly; the field is that of the {place}; its discretisation error was "
+            "not estimated",
         )

@@ -19,7 +19,7 @@ from pinnray.solvers.finger_figures.measures import (
 )
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.shared_work import shared
-from pinnray.solvers.solution import LateralStiffness, Solution
+from pinnray.solvers.solution import Solution
 
 if TYPE_CHECKING:
     from pinnray.solvers.fem.linear import FactorisedProblem
@@ -55,11 +55,7 @@ class FingerFigures:
         places: Drawn points of the largest stress and strain, mm, by the names of these figures.
         curve: Travel of the indenter, mm, and its force along it, N, from rest on; one pair where the way to
             the end is not known.
-        depth: Of the finger, mm.
         strain_over_break: Largest nominal strain over the material's strain at break, of a known material.
-        sideways_stiffness: Force along the depth per displacement of the contact along it, at rest, N/mm;
-            this and the next by `fem-3d` with its setting `lateral`.
-        torsional_stiffness: Torque about the finger's axis per turn of the contact, at rest, N mm/rad.
         strain_energy: Elastic energy of the whole finger, mJ.
     """
 
@@ -84,34 +80,11 @@ class FingerFigures:
     mass: float = _figure("g", "mass of the body")
     thinnest_wall: float = _figure("mm", "thinnest wall or rib")
     narrowest_gap: float = _figure("mm", "narrowest clear width of a cavity")
-    sideways_stiffness: float = float("nan")
-    torsional_stiffness: float = float("nan")
     strain_over_break: float = float("nan")
     strain_energy: float = float("nan")
-    depth: float = float("nan")
     intervals: Mapping[str, Interval] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict)
     curve: tuple[tuple[float, float], ...] = ()
-
-    @property
-    def force_per_depth(self) -> float:
-        """Force of the indenter along its travel, N/mm."""
-        return self.force / self.depth
-
-    @property
-    def stroke(self) -> float:
-        """Travel of the indenter, mm."""
-        return self.curve[-1][0] if self.curve else float("nan")
-
-    @property
-    def density(self) -> float:
-        """Density of the material that the mass is of, g/cm^3."""
-        return 1000 * self.mass / (self.area * self.depth)
-
-    @property
-    def tip(self) -> float:
-        """How far the tip moves, mm."""
-        return float(np.hypot(self.tip_u, self.tip_v))
 
     def force_at(self, stroke: float) -> float:
         """Force of the indenter, N, after a travel, mm; between computed equilibria it is interpolated.
@@ -142,58 +115,30 @@ class FingerFigures:
             found[f"{name}{unit}"] = value
             for end, bound in zip(("low", "high"), self.intervals.get(name, ()), strict=False):
                 found[f"{name}_{end}{unit}"] = bound
-        asked = {
-            "sideways_stiffness_N_per_mm": self.sideways_stiffness,
-            "torsional_stiffness_N_mm_per_rad": self.torsional_stiffness,
-            "strain_over_break": self.strain_over_break,
-        }
-        found |= {name: value for name, value in asked.items() if np.isfinite(value)}
+        if np.isfinite(self.strain_over_break):
+            found["strain_over_break"] = self.strain_over_break
         return found | {"strain_energy_mJ": self.strain_energy}
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """What, how much with its unit and interval, and a remark: a row for each figure that is known."""
-        rows = [
-            (
-                "grip force",
-                self._said("force", "N"),
-                f"at {self.stroke:g} mm, {self.force_per_depth:.4g} N/mm",
+        """What, how much with its unit and interval, and its meaning: a row for each figure that is known."""
+        known = {name: value for name, value in self.values().items() if not np.isnan(value)}
+        return [
+            *(
+                (name.replace("_", " "), self._said(name, value), self._meaning(name))
+                for name, value in known.items()
             ),
-            (
-                "tip displacement",
-                f"{self.tip:.4g} mm",
-                f"{self.tip_u:+.3g} mm along, {self.tip_v:+.3g} mm across (positive toward the indenter)",
-            ),
-            ("wrap", f"{self.wrap:.3g} deg", "fold of the front face around the indenter"),
-            ("compliance across", f"{self.compliance_across:.4g} mm/N", "of the contact, at rest"),
-            ("compliance along", f"{self.compliance_along:.4g} mm/N", "of the contact, at rest"),
-            ("sideways stiffness", f"{self.sideways_stiffness:.4g} N/mm", "of the contact, at rest"),
-            (
-                "torsional stiffness",
-                f"{self.torsional_stiffness:.4g} N mm/rad",
-                "of the contact about the finger's axis, at rest",
-            ),
-            ("von Mises stress", self._said("von_mises", "MPa"), self._where("von_mises")),
-            ("principal strain", f"{self.principal_strain:.2%}", self._where("principal_strain")),
-            ("strain energy", f"{self.strain_energy:.4g} mJ", ""),
-            (
-                "mass",
-                f"{self.mass:.3g} g",
-                f"at {self.density:.3g} g/cm3, {self.area:.4g} mm2 by {self.depth:g} mm",
-            ),
-            ("smallest wall", f"{self.thinnest_wall:.3g} mm", f"narrowest gap {self.narrowest_gap:.3g} mm"),
+            ("strain energy", f"{self.strain_energy:.4g} mJ", "elastic energy of the whole finger"),
         ]
-        return [row for row in rows if not row[1].startswith("nan")]
 
-    def _said(self, name: str, unit: str) -> str:
-        value = f"{getattr(self, name):.4g}"
+    def _said(self, name: str, value: float) -> str:
+        said = f"{value:.4g}"
         if (interval := self.intervals.get(name)) is not None:
-            value += f" ({interval[0]:.4g} to {interval[1]:.4g})"
-        return f"{value} {unit}"
+            said += f" ({interval[0]:.4g} to {interval[1]:.4g})"
+        return f"{said} {QUANTITIES[name].unit}".rstrip()
 
-    def _where(self, name: str) -> str:
-        if (place := self.places.get(name)) is None:
-            return ""
-        return f"largest at ({place[0]:.3g}, {place[1]:.3g}) mm, away from corners and contact"
+    def _meaning(self, name: str) -> str:
+        meaning, place = QUANTITIES[name].meaning, self.places.get(name)
+        return meaning if place is None else f"{meaning}: at ({place[0]:.3g}, {place[1]:.3g}) mm"
 
 
 QUANTITIES: Mapping[str, Quantity] = {
@@ -237,7 +182,6 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
     }
     tip_u, tip_v = solution.displacement(front_ends(problem)[1:])[0]
     stress, strain = largest_away_from_corners(solution)
-    lateral = solution.lateral or LateralStiffness(float("nan"), float("nan"))
     return FingerFigures(
         force=float(force),
         **ways,
@@ -247,11 +191,8 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
         von_mises=stress.value,
         principal_strain=strain.value,
         **(figures_at_rest(problem) if rest is None else rest),
-        sideways_stiffness=lateral.sideways,
-        torsional_stiffness=lateral.torsional,
         strain_over_break=_strain_over_break(problem.material, strain.value),
         strain_energy=float(solution.energy) * depth,
-        depth=depth,
         intervals=_intervals(solution, depth, stress),
         places={
             name: (float(each.place[0]), float(each.place[1]))
@@ -328,14 +269,6 @@ def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, I
     return found
 
 
-def unit_loads(position: float | None) -> tuple[Load, Load]:
-    """The loads that move the contact by 1 mm, along the finger and across it, and not in the other way."""
-    return (
-        Load(displacement=(1.0, 0.0), position=position),
-        Load(displacement=(0.0, 1.0), position=position),
-    )
-
-
 def _compliances(
     solve: Callable[[Load], Solution], position: float | None, depth: float
 ) -> tuple[float, float]:
@@ -343,6 +276,7 @@ def _compliances(
 
     The force acts in one direction, and the contact is free in the other.
     """
-    stiffness = depth * np.array([solve(unit).reaction for unit in unit_loads(position)])
+    units = [Load(displacement=moved, position=position) for moved in ((1.0, 0.0), (0.0, 1.0))]
+    stiffness = depth * np.array([solve(unit).reaction for unit in units])
     compliance = np.linalg.inv(stiffness)
     return float(compliance[0, 0]), float(compliance[1, 1])

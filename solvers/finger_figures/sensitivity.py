@@ -1,6 +1,6 @@
 """Derivatives of a finger's figures by its parameters, those of its material and of its load."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import atan2, cos, degrees, hypot, radians, sin
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,24 +12,22 @@ from pinnray.geometry.finger.parameters import parameter_info
 from pinnray.geometry.mesh.design_motion import MovingMesh
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.fem.variation import VariedProblem
-from pinnray.solvers.finger_figures.figures import (
-    QUANTITIES,
-    FingerFigures,
-    figures_at_rest,
-    figures_of,
-    unit_loads,
-)
-from pinnray.solvers.problem import Load, Problem
-from pinnray.solvers.solution import Solution
-from pinnray.solvers.solver import Progress, silent
+from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.finger_figures.figures import QUANTITIES, FingerFigures, figures_of
+from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from pinnray.runtime.figure import Figure
 
-STEP = 1e-4
+STEP = 1e-2
 """Step of a parameter, mm, or of Young's modulus over its value; ten times as much of an angle, degrees, and
 a tenth as much of Poisson's ratio, on which much depends near 0.5."""
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
@@ -144,8 +142,9 @@ class LocalSensitivity:
 def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 2) -> LocalSensitivity:
     """Derivatives of a finger's figures by every continuous parameter that it has.
 
-    The mesh follows the parameters, so that the derivatives are those of the discrete solution: exact but
-    for rounding, which leaves six digits. A parameter at zero, such as a fillet that is not there, has none.
+    They are central differences of solutions on a mesh that follows the parameters, each from the equilibrium
+    of the finger itself, and have three digits or more. A parameter at zero, such as a fillet that is not
+    there, has none.
 
     Args:
         problem: Of a design, or of a drawn finger, of whose section the walls' thicknesses are varied.
@@ -153,52 +152,72 @@ def sensitivity_of(problem: Problem, progress: Progress = silent, degree: int = 
         degree: Of the elements, 1 or 2.
 
     Raises:
-        UserError: If there is friction.
-        NoSolutionError: If the full load is not reached, or its equilibrium is not stable.
+        UserError: If there is friction, whose forces depend on the way to the load.
+        NoSolutionError: If the full load is not reached.
     """
+    if problem.load.friction:
+        raise UserError("derivatives are without friction, whose forces depend on the way to the load")
     parameters = list(_parameters(problem))
-    varied = VariedProblem(problem, lambda share, text: progress(0.5 * share, text), degree)
-    solution = varied.solution
-    figures = figures_of(solution)
+    solution, near = _solved(problem, degree, lambda share, text: progress(0.5 * share, text))
     derivatives: dict[str, dict[str, float]] = {name: {} for name in QUANTITIES if name not in SMALLEST}
-    pairs = [(each.low, each.high) for each in parameters]
-    found = zip(parameters, varied.solutions(pairs), *_at_rest(problem, pairs, degree), strict=True)
-    for number, (each, ends, along, across) in enumerate(found):
-        low, high = map(_values, ends, along, across)
+    for number, each in enumerate(parameters):
+        low, high = (_values(near(end)) for end in (each.low, each.high))
         for name, slopes in derivatives.items():
             slopes[each.name] = (high[name] - low[name]) / (2 * each.step)
         progress(0.5 + 0.5 * number / len(parameters), each.name)
-    varied.close()
     values = {each.name: each.value for each in parameters}
     units = {each.name: each.unit for each in parameters}
-    return LocalSensitivity(solution, figures, values, units, derivatives)
+    return LocalSensitivity(solution, figures_of(solution), values, units, derivatives)
 
 
-def _at_rest(
-    problem: Problem, pairs: Sequence[tuple[Problem, Problem]], degree: int
-) -> list[list[tuple[Solution, Solution]]]:
-    """For each of the `unit_loads` the solutions of every pair by the linear law."""
-    found = []
-    for unit in unit_loads(problem.load.position):
+def _solved(
+    problem: Problem, degree: int, progress: Progress
+) -> tuple[Solution, Callable[[Problem], Solution]]:
+    """The solution by `fem` or `fem-nonlinear`, as the law is, and a function for problems near it."""
+    if problem.material.law == "linear":
+        linear = FemSolver(degree=degree, estimate=False)
+        return linear.solve(problem), linear.solve
+    solver = FemNonlinearSolver(degree=degree)
 
-        def still(each: Problem, unit: Load = unit) -> Problem:
-            linear = each.material.model_copy(update={"law": "linear"})
-            return replace(each, material=linear, load=unit)
+    def path(of: Problem) -> LoadPath:
+        return solver.path(of, LagrangeSpace(of.mesh, degree))
 
-        varied = VariedProblem(still(problem), degree=degree)
-        found.append(varied.solutions([(still(low), still(high)) for low, high in pairs]))
-        varied.close()
-    return found
+    whole = path(problem)
+    followed = solver.followed(solver.coarser(problem), whole, progress)
+    start = whole.points[-1]
+    if start.fraction < 1:
+        raise NoSolutionError(whole.phrase)
+    solution = _at_end(problem, whole)
+    followed.close()
+
+    def near(other: Problem) -> Solution:
+        own = path(other)
+        if (state := own.settled_from(start)) is None:
+            raise NoSolutionError("a finger that is a little different has no equilibrium near; see solve")
+        own.points.append(state)
+        found = _at_end(other, own)
+        own.close()
+        return found
+
+    return solution, near
 
 
-def _values(solution: Solution, along: Solution, across: Solution) -> dict[str, float]:
-    """The figures, with solutions for the `unit_loads`.
+def _at_end(problem: Problem, path: LoadPath) -> Solution:
+    nodal, equilibrium = path.points[-1].nodal, path.equilibrium
+    return Solution(
+        solver=FemNonlinearSolver.name,
+        problem=problem,
+        field=LagrangeField(path.space.section, nodal),
+        energy=equilibrium.energy(nodal),
+        reaction=reaction_by_residual_work(path.space, equilibrium.internal_force(nodal)),
+        status=Status(True, "the full load alone"),
+        stats={},
+    )
 
-    Area and mass are those of the mesh, which alone follows the walls of a drawn finger.
-    """
-    units = {each.problem.load: each for each in (along, across)}
-    rest = figures_at_rest(solution.problem, solve=units.__getitem__)
-    found, area = figures_of(solution, rest).values(), float(solution.problem.mesh.areas.sum())
+
+def _values(solution: Solution) -> dict[str, float]:
+    """The figures; area and mass are those of the mesh, which alone follows the walls of a drawn finger."""
+    found, area = figures_of(solution).values(), float(solution.problem.mesh.areas.sum())
     return found | {"area": area, "mass": found["mass"] * area / found["area"]}
 
 

@@ -1,6 +1,6 @@
 """Fits of the unknowns under one law each, from a start or from another fit."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,39 +19,22 @@ MOST_LOST = 8
 """Hypotheses without equilibrium at which a search ends: near a limit load there are ever more of them."""
 
 
-class LawModels(Mapping[LawName, ResponseModel]):
-    """The finger by each of some laws, made when it is first asked for."""
-
-    def __init__(self, laws: Sequence[LawName], make: Callable[[LawName], ResponseModel]) -> None:
-        self._laws, self._make, self._made = laws, make, dict[LawName, ResponseModel]()
-
-    def __getitem__(self, law: LawName) -> ResponseModel:
-        if law not in self._made:
-            if law not in self._laws:
-                raise KeyError(law)
-            self._made[law] = self._make(law)
-        return self._made[law]
-
-    def __iter__(self) -> Iterator[LawName]:
-        return iter(self._laws)
-
-    def __len__(self) -> int:
-        return len(self._laws)
-
-
 class LawFits:
     """Fits the unknowns of one finger under any of the laws.
 
     Args:
-        models: The finger by every law.
+        model: The finger by a law.
         parameters: The unknowns, whose priors the laws share.
         cost_change: Relative change of the cost below which a search has converged.
     """
 
     def __init__(
-        self, models: Mapping[LawName, ResponseModel], parameters: Sequence[Parameter], cost_change: float
+        self,
+        model: Callable[[LawName], ResponseModel],
+        parameters: Sequence[Parameter],
+        cost_change: float,
     ) -> None:
-        self._models, self.parameters, self._cost_change = models, parameters, cost_change
+        self._model, self.parameters, self._cost_change = model, parameters, cost_change
         self._names = [parameter.name for parameter in parameters]
         self.progress: Progress = silent
 
@@ -87,7 +70,7 @@ class LawFits:
         A wide contact that the start has is soon lost, while the frame and the walls are those of a narrow
         one. What is `held` stays, and its value in the fit is zero.
         """
-        model = self._models[law]
+        model = self._model(law)
         markers = MarkerModel(model, measurement)
         model.restart(None if near is None else near.response)
 

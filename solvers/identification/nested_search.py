@@ -37,7 +37,7 @@ class NestedSearch:
 
         def polished(fit: Fit) -> Fit:
             progress(0.6, f"{fit.law}: finer")
-            model = self._fine.models[fit.law]
+            model = self._fine.model(fit.law)
             start = fit._replace(model=model, response=self._carried(fit, model))
             return self._fine.polished(start, observations)
 

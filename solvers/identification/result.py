@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
+from pinnray.solvers.assimilation.estimation import LEVEL
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
-from pinnray.solvers.identification.contradiction import CONTRADICTED
 from pinnray.solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
 from pinnray.solvers.identification.fit import NORMAL, Fit
 from pinnray.solvers.problem import Problem
@@ -28,6 +27,10 @@ wraps around a cylinder with friction it was half of the forward one, with a con
 MISSED = 1.5
 """φ from which a misfit is more than chance: with the ten degrees of freedom that nine markers leave, noise
 alone exceeds it once in a hundred times."""
+CONTRADICTED = 20.0
+"""φ from which the markers are not those of the finger: it is 1 to 2 over the truths of
+`comparison.evaluation.truths`, 60 with a clamp that gave by 0.5 degrees and 0.4 mm, and 270 to 410 with
+markers in another order."""
 PROBABLE = 0.01
 """Least probability of a law whose field is kept."""
 
@@ -95,6 +98,7 @@ class Identified:
         ]
         field = IdentifiedField(**vars(members[0].found), members=members)
         sentence, loose = self.sentence(missed), best.model.unknowns.unregistered
+        contradicted = best.estimate.inflation > CONTRADICTED
         return Solution(
             solver=name,
             problem=field.problem,
@@ -102,11 +106,11 @@ class Identified:
             energy=best.model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
             reaction=hypothesis.force,
             status=Status(
-                best.estimate.converged and best.exact and not unstable,
+                best.estimate.converged and best.exact and not unstable and not contradicted,
                 f"{unstable_phrase(unstable)}; {sentence}" if unstable else sentence,
                 [
-                    *(f"{said}, and was left out" for said in self._contradictions()),
                     *self._unexplained(),
+                    *(f"{said}, and was left out" for said in self._contradictions()),
                     *self._wrapped(),
                 ],
             ),
@@ -145,8 +149,14 @@ class Identified:
     def _unexplained(self) -> list[str]:
         """A sentence on markers that no values of the unknowns explain within their deviations."""
         off = self.best.estimate.inflation
-        if not MISSED <= off < CONTRADICTED:  # beyond, no finger explains them, which is said instead
+        if off < MISSED:
             return []
+        if off > CONTRADICTED:
+            return [
+                f"NO FINGER OF THIS DRAWING EXPLAINS THE MARKERS: they are {off:.0f} times as far off as "
+                "they are known, so that force and intervals say nothing; see whether drawing, clamp, load, "
+                "frames of the pictures and numbers of the markers are right"
+            ]
         return [
             f"THE MARKERS ARE {off:.2g} TIMES AS FAR FROM ANY FINGER OF THIS DRAWING AS THEY ARE KNOWN, "
             "which chance does once in a hundred times: see the clamp, the camera and its plane, the scale "
@@ -184,10 +194,8 @@ class Identified:
                 f"{parameter.name}_high": float(high),
                 f"{parameter.name}_resolution": float(resolution),
             }
-        numbers |= {f"singular_value_{n}": float(s) for n, s in enumerate(found.singular_values, 1)}
         size, low, high = self.force().size
         numbers |= {
-            "condition": found.condition,
             "law": self.best.law,
             "force": size,
             "force_low": low,
@@ -240,18 +248,7 @@ class Identified:
             if not known
         ]:
             parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
-        if len(found.parameters) > 1:
-            parts.append(f"least is known of {_least_determined(found)}")
         return "; ".join(parts)
-
-
-def _least_determined(found: Estimate) -> str:
-    """The least determined combination of parameters, in standard deviations of their priors."""
-    direction = found.least_determined
-    direction = direction * np.sign(direction[np.abs(direction).argmax()])
-    order = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= 0.2]
-    text = " ".join(f"{direction[i]:+.2f} {found.parameters[i].name}" for i in order)
-    return f"{text.removeprefix('+')}, singular value {found.singular_values[-1]:.2g}"
 
 
 def _member(fit: Fit, probability: float, problem: Problem) -> Member:

@@ -6,6 +6,7 @@ without an observation.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from scipy.special import chdtri
@@ -15,9 +16,8 @@ from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.body import Body
-from pinnray.solvers.identification.contradiction import MUCH_NEARER, likely_order
 from pinnray.solvers.identification.fit import Fit
-from pinnray.solvers.identification.law_fits import LawFits, LawModels
+from pinnray.solvers.identification.law_fits import LawFits
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
 from pinnray.solvers.identification.result import Identified
 from pinnray.solvers.identification.settings import IdentifyingSolver
@@ -66,18 +66,19 @@ class Identifier:
     ) -> None:
         self._settings, self._mesh = settings, problem.mesh
 
+        @cache
         def model(law: LawName) -> ResponseModel:
             own = replace(problem, material=problem.material.model_copy(update={"law": law}))
             unknowns = Unknowns(own, settings.unknowns)
             return ResponseModel(body(unknowns), unknowns)
 
-        laws = LAWS if settings.law == "evidence" else (problem.material.law,)
-        self.models = LawModels(laws, model)
-        self.flexibility = self.models[laws[0]].flexibility() if flexibility is None else flexibility
+        self.laws = LAWS if settings.law == "evidence" else (problem.material.law,)
+        self.model = model
+        self.flexibility = model(self.laws[0]).flexibility() if flexibility is None else flexibility
         unknowns = Unknowns(problem, settings.unknowns)
         self._names, self._feet = unknowns.names, unknowns.feet.names
         self.parameters = unknowns.parameters(self.flexibility, settings.prior)
-        self._fits = LawFits(self.models, self.parameters, cost_change)
+        self._fits = LawFits(model, self.parameters, cost_change)
         self._known: dict[LawName, Fit] = {}
 
     def measurement(self, observations: Observations) -> MarkerData:
@@ -87,19 +88,6 @@ class Identifier:
             reaction = chosen.reaction, chosen.reaction_error * abs(chosen.reaction)
         return MarkerData.of(self._mesh, observations, chosen.marker_radius, reaction)
 
-    def expected(self, observations: Observations) -> FloatArray:
-        """Displacements of the markers seen, shape (m, 2), mm per N/mm: of a linear finger, drawn contact."""
-        return self._expected(self.measurement(observations))
-
-    def _expected(self, measurement: MarkerData) -> FloatArray:
-        model = next(iter(self.models.values()))
-        at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
-        if at_rest is None:
-            raise NoSolutionError("the finger has no equilibrium near rest")
-        markers = MarkerModel(model, measurement)
-        slope = markers.predicted(at_rest)[1][:, self._names.index("normal_force")]
-        return slope[: 2 * len(measurement.kept)].reshape(-1, 2)
-
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
         """The unknowns under every law, and the laws' probabilities.
 
@@ -107,7 +95,7 @@ class Identifier:
             UserError: If there are no markers, or the finger has no equilibrium near rest.
         """
         self._fits.progress = progress
-        measurement, untried, lost = self.measurement(observations), list(self.models), list[LawName]()
+        measurement, untried, lost = self.measurement(observations), list(self.laws), list[LawName]()
         rough: list[Fit] = []
         while True:
             if not rough:
@@ -118,11 +106,11 @@ class Identifier:
                 break
             except NoSolutionError:
                 lost.append(best.law)
-                if len(lost) == len(self.models):
+                if len(lost) == len(self.laws):
                     raise
                 rough = [each for each in rough if each.law != best.law]
         fits = [fit]
-        rivals = [law for law in self.models if law != fit.law and law not in lost]
+        rivals = [law for law in self.laws if law != fit.law and law not in lost]
         for law in rivals if fit.estimate.inflation < HOPELESS else ():
             try:
                 fits.append(self._rival(law, fit))
@@ -246,16 +234,11 @@ class Identifier:
     def _elsewhere(self, fit: Fit) -> Iterator[FloatArray]:
         """Standardised values, shape (p,), to start again from: wider contacts.
 
-        Where little is explained, places far away follow; where nothing is, they are all, unless the markers
-        seem to be in another order.
+        Where little is explained, places far away follow; where nothing is, they are all.
         """
-        found, hopeless = fit.estimate, fit.estimate.inflation > HOPELESS
-        if "width" in self._names and not hopeless:
+        found = fit.estimate
+        if "width" in self._names and found.inflation <= HOPELESS:
             yield from (np.where(self._is_width, wide, found.z) for wide in WIDE)
-        if hopeless:
-            expected = self._expected(fit.measurement)
-            if likely_order(fit.measurement.displacements, expected, MUCH_NEARER) is not None:
-                return
         if "position" in self._names and found.inflation > ASTRAY:
             for away in (-2.0, 2.0):
                 start = np.zeros(len(self._names))

@@ -13,7 +13,6 @@ The contact has its drawn prior in every frame, because it may move.
 """
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -30,9 +29,8 @@ from pinnray.solvers.assimilation.estimation import (
     values_of,
 )
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
-from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, SHARE, doubt_of_the_plane, log_prior
+from pinnray.solvers.identification.unknowns import CONTACT, SHARE, doubt_of_the_plane
 
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
@@ -79,13 +77,12 @@ class _Prior(NamedTuple):
 
 
 class _Posterior(NamedTuple):
-    """Estimate of z, shape (p,), its covariance, φ, half an interval over its deviation, log evidence."""
+    """Estimate of z, shape (p,), its covariance, φ, half an interval over its deviation."""
 
     z: FloatArray
     covariance: FloatArray
     inflation: float
     quantile: float
-    log_evidence: float
 
 
 class ForceTracker:
@@ -96,10 +93,6 @@ class ForceTracker:
         points: The m markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of their discs, mm; less is taken where one is nearer to the boundary.
 
-    Attributes:
-        log_evidence: Logarithm of the evidence for the law in the last frame, with the finger's drawn prior;
-            None if the frame has no estimate or much less motion than an earlier one. See `Fit.log_evidence`.
-
     Raises:
         UserError: If the unknowns lack the force or its place.
     """
@@ -108,7 +101,7 @@ class ForceTracker:
         self._unknowns, names = model.unknowns, model.unknowns.names
         if missing := {"normal_force", "position"} - set(names):
             raise UserError(f"a force is followed with {' and '.join(sorted(missing))} among the unknowns")
-        self._model = model
+        self._model, self.law = model, model.unknowns.problem.material.law
         self._parameters = model.unknowns.parameters(model.flexibility())
         self._bounds = np.array([parameter.bounds for parameter in self._parameters]).T
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
@@ -118,7 +111,6 @@ class ForceTracker:
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
         self._known, self._learnt = self._drawn, 0
         self._largest = 0.0  # root mean square motion of the markers, mm
-        self.log_evidence: float | None = None
         rest = self._linearised(np.zeros(len(names)))
         if rest is None:
             raise UserError("the finger has no equilibrium at rest")
@@ -141,7 +133,7 @@ class ForceTracker:
                 f"a frame has displacements and deviations of shape {shape} and a mask of shape {shape[:1]}, "
                 f"got {displacements.shape}, {deviations.shape} and {visible.shape}"
             )
-        self._evaluations, self.log_evidence = 0, None
+        self._evaluations = 0
         reading = self._updated(displacements, deviations, visible)
         return replace(reading, evaluations=self._evaluations, seconds=time.perf_counter() - started)
 
@@ -156,7 +148,6 @@ class ForceTracker:
         found = self._searched(self._drawn if near else self._known, rows, observed, noise)
         if found is not None and near:
             self._learn(found, anew=grown)
-            self.log_evidence = found.log_evidence
             if grown:
                 self._largest = moved
             else:
@@ -207,11 +198,7 @@ class ForceTracker:
             used, inflation = inflation, inflation_of(residuals + slopes @ (found - z), freedom)
             if abs(inflation / used - 1) < 1e-3:
                 break
-        left, away = (residuals + slopes @ (found - z)) / used, found - prior.mean
-        misfit = float(left @ left + away @ prior.precision @ away)
-        volume = np.linalg.slogdet(curvature)[1] - np.linalg.slogdet(prior.precision)[1]
-        log_evidence = -len(left) * float(np.log(used)) - 0.5 * (misfit + float(volume))
-        return _Posterior(found, np.linalg.inv(curvature), used, quantile_of(used, freedom), log_evidence)
+        return _Posterior(found, np.linalg.inv(curvature), used, quantile_of(used, freedom))
 
     def _bounded(self, z: FloatArray, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
         """Minimum of a quadratic within the bounds: an unknown that leaves them is held at its bound."""
@@ -286,52 +273,6 @@ class ForceTracker:
         """A reading without an estimate."""
         none, ends = np.nan, self._unknowns.traction.ends
         return ForceReading(np.full(2, none), none, 0.0, np.inf, none, *ends, none, 0, 0.0, status)
-
-
-class LawTracker:
-    """Estimates the force in one frame after another by the law that is most probable by the markers.
-
-    All laws are compared, by the evidence of one frame, whenever the markers have moved by a quarter farther
-    than at the last comparison; in between only the most probable one is followed. A law is dropped once the
-    logarithm of its probability is less than another's by 7: it is a thousand times less probable. A law
-    without an equilibrium in that frame comes after those that have one, and is compared again at the next.
-
-    Args:
-        trackers: By the name of the law; the first is taken before there is a motion.
-
-    Attributes:
-        laws: The laws that are not excluded, the most probable first.
-    """
-
-    def __init__(self, trackers: Mapping[LawName, ForceTracker]) -> None:
-        self._trackers = dict(trackers)
-        self._compared = 0.0  # root mean square motion of the markers in the last comparison, mm
-        self.laws: tuple[LawName, ...] = tuple(trackers)
-
-    def update(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
-        """The force in a frame by the most probable law; see `ForceTracker.update`."""
-        started, first = time.perf_counter(), self.laws[0]
-        found = {first: self._trackers[first].update(displacements, deviations, visible)}
-        moved = _motion(displacements, visible) if visible.sum() >= FEWEST else 0.0
-        if len(self.laws) > 1 and moved > self._compared * 1.25:
-            for law in self.laws[1:]:
-                found[law] = self._trackers[law].update(displacements, deviations, visible)
-            self._compare(moved)
-        evaluations = sum(reading.evaluations for reading in found.values())
-        return replace(found[self.laws[0]], evaluations=evaluations, seconds=time.perf_counter() - started)
-
-    def _compare(self, moved: float) -> None:
-        """Sort and drop the laws by their evidence in the last frame, in which the markers moved by mm."""
-        known = {
-            law: evidence + log_prior(law)
-            for law in self.laws
-            if (evidence := self._trackers[law].log_evidence) is not None
-        }
-        if known:
-            self._compared = moved
-            order = sorted(known, key=lambda law: -known[law])
-            probable = (law for law in order if known[law] >= known[order[0]] - 7.0)
-            self.laws = (*probable, *(law for law in self.laws if law not in known))
 
 
 def _motion(displacements: FloatArray, visible: BoolArray) -> float:

@@ -5,12 +5,11 @@ its force; the feet move in proportion to it. The stroke is not trusted, but its
 into the finger by the fit's displacement times the ratio of the two loads' displacements.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray
 from pinnray.solvers.identification.field import IdentifiedField
 from pinnray.solvers.identification.model import EXACT, Response, ResponseModel
 from pinnray.solvers.problem import Problem, contact_ends
@@ -52,30 +51,6 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
         uncertainty=None,
         identified=None,
     )
-
-
-def force_path(model: ResponseModel, values: FloatArray, count: int = 4) -> Sequence[tuple[float, float]]:
-    """Share of the contact's motion and share of the force at lesser loads, the last of them (1, 1).
-
-    Args:
-        model: The finger that was found; its mesh may be a coarse one.
-        values: Of its unknowns, shape (p,).
-        count: Of loads, whose forces are evenly spaced.
-
-    Returns:
-        Nothing where an equilibrium on the way is not found.
-    """
-    loaded, into = _loaded(model), model.unknowns.directions[0]
-    model.restart(None)
-    shares, moved = np.arange(1, count + 1) / count, []
-    for share in shares:
-        response = model.response(np.where(loaded, share * values, values))
-        if response is None:
-            return []
-        moved.append(float(response.contact @ into))
-    if not moved[-1]:  # no load
-        return []
-    return [(motion / moved[-1], float(share)) for motion, share in zip(moved, shares, strict=True)]
 
 
 def _loaded(model: ResponseModel) -> BoolArray:

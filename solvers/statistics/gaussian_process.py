@@ -33,7 +33,6 @@ from pinnray.solvers.solver import (
     silent,
 )
 from pinnray.solvers.statistics.kernel_field import (
-    Kernel,
     MarkerPrediction,
     correlation,
     derivative_by_log_length,
@@ -57,14 +56,13 @@ START, RANGES = (10.0, 30.0), ((1e-4, 1e6), (1.0, 1000.0))
 
 @dataclass(frozen=True)
 class GaussianProcessSolver(FieldSettings):
-    """u and v as independent processes of mean zero with one of Matérn's kernels.
+    """u and v as independent processes of mean zero with a kernel of Matérn.
 
     Length and variance of each kernel maximise the marginal likelihood, also of the markers that remain when
     one is left out.
     """
 
     clamp: bool = False  # Whether the process is conditioned on a base at rest, a stronger null model
-    kernel: Kernel = "matern52"  # "matern32", "matern52" or "gaussian" (squared exponential)
     name = "gp"
     family = "statistics"
     laws = ("linear",)
@@ -110,7 +108,6 @@ class GaussianProcessSolver(FieldSettings):
                 shapes=np.zeros((0, count + len(base), 2)),
                 load=np.zeros(0),
                 load_deviation=0.0,
-                kernel=self.kernel,
             )
             return _fit(data)
 
@@ -166,8 +163,8 @@ def _most_likely(data: StatFemData, axis: int) -> FloatArray:
 
     def minus_log_likelihood(logarithms: FloatArray) -> tuple[float, FloatArray]:
         variance, length = np.exp(logarithms)
-        process = variance * correlation(data.points, data.points, length, data.kernel)
-        by_length = variance * derivative_by_log_length(data.points, data.points, length, data.kernel)
+        process = variance * correlation(data.points, data.points, length)
+        by_length = variance * derivative_by_log_length(data.points, data.points, length)
         try:
             cholesky = np.linalg.cholesky(process + noise)
         except np.linalg.LinAlgError:  # rounding: markers that all but coincide, nearly without noise

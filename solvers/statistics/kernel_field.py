@@ -1,5 +1,7 @@
 """Displacement fields as sums of Matérn kernels, the posterior means of Gaussian processes; markers left out.
 
+The kernel k = (1 + r + r²/3) exp(-r), r = √5 |x - x'| / length, is of processes with two derivatives.
+
 Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, equations
 4.9, 4.16 and 4.17.
 """
@@ -7,7 +9,6 @@ Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learn
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -19,10 +20,6 @@ from pinnray.solvers.solution import Solution
 MarkerPrediction = tuple[FloatArray, FloatArray]
 """Mean and standard deviation of an observation, each of shape (2,), mm."""
 
-Kernel = Literal["matern32", "matern52", "gaussian"]
-SMOOTHNESS: dict[Kernel, float] = {"matern32": 1.5, "matern52": 2.5, "gaussian": np.inf}
-"""Smoothness ν: a process has as many derivatives as there are whole numbers below it."""
-
 
 @dataclass(frozen=True, eq=False)
 class KernelField:
@@ -31,53 +28,41 @@ class KernelField:
     centres: FloatArray  # x_i, shape (m, 2), mm
     coefficients: FloatArray  # c_i, shape (m, 2), mm
     lengths: FloatArray  # Lengths of k for u and v, shape (2,), mm
-    kernel: Kernel  # Covariance function k
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        kernels = [correlation(location.points, self.centres, length, self.kernel) for length in self.lengths]
+        kernels = [correlation(location.points, self.centres, length) for length in self.lengths]
         return np.asarray((np.stack(kernels, axis=-1) * self.coefficients).sum(axis=1))
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        derivatives = [
-            _derivative_factor(location.points, self.centres, length, self.kernel) for length in self.lengths
-        ]
+        derivatives = [_derivative_factor(location.points, self.centres, length) for length in self.lengths]
         weighted = np.stack(derivatives, axis=-1) * self.coefficients
         offset = self.centres - location.points[:, None]
         return np.asarray(np.einsum("nmc,nmx->ncx", weighted, offset))
 
 
-def correlation(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+def correlation(points: FloatArray, others: FloatArray, length: float) -> FloatArray:
     """The kernel between points (n, 2) and others (m, 2), mm: shape (n, m); 1 at distance zero."""
-    distance = _distance(points, others, length, kernel)
-    if kernel == "gaussian":
-        return np.asarray(np.exp(-(distance**2) / 2))
-    series = 1 + distance if kernel == "matern32" else 1 + distance + distance**2 / 3
-    return np.asarray(series * np.exp(-distance))
+    distance = _distance(points, others, length)
+    return np.asarray((1 + distance + distance**2 / 3) * np.exp(-distance))
 
 
-def derivative_by_log_length(
-    points: FloatArray, others: FloatArray, length: float, kernel: Kernel
-) -> FloatArray:
+def derivative_by_log_length(points: FloatArray, others: FloatArray, length: float) -> FloatArray:
     """Derivative of `correlation` by the length's logarithm, shape (n, m): -r dk/dr at a distance r."""
     squares = ((points[:, None] - others) ** 2).sum(axis=2)
-    return np.asarray(squares * _derivative_factor(points, others, length, kernel))
+    return np.asarray(squares * _derivative_factor(points, others, length))
 
 
-def _derivative_factor(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+def _derivative_factor(points: FloatArray, others: FloatArray, length: float) -> FloatArray:
     """Factor f in the gradient of k at the points, ∇k = f (others - points), shape (n, m), 1/mm²."""
-    distance = _distance(points, others, length, kernel)
-    if kernel == "gaussian":
-        return np.asarray(np.exp(-(distance**2) / 2) / length**2)
-    series = 3 if kernel == "matern32" else 5 / 3 * (1 + distance)
-    return np.asarray(series * np.exp(-distance) / length**2)
+    distance = _distance(points, others, length)
+    return np.asarray(5 / 3 * (1 + distance) * np.exp(-distance) / length**2)
 
 
-def _distance(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
-    """√(2 ν) |x - x'| / length, and |x - x'| / length for the limit of large ν: shape (n, m)."""
-    scale = 1.0 if kernel == "gaussian" else np.sqrt(2 * SMOOTHNESS[kernel])
-    return np.asarray(np.linalg.norm(points[:, None] - others, axis=2) * scale / length)
+def _distance(points: FloatArray, others: FloatArray, length: float) -> FloatArray:
+    """√5 |x - x'| / length: shape (n, m)."""
+    return np.asarray(np.linalg.norm(points[:, None] - others, axis=2) * np.sqrt(5.0) / length)
 
 
 def with_markers_left_out(

@@ -5,7 +5,7 @@ factor ρ, a discrepancy δ and the error e of the observations. Random, and nor
 
 - the prescribed displacement of the contact, about its nominal value, each component with the standard
   deviation `stroke_deviation`; as the problem is linear, u is a sum of one field for each component;
-- δ, a process of mean zero with one of Matérn's kernels, one length, an amplitude each for u and v;
+- δ, a process of mean zero with a kernel of Matérn, one length, an amplitude each for u and v;
 - e, with the observations' standard deviations.
 
 ρ, the amplitudes and the length maximise the marginal likelihood. The displacement returned is the posterior
@@ -39,7 +39,7 @@ from pinnray.solvers.lagrange import LagrangeField
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import Solution, Status, Uncertainty
 from pinnray.solvers.solver import Cost, ElementSettings, NoSolutionError, Progress, check_problem, silent
-from pinnray.solvers.statistics.kernel_field import Kernel, MarkerPrediction, with_markers_left_out
+from pinnray.solvers.statistics.kernel_field import MarkerPrediction, with_markers_left_out
 from pinnray.solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField, predicted
 
 TANGENT_STEP = 0.1
@@ -51,7 +51,6 @@ class StatFemSolver(ElementSettings):
     """Finite elements with an uncertain load and a discrepancy, conditioned on the markers."""
 
     stroke_deviation: float = 0.5  # Standard deviation of each prescribed displacement, mm
-    kernel: Kernel = "matern52"  # Covariance function of the discrepancy, as of `gp`
     name = "statfem"
     family = "statistics"
     laws = (*FemSolver.laws, *FemNonlinearSolver.laws)
@@ -159,7 +158,6 @@ class StatFemSolver(ElementSettings):
             shapes=np.stack([shape.displacement(location) for shape in shapes]),
             load=problem.load.values,
             load_deviation=self.stroke_deviation,
-            kernel=self.kernel,
         )
 
     def _conditioned(

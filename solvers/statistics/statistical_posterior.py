@@ -19,7 +19,6 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.pictures import FreePictures
 from pinnray.solvers.solution import DisplacementField
 from pinnray.solvers.statistics.kernel_field import (
-    Kernel,
     KernelField,
     MarkerPrediction,
     correlation,
@@ -44,7 +43,6 @@ class StatFemData:
     shapes: FloatArray
     load: FloatArray  # Nominal displacements of the contact, shape (k,), mm
     load_deviation: float  # Their standard deviation, mm
-    kernel: Kernel  # Covariance function of δ
 
     def without(self, marker: int) -> "StatFemData":
         """The other markers' data."""
@@ -120,7 +118,7 @@ class Posterior:
     def discrepancy(self) -> KernelField:
         """Posterior mean of δ."""
         coefficients = self.constants.amplitudes**2 * self.coefficients
-        return KernelField(self.data.points, coefficients, self.constants.lengths, self.data.kernel)
+        return KernelField(self.data.points, coefficients, self.constants.lengths)
 
     def at(
         self, points: FloatArray, shapes: FloatArray, frames: FloatArray | None = None
@@ -213,8 +211,7 @@ def minus_log_likelihood(data: StatFemData, parameters: FloatArray) -> tuple[flo
     mean = factor * np.einsum("k,kgc,gc->", data.load, data.shapes, coefficients.reshape(count, 2))
     alike = np.einsum("gchc->cgh", by_covariance) * amplitudes[:, None, None] ** 2
     kernel, longer = (
-        find(data.points, data.points, length, data.kernel)
-        for find in (correlation, derivative_by_log_length)
+        find(data.points, data.points, length) for find in (correlation, derivative_by_log_length)
     )
     by_amplitudes = (alike * kernel).sum(axis=(1, 2))
     return value, np.array([2 * by_load - mean, *(2 * by_amplitudes), (alike * longer).sum()])
@@ -245,7 +242,7 @@ def _covariance(
 ) -> FloatArray:
     """Prior covariance of ρ u + δ between n points and the markers, mm²: (2 n, 2 m), u and v by turns."""
     by_load = np.einsum("knc,kgd->ncgd", shapes, data.shapes) * (constants.factor * data.load_deviation) ** 2
-    kernels = {length: correlation(points, data.points, length, data.kernel) for length in constants.lengths}
+    kernels = {length: correlation(points, data.points, length) for length in constants.lengths}
     kernel = np.stack([kernels[length] for length in constants.lengths])
     discrepancy = np.einsum("cng,cd->ncgd", kernel, np.diag(constants.amplitudes**2))
     return np.asarray((by_load + discrepancy).reshape(2 * len(points), 2 * len(data.points)))

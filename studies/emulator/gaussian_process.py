@@ -12,7 +12,7 @@ Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learn
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.linalg import cholesky, lapack, solve_triangular
@@ -65,16 +65,16 @@ class GaussianProcess:
             learners: Samples from which the lengths are learnt.
             quick: Whether the intervals of few samples may be too narrow.
         """
+        from sklearn.gaussian_process.kernels import RBF
+
         mean, spread = float(values.mean()), float(values.std()) or 1.0
         scaled = (values - mean) / spread
-        signal, lengths, noise = _learnt(inputs[:learners], scaled[:learners])
-        noise = noise / signal
+        start = RBF(np.full(inputs.shape[1], 3.0), (0.05, 1e3))
+        lengths, noise = likeliest(inputs[:learners], scaled[:learners], start)
         near = inputs / lengths
         covariance = _kernel(near, near, (near**2).sum(axis=1))
         covariance[np.diag_indices_from(covariance)] += noise
-        factor = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
-        half = solve_triangular(factor, scaled, lower=True, check_finite=False)
-        weights = solve_triangular(factor, half, lower=True, trans=1, check_finite=False)
+        factor, weights = conditioned(covariance, scaled)
         count = min(LANDMARKS, len(inputs) // 2)
         inner = np.linalg.inv(factor[:count, :count])
         if folded := len(inputs) < FEW and not quick:
@@ -83,8 +83,7 @@ class GaussianProcess:
         if folded:
             ratios = cls._left_out(inputs, values) / made.deviation(inputs)
         else:
-            inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
-            residuals = np.abs(weights / np.diag(inverse))
+            residuals = np.abs(left_out(factor, weights))
             ratios = residuals[count:] * spread / made.deviation(inputs[count:])
         ratios = np.sort(ratios)
         rank = min(int(np.ceil(LEVEL * (len(ratios) + 1))), len(ratios)) - 1
@@ -122,19 +121,38 @@ class GaussianProcess:
         return np.asarray(self.numbers[1] * np.sqrt(np.maximum(1 - known, 0) + self.numbers[2]))
 
 
-def _learnt(inputs: FloatArray, values: FloatArray) -> tuple[float, FloatArray, float]:
-    """Variance, length of every input and variance of the noise, of the largest likelihood."""
+def likeliest(inputs: FloatArray, values: FloatArray, kernel: Any) -> tuple[FloatArray, float]:
+    """Length of every input, and the noise's variance over the signal's, of the largest likelihood.
+
+    Args:
+        inputs: Shape (n, d).
+        values: Of standard deviation one, shape (n,).
+        kernel: Of scikit-learn, with the lengths from which the search starts.
+    """
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+    from sklearn.gaussian_process.kernels import ConstantKernel, WhiteKernel
 
-    kernel = ConstantKernel(10.0, (1e-2, 1e5)) * RBF(np.full(inputs.shape[1], 3.0), (0.05, 1e3))
-    process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-10, 10.0)))
+    whole = ConstantKernel(10.0, (1e-2, 1e5)) * kernel + WhiteKernel(1e-4, (1e-10, 10.0))
+    process = GaussianProcessRegressor(whole)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # that a length is at its bound
         process.fit(inputs, values)
-    found = np.exp(process.kernel_.theta)
-    return float(found[0]), found[1:-1], float(found[-1])
+    signal, *lengths, noise = np.exp(process.kernel_.theta)
+    return np.array(lengths), float(noise / signal)
+
+
+def conditioned(covariance: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Cholesky factor of a covariance, which is overwritten, and the weights of the values."""
+    factor = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
+    half = solve_triangular(factor, values, lower=True, check_finite=False)
+    return factor, solve_triangular(factor, half, lower=True, trans=1, check_finite=False)
+
+
+def left_out(factor: FloatArray, weights: FloatArray) -> FloatArray:
+    """Errors of the values, each predicted from all others; the factor is overwritten."""
+    inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
+    return np.asarray(weights / np.diag(inverse))
 
 
 def _kernel(first: FloatArray, second: FloatArray, squares: FloatArray) -> FloatArray:

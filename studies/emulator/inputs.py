@@ -79,6 +79,20 @@ class Inputs:
             for name, text in named
         }
 
+    def finger(self, settings: Mapping[str, str], where: str = "") -> dict[str, Value]:
+        """A finger from texts that can be predicted.
+
+        Raises:
+            UserError: If it cannot; the message begins with `where`.
+        """
+        try:
+            finger = self.read(settings)
+            if fault := self.fault(finger):
+                raise UserError(fault)
+        except UserError as error:
+            raise UserError(f"{where}{error}") from None
+        return finger
+
     def fault(self, finger: Mapping[str, Value]) -> str | None:
         """The reason why a finger cannot be predicted, or None."""
         varied = self.study.varied

@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import to_hex
 
+from pinnray.comparison.report.page_body import packed_body
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters
-from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime import html
 from pinnray.runtime.arrays import FloatArray
@@ -22,9 +20,6 @@ from pinnray.studies.fields.emulator import FieldEmulator
 from pinnray.studies.fields.gaussian_processes import Block
 from pinnray.studies.fields.reader import FIGURES
 from pinnray.studies.sweep.study import PHYSICS, Range, Value, unit_of
-
-COLOURS = 32
-"""Colours of the stress."""
 
 STEP = 2e-5
 """Least steps of displacements and places of nodes in the page, mm: over half an element, a thousandth of a
@@ -81,7 +76,6 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
     unit = material.model_copy(update={"young": 1.0}).lame
     shape = emulator.inputs.parameters(middle)
     lower = np.tril_indices(emulator.field.landmarks)
-    colours = mpl.colormaps["viridis"](np.linspace(0, 1, COLOURS))
     return {
         "name": study.name,
         "design": study.design,
@@ -114,12 +108,10 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
             }
             for name in FIGURES
         ],
-        "colours": [to_hex(each) for each in colours],
         "colourStress": float(LARGEST * emulator.scales[-1, 1 + FIGURES.index("von_mises")]),
         "thickness": reader.thickness,
         "contactWidth": reader.contact_width,
-        "outlines": [path.tolist() for path in edge_paths(mesh.boundary_edges)],
-        "points": packed.add(mesh.points.astype("<f8")),
+        **packed_body(mesh, packed),
         "cells": packed.add(LagrangeSpace(mesh, 2).cell_nodes.astype("<u4")),
         "front": packed.add(reader.front.astype("<u4")),
         "base": packed.add(np.unique(mesh.boundary("base")).astype("<u4")),

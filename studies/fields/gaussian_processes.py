@@ -5,15 +5,14 @@ a kink. Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machi
 eq. 4.17, algorithm 2.1, eq. 5.12 (leave-one-out).
 """
 
-import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 
 from pinnray.runtime.arrays import FloatArray
+from pinnray.studies.emulator.gaussian_process import conditioned, left_out, likeliest
 from pinnray.studies.fields.reduction import Modes
 
 WATCHED = 12
@@ -47,18 +46,20 @@ class Block:
     @classmethod
     def fitted(cls, inputs: FloatArray, modes: Modes, coefficients: FloatArray) -> Self:
         """The block of samples whose coefficients (n, r) are known."""
+        from sklearn.gaussian_process.kernels import Matern
+
         count = min(len(inputs) // 2, LANDMARKS)
         squares = (inputs[:, None] - inputs) ** 2
         rates, weights, numbers = [], [], []
         factors: list[FloatArray] = []
+        start = Matern(np.full(inputs.shape[1], 2.0), (0.05, 1e3), nu=2.5)
         for column in coefficients.T:
             mean, spread = float(column.mean()), float(column.std()) or 1.0
-            rate, noise = _learnt(inputs, (column - mean) / spread)
-            covariance = matern(squares @ rate) + noise * np.eye(len(inputs))
-            factor = cholesky(covariance, lower=True)
-            half = solve_triangular(factor, column - mean, lower=True)
+            lengths, noise = likeliest(inputs, (column - mean) / spread, start)
+            rate = 1 / lengths**2
+            factor, weight = conditioned(matern(squares @ rate) + noise * np.eye(len(inputs)), column - mean)
             rates.append(rate)
-            weights.append(solve_triangular(factor, half, lower=True, trans=1))
+            weights.append(weight)
             numbers.append((mean, spread, noise))
             if len(factors) < WATCHED:
                 factors.append(np.linalg.inv(factor[:count, :count]))
@@ -97,7 +98,8 @@ class Block:
         errors = np.empty_like(self.weights)
         for mode, rates in enumerate(self.rates):
             covariance = matern(squares @ rates) + self.numbers[2, mode] * np.eye(len(squares))
-            errors[:, mode] = self.weights[:, mode] / np.diag(np.linalg.inv(covariance))
+            factor, _ = conditioned(covariance, self.weights[:, mode])
+            errors[:, mode] = left_out(factor, self.weights[:, mode])
         return errors
 
 
@@ -105,19 +107,3 @@ def matern(squares: FloatArray) -> FloatArray:
     """The kernel of squared distances over the lengths."""
     away = np.sqrt(5 * squares)
     return np.asarray((1 + away + away**2 / 3) * np.exp(-away))
-
-
-def _learnt(inputs: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
-    """Inverse squared length of every input and the noise's variance over the signal's, most likely ones."""
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-
-    lengths = Matern(np.full(inputs.shape[1], 2.0), (0.05, 1e3), nu=2.5)
-    kernel = ConstantKernel(10.0, (1e-2, 1e5)) * lengths + WhiteKernel(1e-4, (1e-10, 10.0))
-    process = GaussianProcessRegressor(kernel)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # that a length is at its bound
-        process.fit(inputs, values)
-    found = np.exp(process.kernel_.theta)
-    return 1 / found[1:-1] ** 2, float(found[-1] / found[0])

@@ -1,19 +1,17 @@
 """The page of a search: the front, its fingers, and a design file for each."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.drawing.drawn_finger import finger_from
 from pinnray.runtime.atomic import write_text
 from pinnray.runtime.html import write_html
 from pinnray.runtime.tables import TextTable
 from pinnray.solvers.finger_figures import QUANTITIES, heading
-from pinnray.solvers.problem import Problem
-from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import solved, with_law
 from pinnray.studies.optimum.designs import COMMAND, write_designs
@@ -21,10 +19,8 @@ from pinnray.studies.optimum.pictures import draw_front, draw_front_fingers, dra
 from pinnray.studies.optimum.question import Question
 from pinnray.studies.optimum.search import Optimum
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.page import slow_sentence
-from pinnray.studies.sweep.study import physics_of, title, unit_of
-from pinnray.studies.sweep.sweep import Sweep
-from pinnray.studies.sweep.tables import failure_grid
+from pinnray.studies.sweep.study import title, unit_of
+from pinnray.studies.sweep.tables import failure_grid, sample_table
 
 PAGE = "front.html"
 
@@ -70,14 +66,13 @@ def write_front(
     Returns:
         Page, table and pictures, and a design file for each run on the front.
     """
-    tasks = {run: job.task(run, optimum.fingers[run]) for run in optimum.front}
+    tasks = {run: job.task(run, optimum.samples[run]) for run in optimum.front}
     designs = [
         write_designs(job, task, folder / "front" / f"{place:02d}.toml", command)
         for place, task in enumerate(tasks.values(), start=1)
     ]
-    grid = front_grid(optimum)
-    lines = [",".join(grid.headings), *(",".join(row) for row in grid.rows)]
-    write_text(folder / "front.csv", "\n".join(lines) + "\n")
+    table = front_table(optimum).to_csv(index=False, lineterminator="\n", float_format="%.6g")
+    write_text(folder / "front.csv", table)
     shown = spread(optimum)
     solutions = {run: _solved(tasks[run]) for run in shown}
     drawn = {
@@ -93,7 +88,7 @@ def write_front(
     page = write_html(
         folder / PAGE,
         "designs.html.j2",
-        title=f"Front of {optimum.question.name}",
+        title=f"Front of {optimum.study.name}",
         sentences=front_sentences(
             optimum, min(task.definition.get("tip_radius", SHARP) for task in tasks.values()), command
         ),
@@ -112,7 +107,7 @@ def front_sentences(optimum: Optimum, sharpest: float = SHARP, command: str = CO
         sharpest: Least radius of the tips on the front, mm.
         command: That solves the problem in a file, `{}`.
     """
-    question = optimum.question
+    question = optimum.study
     senses = " and ".join(f"{sense} {name}" for name, sense in question.objectives.items())
     limits = []
     for name, limit in question.constraints.items():
@@ -129,39 +124,21 @@ def front_sentences(optimum: Optimum, sharpest: float = SHARP, command: str = CO
         f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are on the "
         f"front: none of them is beaten in every objective by another run.{itself} "
         "An emulator proposed fingers; all numbers here are the solver's.",
-        *steps_sentence(optimum),
         *ends_sentence(optimum),
         *tip_sentence(sharpest),
-        *slow_sentence(as_sweep(optimum)),
         "front/01.toml is the shape of the first finger of the table, for `pinnray design`. "
         f"`{command.format('problems/01.toml')}` solves it with load, material and solver of this search.",
-    ]
-
-
-def steps_sentence(optimum: Optimum) -> list[str]:
-    """What the steps along derivatives gained, in a sentence; nothing where there are none."""
-    runs = optimum.question.runs
-    steps = len(optimum.measurements) - runs
-    if not optimum.question.steps:
-        return []
-    if not steps:
-        return ["No step along the derivatives would gain: the front is as good as they can tell."]
-    better = sum(run >= runs for run in optimum.front)
-    gain = optimum.volumes[-1] / optimum.volumes[runs - 1] - 1
-    return [
-        f"{steps} of the runs are a step along exact derivatives from fingers of the front; {better} of them "
-        f"are on it, and the hypervolume is {100 * gain:.2g} % larger by them."
     ]
 
 
 def ends_sentence(optimum: Optimum) -> list[str]:
     """Which parameters of the front's fingers are at ends of their ranges, in a sentence; else nothing."""
     count, found = len(optimum.front), []
-    for name, values in optimum.question.varied.items():
+    for name, values in optimum.study.varied.items():
         if values.values is not None:
             continue
         low, high = values.ends
-        places = [(float(optimum.fingers[run][name]) - low) / (high - low) for run in optimum.front]
+        places = [(float(optimum.samples[run][name]) - low) / (high - low) for run in optimum.front]
         lower = sum(place <= AT_AN_END for place in places)
         upper = sum(place >= 1 - AT_AN_END for place in places)
         if lower + upper >= MOST_AT_ENDS * count:
@@ -186,45 +163,32 @@ def tip_sentence(radius: float) -> list[str]:
     ]
 
 
-def front_grid(optimum: Optimum) -> TextTable:
-    """A row for each run on the front: parameters and quantities."""
-    varied, first = list(optimum.question.varied), optimum.question.names
+def front_table(optimum: Optimum) -> pd.DataFrame:
+    """The samples on the front in its order: quantities of the question, parameters, other quantities."""
+    first, varied = optimum.study.names, optimum.study.varied
     others = [name for name in QUANTITIES if name not in first]
-    rows: list[tuple[str, ...]] = []
-    for place, run in enumerate(optimum.front, start=1):
-        finger, values = optimum.fingers[run], optimum.measurements[run].values
-        numbers = [
-            *(values[name] for name in first),
-            *(finger[name] for name in varied),
-            *(values[name] for name in others),
-        ]
-        texts = (f"{value:.6g}" if isinstance(value, float) else str(value) for value in numbers)
-        rows.append((str(place), str(run), *texts))
-    headings = ("finger", "run", *map(heading, first), *map(title, varied), *map(heading, others))
-    return TextTable("Fingers on the front", headings, rows)
+    table = sample_table(optimum).set_index("sample").loc[optimum.front].rename_axis("run")
+    table = table[[*map(heading, first), *map(title, varied), *map(heading, others)]].reset_index()
+    table.insert(0, "finger", range(1, len(table) + 1))
+    return table
+
+
+def text_table(title: str, table: pd.DataFrame) -> TextTable:
+    """A table of numbers with four digits."""
+    rows = [[f"{each:.4g}" if isinstance(each, float) else str(each) for each in row] for row in table.values]
+    return TextTable(title, list(table.columns), rows)
 
 
 def page_tables(optimum: Optimum) -> list[TextTable]:
-    """The columns of `front_grid` in two tables, narrow enough for a page, and runs without a result."""
-    grid = front_grid(optimum)
-    split = 2 + len(optimum.question.names) + len(optimum.question.varied)
-    parts = (range(split), (0, *range(split, len(grid.headings))))
-    titles = (grid.title, "Their other quantities")
-    failures = failure_grid(as_sweep(optimum))
-    tables = [
-        TextTable(
-            title,
-            tuple(_in_lines(grid.headings[column]) for column in part),
-            [tuple(_short(row[column]) for column in part) for row in grid.rows],
-        )
-        for title, part in zip(titles, parts, strict=True)
+    """The front in two tables, narrow enough for a page, and runs without a result."""
+    table = front_table(optimum).rename(columns=_in_lines)
+    split = 2 + len(optimum.study.names) + len(optimum.study.varied)
+    found = [
+        text_table("Fingers on the front", table.iloc[:, :split]),
+        text_table("Their other quantities", table.iloc[:, [0, *range(split, len(table.columns))]]),
     ]
-    return [*tables, *([failures] if failures.rows else [])]
-
-
-def as_sweep(optimum: Optimum) -> Sweep:
-    """The runs of a search as the samples of a sweep."""
-    return Sweep(optimum.question, optimum.fingers, optimum.measurements)
+    failures = failure_grid(optimum)
+    return [*found, *([failures] if failures.rows else [])]
 
 
 def _in_lines(heading: str) -> str:
@@ -232,19 +196,11 @@ def _in_lines(heading: str) -> str:
     return heading.replace("mm_per_N", "mm/N").replace("_", "\n")
 
 
-def _short(text: str) -> str:
-    """A number with four digits, as far as it has more."""
-    try:
-        return text if text.isdigit() else f"{float(text):.4g}"
-    except ValueError:
-        return text
-
-
 def spread(optimum: Optimum, count: int = DRAWN) -> list[int]:
     """Runs on the front at about equal distances along it, both ends among them."""
     if len(optimum.front) <= count:
         return optimum.front
-    costs = np.array([optimum.question.costs(optimum.measurements[run].values) for run in optimum.front])
+    costs = np.array([optimum.study.costs(optimum.measurements[run].values) for run in optimum.front])
     steps = np.linalg.norm(np.diff(costs / np.ptp(costs, axis=0), axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     places = [int(np.abs(along - at).argmin()) for at in np.linspace(0, along[-1], count)]
@@ -253,8 +209,5 @@ def spread(optimum: Optimum, count: int = DRAWN) -> list[int]:
 
 def _solved(task: Task) -> Solution:
     """The solution of a task once more, for its picture."""
-    finger = finger_from(task.definition)
-    mesh = finger_mesh(finger, settings=task.mesh)
-    solver = make_solver(task.solver, **task.settings)
-    material, load = physics_of(task.physics)
-    return solved(solver, Problem(mesh, with_law(material, solver), load, finger=finger))
+    solver, problem = task.problem()
+    return solved(solver, replace(problem, material=with_law(problem.material, solver)))

@@ -19,16 +19,16 @@ BLUE = "#0072b2"
 
 def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
     """Draw the first two objectives of every run; those on the front are filled, the shown ones numbered."""
-    first, second, *third = optimum.question.objectives
+    first, second, *third = optimum.study.objectives
     with figure(3.9) as drawn:
-        senses = ", ".join(f"{sense} {name}" for name, sense in optimum.question.objectives.items())
-        solver = optimum.question.solver
+        senses = ", ".join(f"{sense} {name}" for name, sense in optimum.study.objectives.items())
+        solver = optimum.study.solver
         rest = f"the third objective, {third[0]}, is not drawn" if third else "every point is a run"
         note = f"{len(optimum.measurements)} runs of {solver}; {rest}"
         write_heading(drawn, f"Pareto front: {senses}", note)
         axes = axes_at(drawn, (0.7, 0.55, WIDTH - 0.9, 2.75))
         others = [each for each in optimum.measurements if each.number not in optimum.front and each.values]
-        allowed = np.array([is_allowed(optimum.question, each) for each in others], dtype=bool)
+        allowed = np.array([is_allowed(optimum.study, each) for each in others], dtype=bool)
         points = np.array([[each.values[name] for name in (first, second)] for each in others]).reshape(-1, 2)
         axes.plot(*points[allowed].T, "o", ms=3.5, mfc="none", c=MUTED, label="other runs")
         if not allowed.all():
@@ -55,7 +55,7 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
 
 def draw_growth(optimum: Optimum) -> Figure:
     """Draw the hypervolume over the number of runs."""
-    start = optimum.question.samples or 0
+    start = optimum.study.samples or 0
     with figure(2.4) as drawn:
         write_heading(
             drawn, "Hypervolume over the runs", f"the first {start} runs are samples, then come proposals"
@@ -104,9 +104,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
             axes.set_axis_off()
             values = optimum.measurements[run].values
-            text = ", ".join(
-                f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.question.objectives
-            )
+            text = ", ".join(f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.objectives)
             number = axes.annotate(
                 str(optimum.place(run)),
                 (0, 1.03),

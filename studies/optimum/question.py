@@ -51,14 +51,12 @@ class Question(Study):
     Attributes:
         objectives: Two or three quantities, each to be the least or the largest.
         constraints: Limits of quantities.
-        runs: Number of runs of the solver, without the next.
-        steps: Fingers of the front, at most, from which a step along exact derivatives is run at the end.
+        runs: Number of runs of the solver.
     """
 
     objectives: dict[str, Sense] = Field(min_length=2, max_length=3)
     constraints: dict[str, Limit] = Field(default_factory=dict)
     runs: int = bounded(120, FEWEST, 100_000, "", "", "Number of runs of the solver")
-    steps: int = bounded(0, 0, 1000, "", "", "Steps along derivatives at the end")
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -67,9 +65,6 @@ class Question(Study):
                 raise ValueError(f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}")
         if "section" in {*self.fixed, *self.varied}:
             raise ValueError("a drawing has no parameters to optimise; give a design")
-        known = self.solver in ("fem", "fem-nonlinear") and not self.fixed.get("friction", 0)
-        if self.steps and not known:
-            raise ValueError("steps: derivatives are of fem or fem-nonlinear, without friction")
         return self
 
     @property
@@ -113,7 +108,7 @@ def question_of(given: Mapping[str, Any]) -> Question:
     """
     content = dict(given)
     own: dict[str, Any] = {
-        name: content.pop(name) for name in ("objectives", "constraints", "runs", "steps") if name in content
+        name: content.pop(name) for name in ("objectives", "constraints", "runs") if name in content
     }
     if said := [name for name in ("sampling", "samples") if name in content]:
         raise UserError(f"{said[0]} belongs to a study; the search chooses its samples: give runs")

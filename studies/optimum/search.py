@@ -18,7 +18,6 @@ from pinnray.runtime.stages import Stages
 from pinnray.studies.emulator.emulator import fitted_emulator
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.optimum.front import hypervolume, reference_point, unbeaten
-from pinnray.studies.optimum.gradient_step import stepped
 from pinnray.studies.optimum.question import ENOUGH, Question
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement
@@ -38,24 +37,18 @@ CANDIDATES = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Optimum:
-    """All runs of a search, and those on the front.
+class Optimum(Sweep):
+    """All runs of a search as the samples of a sweep, and those on the front.
 
     Attributes:
-        question: The question.
-        fingers: Of the runs.
-        measurements: Their results, in the same order.
+        study: The question.
         front: Numbers of the runs on the Pareto front, ordered by the first objective.
         volumes: Hypervolume after each run, shape (n,), in the product of the objectives' units.
-        reference: Point from which it counts, as values of the objectives.
     """
 
-    question: Question
-    fingers: list[dict[str, Value]]
-    measurements: list[Measurement]
+    study: Question
     front: list[int]
     volumes: FloatArray
-    reference: dict[str, float]
 
     __repr__ = brief
 
@@ -80,7 +73,6 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
         "objectives": dict(question.objectives),
         "constraints": {name: limit.model_dump() for name, limit in question.constraints.items()},
         "runs": question.runs,
-        **({"steps": question.steps} if question.steps else {}),
     }
     check_resumable_folder(job.out / QUESTION_FILE, definition, job="search", free={"study.name"})
     job.out.mkdir(parents=True, exist_ok=True)
@@ -103,13 +95,7 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
                 finish(tasks, journal, workers, progress)
             done = len(fingers)
             if done >= question.runs:
-                found = _optimum(question, fingers, journal)
-                more = [] if done > question.runs else _steps(job, found, stages)
-                if not more:
-                    return found
-                fingers = fingers + more
-                _keep_fingers(job.out / FINGERS_FILE, fingers)
-                continue
+                return _optimum(question, fingers, journal)
             count = min(-(-(question.runs - start) // ROUNDS), question.runs - done)
             with stages.stage(f"proposals after {done}") as progress:
                 progress(0.0, "the emulator is fitted and searched")
@@ -166,22 +152,6 @@ def _proposed(
     return found + more[: count - len(found)]
 
 
-def _steps(job: StudyJob[Question], found: Optimum, stages: Stages) -> list[dict[str, Value]]:
-    """Fingers a step along the derivatives from some of the front, evenly chosen."""
-    count = min(job.study.steps, len(found.front))
-    if not count:
-        return []
-    chosen = np.unique(np.linspace(0, len(found.front) - 1, count).round().astype(int))
-    more = []
-    with stages.stage("derivatives") as progress:
-        for number, place in enumerate(chosen):
-            run = found.front[place]
-            progress(number / len(chosen), f"of finger {place + 1} of the front")
-            if (finger := stepped(job, found.fingers[run], found.measurements[run])) is not None:
-                more.append(finger)
-    return more
-
-
 def is_allowed(question: Question, run: Measurement) -> bool:
     """Whether a run has converged, obeys the constraints and is of a finger that can be so deformed."""
     return run.state == "done" and not run.through_itself and question.allows(run.values)
@@ -214,9 +184,7 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
         hypervolume(costs[[each.number <= number for each in allowed]], reference)
         for number in range(len(measured))
     ]
-    signs = [1.0 if sense == "least" else -1.0 for sense in question.objectives.values()]
-    point = dict(zip(question.objectives, map(float, reference * signs), strict=True))
-    return Optimum(question, fingers, measured, on_front, np.array(volumes), point)
+    return Optimum(question, fingers, measured, on_front, np.array(volumes))
 
 
 def _known_fingers(file: Path) -> list[dict[str, Value]]:

@@ -8,8 +8,9 @@ from math import floor
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from pinnray.geometry.cache import drawn_finger
+from pinnray.geometry.cache import drawn_finger, finger_mesh
 from pinnray.geometry.drawing.description import description_beside, load_description
+from pinnray.geometry.drawing.drawn_finger import finger_from
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import Parameters, parameter_info
@@ -18,7 +19,10 @@ from pinnray.geometry.finger.rules import markers_apart, markers_fit
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.content_hash import sources_digest
 from pinnray.runtime.machine import package_versions
-from pinnray.solvers.solver import check_load
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solver import Solver, check_load
+from pinnray.studies.sweep.field_path import moved_mesh, stepping
 from pinnray.studies.sweep.study import PHYSICS, Study, Value, physics_of
 
 LEAST_MARKERS = {name: float(parameter_info(name, "low")) for name in ("marker_diameter", "marker_height")}
@@ -62,6 +66,23 @@ class Task:
     time_limit: float | None = None
     fields: FieldOrder | None = None
 
+    def problem(self) -> tuple[Solver, Problem]:
+        """The solver and its problem, on a mesh that moves with the finger where its field is kept.
+
+        Raises:
+            UserError: If they cannot be made, or the solver does not take them.
+        """
+        finger = finger_from(self.definition)
+        material, load = physics_of(self.physics)
+        solver: Solver = make_solver(self.solver, **self.settings)
+        if self.fields and isinstance(finger, Design):
+            mesh = moved_mesh(self.fields.base, self.mesh).of(finger)
+            load = load.model_copy(update={"position": finger.contact_abscissa})
+            solver = stepping(solver, self.fields.strokes)
+        else:
+            mesh = finger_mesh(finger, settings=self.mesh, keep=self.checkpoints is not None)
+        return solver, Problem(mesh, material, load, finger=finger)
+
 
 def field_base(study: Study, definition: Mapping[str, Any]) -> dict[str, Any]:
     """The definition of the finger in the middle of a study's ranges, whose mesh follows all others."""
@@ -91,8 +112,6 @@ class StudyJob(Generic[S]):
         processes: Worker processes on this machine.
         scheduler: Address of a Dask scheduler whose workers are used instead.
         finger: The finger from which the samples differ, in place of the study's design.
-        mesh: Element sizes, in place of the study's size.
-        kind: What messages call the job.
     """
 
     study: S
@@ -101,8 +120,6 @@ class StudyJob(Generic[S]):
     processes: int = 1
     scheduler: str | None = None
     finger: Finger | None = None
-    mesh: MeshSettings | None = None
-    kind: str = "sweep"
 
     def task(self, number: int, sample: Mapping[str, Value]) -> Task:
         """The task of a sample.
@@ -125,7 +142,7 @@ class StudyJob(Generic[S]):
         return Task(
             number,
             self._drawing(shape) if "section" in shape else definition,
-            self.mesh or MeshSettings(size=study.mesh_size),
+            MeshSettings(size=study.mesh_size),
             {name: value for name, value in values.items() if name in PHYSICS},
             study.solver,
             {**study.settings, **settings},

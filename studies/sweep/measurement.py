@@ -1,27 +1,22 @@
 """The work of a worker: one sample from its definition to its quantities."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from pinnray.comparison.evaluation.deformed_body import THROUGH_ITSELF, DeformedBody
 from pinnray.comparison.evaluation.plausibility import problem_remarks
-from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.drawing.drawn_finger import finger_from
-from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.rules import broken_rule
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures import FRACTIONS
-from pinnray.solvers.problem import Problem
-from pinnray.solvers.registry import make_solver
-from pinnray.solvers.solver import Solver, TrainedSolver, TrainingContext, TrainingDiverged
-from pinnray.studies.sweep.field_path import FieldPath, moved_mesh, stepping
+from pinnray.solvers.solver import TrainedSolver, TrainingContext, TrainingDiverged
+from pinnray.studies.sweep.field_path import FieldPath
 from pinnray.studies.sweep.job import Task
 from pinnray.studies.sweep.quantities import quantities
-from pinnray.studies.sweep.study import physics_of
 
 OUT_OF_TIME = "stopped at the time limit"
 
@@ -34,18 +29,18 @@ class Measurement:
     """What one sample gave.
 
     Attributes:
-        number: Of the sample.
+        number: Of the sample, or its name.
         state: How it ended.
         message: The solver's sentence, or the reason why there is no result.
         seconds: Time of the worker, meshing included, s.
-        values: The quantities by name; empty if there is no result.
+        values: The quantities by name, ready for JSON; empty if there is no result.
     """
 
-    number: int
+    number: Any
     state: Ending
     message: str
     seconds: float
-    values: dict[str, float] = field(default_factory=dict)
+    values: dict[str, Any] = field(default_factory=dict)
 
     @property
     def through_itself(self) -> bool:
@@ -55,6 +50,11 @@ class Measurement:
 
 class OutOfTime(UserError):
     """The work on a sample takes too long."""
+
+
+def sampled(task: Task, _report: Callable[..., None]) -> list[Measurement]:
+    """The one sample of a task, as a worker answers."""
+    return [measured(task)]
 
 
 def measured(task: Task) -> Measurement:
@@ -76,19 +76,10 @@ def measured(task: Task) -> Measurement:
     try:
         if "section" not in task.definition and (fault := broken_rule(Parameters(**task.definition))):
             return ended("refused", fault)
-        finger = finger_from(task.definition)
-        material, load = physics_of(task.physics)
-        solver: Solver = make_solver(task.solver, **task.settings)
-        if task.fields and isinstance(finger, Design):
-            mesh = moved_mesh(task.fields.base, task.mesh).of(finger)
-            load = load.model_copy(update={"position": finger.contact_abscissa})
-            solver = stepping(solver, task.fields.strokes)
-        else:
-            mesh = finger_mesh(finger, settings=task.mesh, keep=task.checkpoints is not None)
-        problem = Problem(mesh, material, load, finger=finger)
+        solver, problem = task.problem()
         if task.checkpoints and isinstance(solver, TrainedSolver):
             solver = solver.in_context(TrainingContext(task.checkpoints, resume=True))
-        solution, values = quantities(finger, problem, solver, density=task.density, progress=progress)
+        solution, values = quantities(problem, solver, density=task.density, progress=progress)
     except (OutOfTime, TrainingDiverged) as error:
         return ended("not converged", str(error))
     except UserError as error:
@@ -97,7 +88,7 @@ def measured(task: Task) -> Measurement:
         return ended("failed", f"{type(error).__name__}: {error}")
     if task.fields and solution.status.converged:
         FieldPath.of(solution, task.fields.strokes).save(task.fields.file)
-    status, _ = DeformedBody(mesh).status(solution)
+    status, _ = DeformedBody(problem.mesh).status(solution)
     said = "; ".join([status.message, *problem_remarks(problem)])
     if unknown := [name for name, value in values.items() if np.isnan(value) and name not in FRACTIONS]:
         return ended("not converged", f"{', '.join(unknown)} cannot be computed; {said}", values)

@@ -4,20 +4,16 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pinnray.runtime import html
+from pinnray.runtime.figure import Figure
 from pinnray.studies.sweep.job import StudyJob
-from pinnray.studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs, draw_sensitivity
+from pinnray.studies.sweep.pictures import SHOWN, draw_fingers, draw_maps, draw_pairs, draw_sensitivity
 from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
 from pinnray.studies.sweep.study import Study
 from pinnray.studies.sweep.sweep import Sweep
-from pinnray.studies.sweep.tables import failure_grid, quantity_grid
+from pinnray.studies.sweep.tables import failure_grid, known_quantities, quantity_grid
 
 PAGE = "sweep.html"
-
-SLOW, SLOW_S = 10, 10
-"""A finger is told of that takes so many times the median and so many seconds."""
 
 FILES = (
     "samples.parquet and samples.csv (a row for each sample, units in the headings), sweep.json (the study, "
@@ -39,19 +35,21 @@ def write_page(
         record: Start, durations and machine, from `Stages.record`.
         formats: Of the pictures besides PNG.
     """
-    pictures: dict[Path, str] = {}
     found = sensitivities(sweep, SHOWN)
-    if len(sweep.good) > 1:
-        drawn = {
-            "pairs": (draw_pairs(sweep), "Quantities over the varied parameters, a dot for each finger."),
-            "fingers": (
-                draw_fingers(sweep, job),
-                "The fingers with the least, the median and the largest value of a quantity, to one scale.",
-            ),
-        }
+    drawn: dict[str, tuple[Figure, str]] = {}
+    if sweep.study.sampling == "grid" and len(sweep.study.varied) == 2:
+        trained = "rel_l2_displacement" in known_quantities(sweep)
+        names = ("rel_l2_displacement", "boundary_violation") if trained else SHOWN[:2]
+        drawn["map"] = (draw_maps(sweep, names), "Quantities over both parameters; framed: the least value.")
+    if len(sweep.good) > 1 and not sweep.study.settings_alone:
+        drawn["pairs"] = (draw_pairs(sweep), "Quantities over the varied parameters, a dot for each finger.")
+        drawn["fingers"] = (
+            draw_fingers(sweep, job),
+            "The fingers with the least, the median and the largest value of a quantity, to one scale.",
+        )
         if found:
             drawn["sensitivity"] = (draw_sensitivity(found), sensitivity_caption(found))
-        pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
+    pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
     failures = failure_grid(sweep)
     page = html.write_html(
         folder / PAGE,
@@ -82,20 +80,7 @@ def sweep_sentences(sweep: Sweep) -> list[str]:
             f"{found - good} have none, for the reasons in the table below. Statistics, pictures and "
             "sensitivities are of the converged ones."
         )
-    return [*sentences, *slow_sentence(sweep), *(f"{remark}." for remark in sweep.remarks)]
-
-
-def slow_sentence(sweep: Sweep) -> list[str]:
-    """Which finger took much longer than the others, in a sentence; nothing if none did."""
-    if not sweep.measurements or sweep.study.settings_alone:
-        return []
-    slowest = max(sweep.measurements, key=lambda each: each.seconds)
-    median = float(np.median([each.seconds for each in sweep.measurements]))
-    if slowest.seconds < max(SLOW * median, SLOW_S):
-        return []
-    limit = sweep.study.time_limit
-    advice = "" if limit else "; time_limit in the file of the study stops such ones"
-    return [f"Number {slowest.number} took {slowest.seconds:.0f} s, the median {median:.2g} s{advice}."]
+    return [*sentences, *(f"{remark}." for remark in sweep.remarks)]
 
 
 def sensitivity_caption(found: dict[str, Sensitivity]) -> str:

@@ -1,21 +1,20 @@
 """Pictures of a sweep: quantities over parameters, sensitivities, and fingers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.patches import Rectangle
 
-from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.comparison.figures.style import HALO, axes_at, write_heading
 from pinnray.geometry.drawing.drawn_finger import finger_from
 from pinnray.geometry.finger.picture import draw_section
-from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity
-from pinnray.studies.sweep.study import Study, unit_of
+from pinnray.studies.sweep.study import Study, Value, title, unit_of
 from pinnray.studies.sweep.sweep import Sweep
 
 SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
@@ -23,9 +22,6 @@ SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
 
 MOST_DOTS = 2_000
 """Largest number of samples drawn in a panel."""
-
-BINS, LEAST_BINS, IN_A_BIN = 8, 3, 8
-"""Bins of the medians at most and at least, and samples for each: medians of fewer vary by chance."""
 
 WIDE = 6
 """Largest number of columns that have room for long words."""
@@ -35,7 +31,7 @@ COLUMNS = 3
 
 
 def draw_pairs(sweep: Sweep) -> Figure:
-    """Draw quantities over the varied parameters: a dot for each sample, and medians of bins."""
+    """Draw quantities over the varied parameters: a dot for each sample."""
     names = [name for name in SHOWN if _varies(sweep, name)]
     parameters = list(sweep.study.varied)
     good = sweep.good[:MOST_DOTS]
@@ -43,9 +39,7 @@ def draw_pairs(sweep: Sweep) -> Figure:
     left, head, foot, gap, tall = 1.1, 0.5, 0.95, 0.12, 0.62
     width = (WIDTH - left - 0.1 - gap * (len(parameters) - 1)) / len(parameters)
     with figure(head + foot + (tall + gap) * len(names)) as drawn:
-        bins = min(BINS, len(good) // IN_A_BIN)
-        line = f"line: medians of {bins} bins" if bins >= LEAST_BINS else "too few for a line of medians"
-        note = f"{len(good)} of {len(sweep.good)} samples; {line}"
+        note = f"{len(good)} of {len(sweep.good)} samples"
         write_heading(drawn, f"Quantities over parameters: {sweep.study.name}", note)
         for row, name in enumerate(names):
             values = np.array([each.values[name] for each in good])
@@ -56,7 +50,6 @@ def draw_pairs(sweep: Sweep) -> Figure:
                 choices = sweep.study.varied[parameter].values
                 x = np.array([choices.index(text) if choices else text for text in texts], dtype=np.float64)
                 axes.plot(x, values, "o", ms=size, color="#0072b2", alpha=0.7, mew=0, clip_on=False, zorder=3)
-                draw_medians(axes, x, values)
                 axes.tick_params(length=2, pad=1.5)
                 axes.locator_params(axis="y", nbins=3)
                 ends = _ends(sweep, parameter)
@@ -76,6 +69,39 @@ def draw_pairs(sweep: Sweep) -> Figure:
                     labels[0].set_horizontalalignment("left")
                     labels[-1].set_horizontalalignment("right")
                     axes.set_xlabel(_wrapped(parameter, narrow=len(parameters) > WIDE), labelpad=2)
+    return drawn
+
+
+def draw_maps(sweep: Sweep, names: Sequence[str]) -> Figure:
+    """Draw quantities as colours over the two parameters of a grid; the least value of each has a frame."""
+    first, second = sweep.study.varied
+    x, y = (list(dict.fromkeys(sample[name] for sample in sweep.samples)) for name in (first, second))
+    head, cell, left, gap = 0.68, 0.34, 0.95, 0.25
+    width = (WIDTH - left - 0.1) / len(names) - gap
+    with figure(head + cell * len(y) + 0.5) as drawn:
+        write_heading(drawn, f"Quantities over the grid: {sweep.study.name}", "framed: the least value")
+        for column, name in enumerate(names):
+            axes = axes_at(drawn, (left + column * (width + gap), head, width, cell * len(y)))
+            table = np.full((len(y), len(x)), np.nan)
+            for each in sweep.measurements:
+                at, value = sweep.samples[each.number], each.values.get(name, np.nan)
+                place = x.index(at[first]), y.index(at[second])
+                table[place[::-1]] = value
+                words = f"{value:.3g}" if np.isfinite(value) else each.state
+                axes.text(*place, words, ha="center", va="center", size=SMALL, path_effects=HALO)
+            if np.isfinite(table).any():
+                scale = LogNorm() if np.nanmin(table) > 0 else Normalize()
+                axes.imshow(table, norm=scale, cmap=colormaps["viridis_r"], aspect="auto")
+                row, best = np.unravel_index(np.nanargmin(table), table.shape)
+                corner = (float(best) - 0.5, float(row) - 0.5)
+                axes.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor=INK, lw=1.8, clip_on=False))
+            axes.set(xlim=(-0.5, len(x) - 0.5), ylim=(-0.5, len(y) - 0.5))
+            axes.set_xticks(range(len(x)), [_short(value) for value in x])
+            axes.set_yticks(range(len(y)), [] if column else [_short(value) for value in y])
+            axes.tick_params(length=0)
+            axes.set_title(name.replace("_", " "), fontsize=8.5)
+            axes.set_xlabel(title(first))
+        drawn.axes[0].set_ylabel(title(second).replace("_", "\n"))
     return drawn
 
 
@@ -146,19 +172,6 @@ def draw_fingers(sweep: Sweep, job: StudyJob[Study]) -> Figure:
     return drawn
 
 
-def draw_medians(axes: Axes, x: FloatArray, values: FloatArray) -> None:
-    """Draw the medians of bins, or of levels, that hold enough samples each; nothing if they are few."""
-    levels = np.unique(x)
-    bins = min(BINS, len(x) // IN_A_BIN)
-    if (len(levels) if len(levels) <= 12 else LEAST_BINS) * IN_A_BIN > len(x):
-        return
-    edges = np.linspace(x.min(), x.max(), bins + 1) if len(levels) > 12 else np.append(levels, np.inf)
-    places = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
-    used = [number for number in range(len(edges) - 1) if (places == number).any()]
-    middles = [np.median(x[places == number]) for number in used]
-    axes.plot(middles, [np.median(values[places == number]) for number in used], color=INK, lw=1.0)
-
-
 def _varies(sweep: Sweep, name: str) -> bool:
     values = np.array([each.values[name] for each in sweep.good])
     if len(values) < 2 or not np.isfinite(values).all():
@@ -184,6 +197,10 @@ def _ends(sweep: Sweep, parameter: str) -> tuple[str, str]:
     if values.values is not None:
         return str(values.values[0])[:9], str(values.values[-1])[:9]
     return f"{values.low:g}", f"{values.high:g}"
+
+
+def _short(value: Value) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _doubt(found: Sensitivity) -> str:

@@ -5,12 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.comparison.evaluation.evaluation import field_difference
-from pinnray.geometry.finger.finger import Finger
+from pinnray.comparison.evaluation.differences import FieldDifference
 from pinnray.geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.finger_figures import QUANTITIES, Quantity, figures_at_rest, figures_of
-from pinnray.solvers.finger_figures import heading as heading_of
+from pinnray.solvers.finger_figures import Quantity, figures_at_rest, figures_of
 from pinnray.solvers.problem import Load, Problem, contact_functional
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Progress, Solver, TrainedSolver, silent, solved, with_law
@@ -29,19 +27,13 @@ TRAINING: Mapping[str, Quantity] = {
 """What a training gives besides, compared with `fem`."""
 
 
-def quantity_heading(name: str) -> str:
-    """Column heading of a quantity or of a training's, its name with the unit, such as `force_N`."""
-    return heading_of(name, {**QUANTITIES, **TRAINING}[name])
-
-
 def quantities(
-    finger: Finger, problem: Problem, solver: Solver, *, density: float, progress: Progress = silent
+    problem: Problem, solver: Solver, *, density: float, progress: Progress = silent
 ) -> tuple[Solution, dict[str, float]]:
     """Solve a problem and evaluate every quantity.
 
     Args:
-        finger: The finger of the problem's mesh.
-        problem: The problem; its material's law is replaced by one that the solver has.
+        problem: The problem, with its finger; its material's law is replaced by one that the solver has.
         solver: The solver.
         density: Of the material, g/cm^3.
         progress: Called by the solver; it may stop it by an exception.
@@ -49,7 +41,6 @@ def quantities(
     Returns:
         The solution, and the quantities by the names of `QUANTITIES`; NaN where the solver does not give one.
     """
-    problem = replace(problem, finger=finger)
     linear = replace(problem, material=problem.material.model_copy(update={"law": "linear"}))
     plain = replace(solver, estimate=False) if isinstance(solver, FemSolver) else FemSolver(estimate=False)
     if isinstance(solver, FemSolver):
@@ -73,7 +64,7 @@ def training(solution: Solution) -> dict[str, float]:
     own, reference = (each.displacement(rule.location) for each in (solution, fem))
     base, load = boundary_violations(solution)
     return {
-        "rel_l2_displacement": field_difference(own, reference, rule.weights).rel_l2,
+        "rel_l2_displacement": FieldDifference.of(own, reference, rule.weights).rel_l2,
         "rel_energy": float(solution.energy) / float(fem.energy) - 1,
         "boundary_violation": max(base, load) / float(np.linalg.norm(problem.load.values)),
         "base_violation": base,

@@ -7,8 +7,6 @@ B. Sudret, Reliab. Eng. Syst. Saf. 93 (2008) 964-979, section 4.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
-from math import comb
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -99,10 +97,6 @@ def _fit(places: FloatArray, values: FloatArray, powers: IntArray) -> tuple[Floa
 
 def _powers(dimensions: int, degree: int) -> IntArray:
     """Every combination of degrees with a total of at most `degree`, shape (terms, dimensions)."""
-    powers = np.zeros((comb(dimensions + degree, degree), dimensions), dtype=np.int64)
-    row = 0
-    for total in range(degree + 1):
-        for axes in combinations_with_replacement(range(dimensions), total):
-            np.add.at(powers[row], list(axes), 1)
-            row += 1
-    return powers
+    from sklearn.preprocessing import PolynomialFeatures
+
+    return np.asarray(PolynomialFeatures(degree).fit(np.zeros((1, dimensions))).powers_)

@@ -1,6 +1,6 @@
-"""The journal of a sweep: an SQLite file with one row for every finished sample.
+"""The journal of a study: an SQLite file with one row for every finished sample.
 
-Only the process that runs the sweep writes to it, a row in a transaction: after a kill at any moment a sample
+Only the process that runs the study writes to it, a row in a transaction: after a kill at any moment a sample
 is in it as a whole or not at all.
 """
 
@@ -9,6 +9,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 from pinnray.runtime.errors import UserError
 from pinnray.studies.sweep.measurement import Measurement
@@ -18,7 +19,7 @@ _NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")
 
 _TABLE = """
 create table if not exists samples (
-    number integer primary key,
+    number primary key, -- or a name
     state text not null,
     message text not null,
     seconds real not null,
@@ -54,7 +55,7 @@ class Journal:
                 "delete from samples where state = ? and message like ?", (state, f"{message}%")
             ).rowcount
 
-    def numbers(self) -> set[int]:
+    def numbers(self) -> set[Any]:
         """Numbers of the samples that have a result."""
         return {number for (number,) in self._connection.execute("select number from samples")}
 

@@ -1,29 +1,38 @@
 """Run a study: every sample once, whatever happens to the workers or to the program."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
+from math import inf
 from pathlib import Path
+from typing import Any
 
 from pinnray.comparison.evaluation.deformed_body import ADVICE
 from pinnray.comparison.evaluation.plausibility import LOOKS_LIKE
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.output_folder import check_links, check_resumable_folder, locked
+from pinnray.runtime.processes.child import ProcessFailed
+from pinnray.runtime.processes.pool import Input
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.text_files import read_json
 from pinnray.solvers.solver import Progress, silent
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement
+from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, sampled
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import Journal, opened
 from pinnray.studies.sweep.study import Study, Value
-from pinnray.studies.sweep.workers import Workers
+from pinnray.studies.sweep.workers import DEATHS, Workers
 
 STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
 
 FEW = 5
 """Samples that a remark names."""
+
+GRACE, GRACE_S = 1.5, 10.0
+"""A worker whose sample does not stop at its limit of time is ended after so many times the limit and so many
+seconds more, for what it has to load first."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +78,13 @@ def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
     stages = stages or Stages(quiet=True)
     all_samples = samples(job.study)
     tasks = {number: job.task(number, sample) for number, sample in enumerate(all_samples)}
-    definition = {**job.definition(all_samples[0], __name__), "mesh": job.mesh and job.mesh.model_dump()}
+    definition = job.definition(all_samples[0], __name__)
     free = {"study.name", "study.time_limit"}  # on which no result depends
     if job.study.sampling == "sobol":
         free.add("study.samples")  # which may be continued
     if trainings := job.study.settings_alone:
         free.add("study.varied")  # the trainings of another grid go on from their checkpoints
-    check_resumable_folder(job.out / STUDY_FILE, definition, job=job.kind, free=free)
+    check_resumable_folder(job.out / STUDY_FILE, definition, job="sweep", free=free)
     job.out.mkdir(parents=True, exist_ok=True)
     with locked(job.out), ExitStack() as stack:
         before = _study_in(job.out) if (job.out / JOURNAL).exists() else job.study
@@ -95,19 +104,59 @@ def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
 def finish(
     tasks: Mapping[int, Task], journal: Journal, workers: Workers, progress: Progress = silent
 ) -> None:
-    """Run the tasks that have no result in the journal, and keep each result at once.
+    """Run the tasks that have no result in the journal, by the samples' numbers, and keep each at once."""
+    known = journal.numbers()
+    waiting = {number: task for number, task in tasks.items() if number not in known}
+    limit = next((task.time_limit for task in tasks.values()), None)
+    run_tasks(sampled, waiting, tasks, journal, workers, progress, time_limit=limit, deaths=DEATHS)
+
+
+def run_tasks(
+    work: Callable[[Input, Callable[..., None]], Iterable[Measurement]],
+    tasks: Mapping[Any, Input],
+    samples: Collection[Any],
+    journal: Journal,
+    workers: Workers | None,
+    progress: Progress = silent,
+    *,
+    time_limit: float | None = None,
+    deaths: int,
+) -> None:
+    """Run the tasks of a study and keep each result at once.
 
     Args:
-        tasks: By the samples' numbers.
+        work: Answers a task with the results of its samples, or reports each of them as it comes.
+        tasks: By name; where a process dies, the name is that of the failed sample.
+        samples: Numbers or names of all samples of the study.
         journal: Where the results are kept.
-        workers: The processes that do the work.
+        workers: The processes that do the work; None for this one.
         progress: Called with the share that is done and a note.
+        time_limit: Of each task, s.
+        deaths: Deaths of its process after which a task has failed.
     """
-    known = journal.numbers() & tasks.keys()
-    for answer in workers.answers({number: task for number, task in tasks.items() if number not in known}):
-        journal.add(answer)
-        known.add(answer.number)
-        progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
+    done = len(journal.numbers() & set(samples))
+
+    def keep(_: Any, found: Measurement) -> None:
+        nonlocal done
+        journal.add(found)
+        done += 1
+        progress(done / len(samples), f"{done} of {len(samples)} samples")
+
+    hard = inf if time_limit is None else GRACE * time_limit + GRACE_S
+    if workers is None:
+        answers: Iterable[Any] = ((name, work(task, partial(keep, name))) for name, task in tasks.items())
+    else:
+        answers = workers.answers(work, tasks, report=keep, timeout_s=hard, deaths=deaths)
+    for name, answer in answers:
+        if not isinstance(answer, ProcessFailed):
+            found = list(answer)
+        elif answer.exit_code is None:
+            found = [Measurement(name, "not converged", f"{OUT_OF_TIME}: after {hard:.3g} s", hard)]
+        else:
+            times = f"its worker process died {deaths} times" if deaths > 1 else answer.message
+            found = [Measurement(name, "failed", times, 0.0)]
+        for each in found:
+            keep(name, each)
 
 
 def load_sweep(folder: Path) -> Sweep:

@@ -9,7 +9,8 @@ import pandas as pd
 
 from pinnray.runtime.atomic import write_bytes, write_text
 from pinnray.runtime.tables import TextTable, plain
-from pinnray.solvers.finger_figures import QUANTITIES, heading
+from pinnray.solvers.finger_figures import QUANTITIES, Quantity, heading
+from pinnray.studies.sweep.quantities import TRAINING
 from pinnray.studies.sweep.study import title
 from pinnray.studies.sweep.sweep import Sweep
 
@@ -17,32 +18,40 @@ FEW = 5
 """Numbers of samples that the table of failures lists for a reason."""
 
 
+def known_quantities(sweep: Sweep) -> dict[str, Quantity]:
+    """The quantities of a sweep's samples by name, those of a training among them if it has trained."""
+    trained = any("loss" in each.values for each in sweep.measurements)
+    return {**QUANTITIES, **(TRAINING if trained else {})}
+
+
 def sample_table(sweep: Sweep) -> pd.DataFrame:
     """A row for every finished sample: number, varied parameters, state, quantities, time and message."""
-    rows = []
+    rows, known = [], known_quantities(sweep)
     for each in sweep.measurements:
         row: dict[str, object] = {"sample": each.number}
         row |= {title(name): value for name, value in sweep.samples[each.number].items()}
         row |= {"state": each.state}
-        row |= {heading(name): each.values.get(name, float("nan")) for name in QUANTITIES}
+        row |= {
+            heading(name, quantity): each.values.get(name, float("nan")) for name, quantity in known.items()
+        }
         rows.append(row | {"seconds": each.seconds, "message": each.message})
     return pd.DataFrame(rows)
 
 
-def write_tables(sweep: Sweep, folder: Path) -> list[Path]:
-    """Write `samples.parquet` and `samples.csv`, and return the paths."""
-    frame = sample_table(sweep)
+def write_frame(frame: pd.DataFrame, path: Path) -> list[Path]:
+    """Write a table as Parquet and CSV under a path without ending, and return both paths."""
     buffer = BytesIO()
     frame.to_parquet(buffer, engine="pyarrow", index=False)
-    write_bytes(folder / "samples.parquet", buffer.getvalue())
-    write_text(folder / "samples.csv", frame.map(plain).to_csv(index=False, lineterminator="\n"))
-    return [folder / "samples.parquet", folder / "samples.csv"]
+    files = [path.with_suffix(".parquet"), path.with_suffix(".csv")]
+    write_bytes(files[0], buffer.getvalue())
+    write_text(files[1], frame.map(plain).to_csv(index=False, lineterminator="\n"))
+    return files
 
 
 def quantity_grid(sweep: Sweep) -> TextTable:
     """Least, median and largest value of each quantity over the converged samples."""
     rows = []
-    for name, quantity in QUANTITIES.items():
+    for name, quantity in known_quantities(sweep).items():
         values = np.array([each.values[name] for each in sweep.good])
         known = values[np.isfinite(values)]
         ends = np.quantile(known, [0, 0.5, 1]) if len(known) else []

@@ -10,13 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from itertools import islice, zip_longest
 from math import inf
+from signal import SIGKILL
 from typing import TYPE_CHECKING, Self
 
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.processes.child import ProcessFailed
-from pinnray.runtime.processes.pool import Pool
-from pinnray.studies.sweep.job import Task
-from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, measured
+from pinnray.runtime.processes.pool import Input, Name, Output, Pool
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -28,10 +27,6 @@ Samples that wait for a dying worker of a scheduler count too: where one is kill
 seconds, one of 10,000 samples has eight by chance with a probability below 1e-3.
 """
 
-GRACE, GRACE_S = 1.5, 10.0
-"""A worker whose sample does not stop at its limit of time is ended after so many times the limit and so many
-seconds more, for what it has to load first."""
-
 WAIT_S = 20
 """Time to reach a scheduler, s."""
 
@@ -42,14 +37,17 @@ class Workers:
     Args:
         count: Number of processes on this machine, if there is no scheduler.
         scheduler: Address of a Dask scheduler whose workers are used instead, such as tcp://host:8786.
+        threads: Threads of each process; see `Pool`.
+        warm: Whether no task has to run alone first; see `answers`.
     """
 
-    def __init__(self, count: int, scheduler: str | None = None) -> None:
-        self._count, self._scheduler = count, scheduler
-        self._stack = ExitStack()
-        self._pool = self._stack.enter_context(Pool(count))
+    def __init__(
+        self, count: int, scheduler: str | None = None, *, threads: int = 1, warm: bool = False
+    ) -> None:
+        self._scheduler, self._stack = scheduler, ExitStack()
+        self._pool = self._stack.enter_context(Pool(count, threads=threads))
         self._client: Client | None = None
-        self._warm = False
+        self._warm = warm
 
     def __enter__(self) -> Self:
         return self
@@ -57,65 +55,63 @@ class Workers:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def answers(self, tasks: Mapping[int, Task]) -> Iterator[Measurement]:
-        """Run tasks and yield their results as they come, each once.
+    def answers(
+        self,
+        work: Callable[[Input, Callable[..., None]], Output],
+        tasks: Mapping[Name, Input],
+        *,
+        report: Callable[..., None] = lambda *_: None,
+        timeout_s: float = inf,
+        deaths: int,
+    ) -> Iterator[tuple[Name, Output | ProcessFailed]]:
+        """Run tasks and yield their answers as they come, each once; see `Pool.answers`.
 
         The first tasks run alone, one on each machine: they compile the forms of FEniCS, which all would
-        compile at once if its cache is empty.
+        compile at once if its cache is empty. Those of a scheduler report nothing, and have no limit of time.
 
         Raises:
             UserError: If the scheduler does not answer or has no workers.
         """
         if self._scheduler is not None and self._client is None:
             self._client = self._stack.enter_context(_connected(self._scheduler))
-        run = self._here if self._client is None else self._at_scheduler
         first = 0 if self._warm else 1 if self._client is None else len(_one_each(self._client))
-        yield from run(dict(islice(tasks.items(), first)))
-        self._warm = True
-        yield from run(dict(islice(tasks.items(), first, None)))
-
-    def _here(self, tasks: Mapping[int, Task]) -> Iterator[Measurement]:
-        limit = next((task.time_limit for task in tasks.values()), None)
-        hard = inf if limit is None else GRACE * limit + GRACE_S
-        for number, answer in self._pool.answers(_measured, tasks, deaths=DEATHS, timeout_s=hard):
-            if not isinstance(answer, ProcessFailed):
-                yield answer
-            elif answer.exit_code is None:
-                yield Measurement(number, "not converged", f"{OUT_OF_TIME}: after {hard:.3g} s", hard)
+        for part in (dict(islice(tasks.items(), first)), dict(islice(tasks.items(), first, None))):
+            if self._client is not None:
+                yield from self._at_scheduler(work, part, deaths)
             else:
-                yield _failed(number)
+                yield from self._pool.answers(work, part, report=report, timeout_s=timeout_s, deaths=deaths)
+            self._warm = True
 
-    def _at_scheduler(self, tasks: Mapping[int, Task]) -> Iterator[Measurement]:
+    def _at_scheduler(
+        self, work: Callable[[Input, Callable[..., None]], Output], tasks: Mapping[Name, Input], most: int
+    ) -> Iterator[tuple[Name, Output | ProcessFailed]]:
         from distributed import KilledWorker, as_completed
 
-        client, deaths = self._client, Counter[int]()
+        client, deaths = self._client, Counter[Name]()
         assert client is not None
         places = [] if self._warm else _one_each(client)
         running = {
-            client.submit(measured, task, pure=False, workers=place, allow_other_workers=bool(place)): number
-            for (number, task), place in zip_longest(tasks.items(), places[: len(tasks)])
+            client.submit(_alone, work, task, pure=False, workers=at, allow_other_workers=bool(at)): name
+            for (name, task), at in zip_longest(tasks.items(), places[: len(tasks)])
         }
         answers = as_completed(list(running))
         for future in answers:
-            number = running.pop(future)
+            name = running.pop(future)
             try:
-                yield future.result()
+                yield name, future.result()
             except KilledWorker:
-                deaths[number] += 1
-                if deaths[number] == DEATHS:
-                    yield _failed(number)
+                deaths[name] += 1
+                if deaths[name] == most:
+                    yield name, ProcessFailed(-SIGKILL)
                 else:
-                    again = client.submit(measured, tasks[number], pure=False)
-                    running[again] = number
+                    again = client.submit(_alone, work, tasks[name], pure=False)
+                    running[again] = name
                     answers.add(again)
 
 
-def _measured(task: Task, report: Callable[..., None]) -> Measurement:
-    return measured(task)
-
-
-def _failed(number: int) -> Measurement:
-    return Measurement(number, "failed", f"its worker process died {DEATHS} times", 0.0)
+def _alone(work: Callable[[Input, Callable[..., None]], Output], task: Input) -> Output:
+    """The answer of a task to which nobody listens on the way."""
+    return work(task, lambda *_: None)
 
 
 def _one_each(client: "Client") -> list[str]:

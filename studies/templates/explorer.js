@@ -9,8 +9,7 @@
   byId("explorer-absent").hidden = true;
   byId("explorer").hidden = false;
 
-  const digits = (value, count = 3) => String(Number(value.toPrecision(count))).replace("-", "−");
-  const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const { FOOT, ink, digits, sheet, view, placed, paint, outline, lines, seen, colourBar, scaleBar } = pinnrayBody;
   const element = (name, attributes = {}, text = "") => {
     const made = Object.assign(document.createElement(name), { textContent: text });
     for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -124,50 +123,20 @@
   })();
 
   function picture({ points, moved, stress }) {
-    const ratio = window.devicePixelRatio || 1;
     const width = canvas.clientWidth;
-    const foot = 44;
     const scale = width / (range.x[1] - range.x[0]);
-    const height = scale * (range.y[1] - range.y[0]) + foot;
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-      canvas.style.height = `${height}px`;
-    }
-    const context = canvas.getContext("2d");
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
-    const [left, top] = [range.x[0], range.y[1]];
-    const X = (x) => (x - left) * scale;
-    const Y = (y) => (top - y) * scale;
-    const { cells } = mesh;
-    const xs = new Float64Array(mesh.count);
-    const ys = new Float64Array(mesh.count);
-    for (let n = 0; n < mesh.count; n += 1) {
-      xs[n] = X(points[2 * n] + moved[2 * n]);
-      ys[n] = Y(points[2 * n + 1] + moved[2 * n + 1]);
-    }
-    outline(context, (n) => [X(points[2 * n]), Y(points[2 * n + 1])], ink("--rule"));
-    // The triangles of a colour in one path.
-    const count = manifest.colours.length;
-    const top_ = manifest.colourStress * (values.young / manifest.baseYoung);
-    const paths = manifest.colours.map(() => new Path2D());
-    for (let t = 0; t < cells.length; t += 6) {
-      const [a, b, c] = [cells[t], cells[t + 1], cells[t + 2]];
-      const share = (stress[a] + stress[b] + stress[c]) / (3 * top_);
-      const path = paths[Math.min(count - 1, Math.max(0, Math.floor(share * count)))];
-      path.moveTo(xs[a], ys[a]);
-      path.lineTo(xs[b], ys[b]);
-      path.lineTo(xs[c], ys[c]);
-      path.closePath();
-    }
-    context.lineWidth = 0.6;
-    paths.forEach((path, k) => {
-      context.fillStyle = context.strokeStyle = manifest.colours[k];
-      context.fill(path);
-      context.stroke(path);
-    });
-    outline(context, (n) => [xs[n], ys[n]], ink("--ink"));
+    const height = scale * (range.y[1] - range.y[0]);
+    canvas.style.height = `${height + FOOT}px`;
+    const context = sheet(canvas, width, height + FOOT);
+    const middle = { scale, x: (range.x[0] + range.x[1]) / 2, y: (range.y[0] + range.y[1]) / 2 };
+    const at = view(middle, [width / 2, height / 2]);
+    const { triangles } = mesh;
+    const most = manifest.colourStress * (values.young / manifest.baseYoung);
+    const share = (t) => (stress[triangles[3 * t]] + stress[triangles[3 * t + 1]] + stress[triangles[3 * t + 2]]) / (3 * most);
+    outline(context, manifest.outlines, placed(points, undefined, at), ink("--rule"));
+    const places = placed(points, moved, at);
+    paint(context, triangles, places, share, manifest.colours);
+    outline(context, manifest.outlines, places, ink("--ink"));
     // The cylinder, and the way of its middle.
     const angle = (values.direction * Math.PI) / 180;
     const start = [values.contact_position, values.radius];
@@ -176,49 +145,18 @@
     context.fillStyle = ink("--soft");
     context.lineWidth = 1.2;
     context.beginPath();
-    context.arc(X(end[0]), Y(end[1]), values.radius * scale, 0, 2 * Math.PI);
+    context.arc(at.X(end[0]), at.Y(end[1]), values.radius * scale, 0, 2 * Math.PI);
     context.globalAlpha = 0.55;
     context.fill();
     context.globalAlpha = 1;
     context.stroke();
     context.setLineDash([3, 3]);
-    context.beginPath();
-    context.moveTo(X(start[0]), Y(start[1]));
-    context.lineTo(X(end[0]), Y(end[1]));
-    context.stroke();
+    lines(context, [start, end], at, ink("--ink"));
     context.setLineDash([]);
-    drawMarkers(context, X, Y);
-    legend(context, width, height - foot, top_, scale);
-  }
-
-  function outline(context, place, colour) {
-    context.strokeStyle = colour;
-    context.lineWidth = 1;
-    context.beginPath();
-    for (const path of manifest.outlines) {
-      path.forEach((node, k) => (k ? context.lineTo(...place(node)) : context.moveTo(...place(node))));
-    }
-    context.stroke();
-  }
-
-  function legend(context, width, y, most, scale) {
-    const [length, at_] = [Math.min(0.5 * width, 260), 8];
-    manifest.colours.forEach((colour, k) => {
-      context.fillStyle = colour;
-      context.fillRect(at_ + (k * length) / manifest.colours.length, y + 6, length / manifest.colours.length + 1, 9);
-    });
-    context.fillStyle = ink("--ink");
-    context.font = "12px system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif";
-    context.textBaseline = "top";
-    context.textAlign = "left";
-    context.fillText("0", at_, y + 18);
-    context.textAlign = "right";
-    context.fillText(`${digits(most)} MPa`, at_ + length, y + 18);
-    context.textAlign = "center";
-    context.fillText(width > 500 ? "von Mises stress" : "stress", at_ + 0.5 * length, y + 18);
-    context.fillRect(width - 8 - 10 * scale, y + 10, 10 * scale, 3);
-    context.textAlign = "right";
-    context.fillText("10 mm", width - 8, y + 18);
+    seen(context, markers.map(([x, y, u, v]) => [x + u, y + v]), at);
+    const title = width > 500 ? "von Mises stress" : "stress";
+    colourBar(context, [8, height], Math.min(0.5 * width, 260), manifest.colours, ["0", `${digits(most)} MPa`, title]);
+    scaleBar(context, [width - 8, height], scale, 0.15 * width);
   }
 
   // Force over the stroke with its interval; what is beyond the stroke is grey.
@@ -296,16 +234,6 @@
     byId("explorer-markers").textContent = inside.length
       ? `${inside.length} markers: mean of |Δu| + |Δv| ${digits(mean)} mm at these sliders.${outside ? ` ${outside} lie outside the finger.` : ""}`
       : "All markers lie outside the finger; x and y are of the finger at rest, mm from its base on the front face.";
-  }
-
-  function drawMarkers(context, X, Y) {
-    context.lineWidth = 1.5;
-    for (const [x, y, u, v] of markers) {
-      context.strokeStyle = "#d1495b";
-      context.beginPath();
-      context.arc(X(x + u), Y(y + v), 4, 0, 2 * Math.PI);
-      context.stroke();
-    }
   }
 
   byId("explorer-csv").addEventListener("change", ({ target }) => target.files[0] && takeFile(target.files[0]));

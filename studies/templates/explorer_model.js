@@ -30,7 +30,7 @@ const pinnrayModel = (() => {
   async function load() {
     read = await pinnrayPacked.reader("explorer-data");
     mesh = {
-      points: read(manifest.points), cells: read(manifest.cells), front: read(manifest.front), base: read(manifest.base),
+      points: read(manifest.points), triangles: read(manifest.triangles), cells: read(manifest.cells), front: read(manifest.front), base: read(manifest.base),
       away: read(manifest.away), space: manifest.space.map((parts) => atNodes(parts.map(read))), errors: read(manifest.errors),
       known: read(manifest.known), lost: read(manifest.lost),
       field: block(manifest.field), numbers: block(manifest.numbers), motion: block(manifest.motion),

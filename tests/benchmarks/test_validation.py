@@ -88,7 +88,7 @@ def test_coarse_tetrahedra_have_the_figures_of_comsol():
         np.testing.assert_allclose(moved_feet(found[case]), places, rtol=0, atol=0.2)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_page_has_the_modulus_and_the_errors_of_the_program(beam):
     """The page's are of a finer mesh: 1 kPa and 0.03 mm away."""
     runs = read_runs()

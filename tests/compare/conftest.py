@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.comparison import Results
-from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.point_location import LocatedPoints

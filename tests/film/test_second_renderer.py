@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import pinnray as pr
-from pinnray.film.film import Film
+from pinnray.film.film import FilmSettings
 from pinnray.film.track_film import track_film
 from pinnray.solvers.problem import Load
 from pinnray.solvers.solver import silent
@@ -28,7 +28,8 @@ def tracked(name, folder):
         for frame in frames:
             if frame.number % 2 == 0:
                 cv2.imwrite(str(pictures / f"{frame.number}.png"), frame.image)
-    film = Film(str(pictures), camera=DATA / "camera.json", workspace=DATA / "fiducials.json", fps=15.0)
+    settings = FilmSettings(camera=DATA / "camera.json", workspace=DATA / "fiducials.json", fps=15.0)
+    film = settings.of(str(pictures))
     return track_film(film, FINGER, folder / "out", silent, video=False)
 
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import cadquery as cq
 import numpy as np
 import pytest
 
@@ -11,7 +12,7 @@ from tests.meshes import body_area, body_perimeter
 
 
 def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> None:
-    face = cad.cq.Face.makeFromWires(*cad._wires(design))
+    face = cq.Face.makeFromWires(*cad._wires(design))
     assert face.isValid()
     assert face.Area() == pytest.approx(body_area(design), rel=1e-9)
     assert len(face.innerWires()) == design.rib_count + 1
@@ -79,10 +80,8 @@ def test_stl_files_enclose_the_volumes(written: dict[str, Path]) -> None:
 )
 def test_the_mesh_has_its_boundary_on_the_cad_face(design: Design) -> None:
     """Gmsh gets the section without CAD: both are the same geometry."""
-    import cadquery as cq
-
     mesh = build_mesh(design, MeshSettings(size=2.0))
-    face = cad.cq.Face.makeFromWires(*cad._wires(design))
+    face = cq.Face.makeFromWires(*cad._wires(design))
     assert face.Area() == pytest.approx(design.section.area, rel=1e-12)
     wires = cq.Compound.makeCompound([face.outerWire(), *face.innerWires()])
     nodes = mesh.points[np.unique(mesh.boundary_edges)]

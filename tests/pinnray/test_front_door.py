@@ -110,7 +110,7 @@ def test_what_no_real_finger_does_is_said_of_a_solution():
 def test_a_sweep_is_a_data_frame_and_predicts(tmp_path: Path):
     from tests.studies.emulator.sweeps import solved_sweep
 
-    folder = solved_sweep(tmp_path / "ref", count=48)
+    folder = solved_sweep(tmp_path / "ref", count=24)
     finger = {"height": 95, "base_width": 30, "rib_angle": 5, "tip_length": 20, "rib_count": 4}
     walls = {"rib_thickness": 1.5, "front_thickness": 1.5, "back_thickness": 1.5}
     found = pr.predict(folder, [{**finger, **walls}, {**finger, **walls, "front_thickness": 2.0}])

@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from pinnray.comparison.crossval.folds import load_cases_of
-from pinnray.comparison.crossval.study import CrossvalStudy, solver_variants
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks
 from pinnray.comparison.evaluation.truths import TRUTHS, Truth, virtual_experiment
 from pinnray.geometry.finger.design import Design
@@ -27,19 +25,11 @@ from tests.fingers import beam
 FILES = {
     "empty/notes.txt": "mine",
     "damaged/metrics.json": "{",
-    "damaged/run.json": "{}",
     "foreign/metrics.json": '{"schema": 99}',
-    "foreign/run.json": "{}",
 }
 truth = partial(Truth, name="mine", description="pressed in by {:.4g} mm")
 MESH = build_mesh(Design(), MeshSettings(size=2.0), across=1)
 PROBLEM = Problem(MESH)
-
-
-def crossval(**changes: Any) -> None:
-    CrossvalStudy(
-        design=Design(), variants=solver_variants([FemSolver()], Material()), out=Path("out"), **changes
-    ).check()
 
 
 @cache

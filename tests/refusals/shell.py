@@ -40,7 +40,6 @@ FILES: dict[str, str | bytes] = {
     "half.json": '{"fiducials": [',
     "strip.csv": "strain,stress_MPa\n0.1,1\n0.2,2\n0.3,3\n",
     "options/misspelt.toml": '[options]\nsolverz = "fem"',
-    "options/kind.toml": '[options]\nmesh-size = "fine"',
     "options/design.toml": '[options]\ndesign = "none-such"',
     "options/solvers.json": '{"options": {"solvers": "none-such", "mesh-size": 1}}',
     "options/no table.toml": "mesh-size = 1",

@@ -3,7 +3,14 @@
 # ruff: noqa: F401, because the expressions of approved.txt use the names
 
 from pathlib import Path
+from typing import Any
 
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.registration import HAND_HELD
+from pinnray.solvers.fem.linear import FemSolver
+from pinnray.solvers.problem import Load, Material
+from pinnray.studies.crossval.folds import load_cases_of
+from pinnray.studies.crossval.study import CrossvalStudy, solver_variants
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.emulator.store import emulator_of
 from pinnray.studies.optimum.question import Question, load_question
@@ -13,6 +20,7 @@ from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import opened
 from pinnray.studies.sweep.study import Study, load_study
 from pinnray.studies.sweep.sweep import load_sweep
+from tests.refusals.compare import markers, pressed
 from tests.studies.emulator.sweeps import solved_sweep
 
 RIBS = "[varied]\nrib_thickness = {from = 1, to = 2}\n"
@@ -32,6 +40,12 @@ def study(text: str = RIBS, head: str = "samples = 4\n") -> Study:
 
 def varied(text: str, head: str = "samples = 4\n") -> Study:
     return study(f"[varied]\n{text}\n", head)
+
+
+def crossval(**changes: Any) -> None:
+    CrossvalStudy(
+        design=Design(), variants=solver_variants([FemSolver()], Material()), out=Path("out"), **changes
+    ).check()
 
 
 def task(asked: Study) -> object:

@@ -29,7 +29,7 @@ from pinnray.vision.frames.formats import PNG
 from pinnray.vision.frames.sources import open_frames, photographs
 from pinnray.vision.frames.video import video_writer
 from pinnray.vision.measurements import read_measurements
-from pinnray.vision.rig.boards import board_poses, board_scene
+from pinnray.vision.rig.boards import board_poses
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
 from pinnray.vision.rig.virtual_camera import default_camera

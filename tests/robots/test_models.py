@@ -1,21 +1,17 @@
-"""Models for robot simulators: the chain against MuJoCo's mechanics, tetrahedra against Gmsh's reading."""
+"""Models for robot simulators: the chain against MuJoCo's mechanics, tetrahedra as VTK reads them."""
 
-from xml.etree import ElementTree as ET
-
-import gmsh
 import numpy as np
 import pytest
+import pyvista
 
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.mjcf import Damping, chain_mjcf
 from pinnray.robots.simulation import chain_front
-from pinnray.robots.sofa import sofa_scene
-from pinnray.robots.solid_files import write_msh
+from pinnray.robots.solid_files import write_vtk
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.robots.springs import Springs
-from pinnray.solvers.physics import Material
 from tests.solvers.conftest import SHORT
 
 DENSITY = 1200.0
@@ -81,42 +77,14 @@ def test_mujoco_has_the_masses_springs_and_places_of_the_chain(front, chain, spr
     assert data.qfrc_damper == pytest.approx(-resistance, rel=1e-6)
 
 
-def test_gmsh_reads_the_body_with_its_groups(tmp_path, section):
-    body = SolidMesh.of(section, 3)
-    assert body.volume == pytest.approx(MM**3 * section.areas.sum() * section.depth)
-    write_msh(tmp_path / "finger.msh", body)
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(tmp_path / "finger.msh"))
-        groups = {gmsh.model.getPhysicalName(*each): each for each in gmsh.model.getPhysicalGroups()}
-        assert groups == {"base": (2, 1), "front": (2, 2), "body": (3, 3)}
-        tags, points, _ = gmsh.model.mesh.getNodes()
-        place = dict(zip(tags.tolist(), points.reshape(-1, 3), strict=True))
-        assert len(tags) == len(body.points)
-        assert len(gmsh.model.mesh.getElementsByType(4)[0]) == len(body.tetrahedra)
-        for name, length in (
-            ("base", section.boundary_length("base")),
-            ("front", section.boundary_length("front")),
-        ):
-            (entity,) = gmsh.model.getEntitiesForPhysicalGroup(*groups[name])
-            (nodes,) = gmsh.model.mesh.getElements(2, entity)[2]
-            a, b, c = np.moveaxis(np.array([place[node] for node in nodes.tolist()]).reshape(-1, 3, 3), 1, 0)
-            normals = np.cross(b - a, c - a) / 2
-            assert np.linalg.norm(normals, axis=1).sum() == pytest.approx(MM**2 * length * section.depth)
-            outward = {"base": -normals[:, 0], "front": normals[:, 1]}[name]
-            assert (outward > 0).all()
-    finally:
-        gmsh.finalize()
-
-
-def test_the_scene_holds_the_base_in_the_units_of_its_mesh(section):
+def test_the_tetrahedra_fill_the_body_and_name_the_nodes_of_its_boundaries(section, tmp_path):
     body = SolidMesh.of(section, 2)
-    root = ET.fromstring(sofa_scene("finger.msh", body, Material(young=3.0, poisson=0.4), DENSITY, 0.01))
-    (finger,) = root.findall("Node")
-    field, mass = finger.find("TetrahedronFEMForceField"), finger.find("UniformMass")
-    assert (field.get("youngModulus"), field.get("poissonRatio")) == ("3e+06", "0.4")
-    assert float(mass.get("totalMass")) == pytest.approx(DENSITY * body.volume, rel=1e-5)
-    held = np.array(finger.find("FixedProjectiveConstraint").get("indices").split(), dtype=int)
-    assert (body.points[held, 0] == 0).all()
-    assert len(held) == 3 * len(np.unique(section.boundary("base")))
+    write_vtk(tmp_path / "finger.vtk", body)
+    grid = pyvista.read(tmp_path / "finger.vtk")
+    assert grid.volume == pytest.approx(MM**3 * section.areas.sum() * section.depth)
+    assert grid.volume == pytest.approx(body.volume)
+    base, front = grid.points[grid["base"] == 1], grid.points[grid["front"] == 1]
+    assert len(base) == 3 * len(np.unique(section.boundary("base")))
+    assert np.abs(base[:, 0]).max() < 1e-9
+    assert np.abs(front[:, 1]).max() < 1e-9
+    assert np.ptp(front[:, 2]) == pytest.approx(MM * section.depth)

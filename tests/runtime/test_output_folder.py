@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from pinnray.runtime import output_folder
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.output_folder import (
     MARK,
@@ -124,7 +123,6 @@ def test_a_result_that_cannot_take_its_place_is_complete_beside_it(out, monkeypa
         raise OSError(16, "Device or resource busy")  # `out` is a mounted volume
 
     monkeypatch.setattr(Path, "replace", busy)
-    monkeypatch.setattr(output_folder, "_exchanged", lambda *_: False)
     before = tree(out)
     with pytest.raises(
         UserError, match=r"cannot replace .* \(Device or resource busy\); the complete result is in"
@@ -258,18 +256,9 @@ def test_a_run_that_is_killed_while_it_replaces_a_result_does_not_bar_the_next(
     assert tree(out.parent) == {"run/report.html": "new report"}
 
 
-def test_the_new_result_takes_the_name_of_the_last_one_in_one_step(out, monkeypatch):
-    """A run that is killed between two renames would leave nothing under that name."""
-    killed_before("replace", 1, lambda: attempt(out), monkeypatch)
-    assert tree(out) == {"report.html": "new report"}
-    attempt(out)
-    assert tree(out.parent) == {"run/report.html": "new report"}
-
-
 @pytest.mark.parametrize("number", [1, 2], ids=["first", "second"])
-def test_where_two_renames_are_needed_a_kill_at_one_loses_no_result(out, monkeypatch, number):
+def test_a_kill_at_a_rename_loses_no_result(out, monkeypatch, number):
     """Of the runs that go on, one that fails must not lose the last result either."""
-    monkeypatch.setattr(output_folder, "_exchanged", lambda *_: False)
     before = tree(out)
     killed_before("replace", number, lambda: attempt(out), monkeypatch)
     with pytest.raises(RuntimeError):
@@ -280,7 +269,6 @@ def test_where_two_renames_are_needed_a_kill_at_one_loses_no_result(out, monkeyp
 
 
 def test_a_rename_that_fails_leaves_both_results(out, monkeypatch):
-    monkeypatch.setattr(output_folder, "_exchanged", lambda *_: False)
     before, rename, calls = tree(out), os.rename, []
 
     def second_fails(source: Path, target: Path) -> None:

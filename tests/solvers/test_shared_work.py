@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.certification import with_certificates
-from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.comparison.evaluation.evaluation import evaluated
 from pinnray.geometry.finger.design import Design
+from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.fem.linear_solvers import Factorisation
 from pinnray.solvers.finger_figures import figures_at_rest
 from pinnray.solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalSolver, PinnStdSolver
 from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix

@@ -86,6 +86,8 @@ def test_a_refit_is_checked_like_a_solution(coarse_mesh: TriangleMesh) -> None:
     seen = observed_at(coarse_mesh.markers, np.zeros((9, 2)), 0.0)
     with pytest.raises(UserError, match="beam returned a displacement that is not finite everywhere"):
         refitter(Refitted({"field": Field(displacement=spoilt)}), Problem(coarse_mesh))(seen)
+    with pytest.raises(SolverFailedError, match="LinAlgError: Singular matrix"):
+        refitter(Refitted(lambda solution: np.linalg.inv(np.zeros((2, 2)))), Problem(coarse_mesh))(seen)
 
 
 def test_an_exception_tells_the_place_in_the_solvers_own_folder(coarse_mesh: TriangleMesh) -> None:

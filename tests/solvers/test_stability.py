@@ -44,7 +44,7 @@ def bent_force(problem):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "solver", [FemNonlinearSolver(), pytest.param(LOCAL, marks=pytest.mark.slow)], ids=["fem", "network"]
+    "solver", [FemNonlinearSolver(), pytest.param(LOCAL, marks=pytest.mark.release)], ids=["fem", "network"]
 )
 def test_a_column_buckles_under_eulers_load(problem, solver):
     """Within 1 %: shear and the shortening of the axis are less; straight it would bear 48 times as much.
@@ -73,7 +73,7 @@ def test_three_dimensions_tell_of_stability(monkeypatch):
     section, middle = column(HEIGHT, WIDTH)
     mesh = mesh_of(section, middle, 1.0, WIDTH)
     problem = Problem(mesh, Material(law="neo-hookean"), Load(kind="mean", displacement=(None, -STROKE)))
-    solver = Fem3dSolver(layers=1, grading=1.0, sides="held", linear_solver="direct")
+    solver = Fem3dSolver(layers=1, grading=1.0, sides="held")
     bent = solver.solve(problem)
     assert bent.status.converged, bent.status.message
     assert bent.stats["unstable_directions"] == 0
@@ -82,9 +82,6 @@ def test_three_dimensions_tell_of_stability(monkeypatch):
     straight = solver.solve(problem)
     assert not straight.status.converged
     assert "NOT STABLE" in straight.status.message
-
-    gently = replace(problem, load=Load(kind="mean", displacement=(None, -0.001)))
-    assert "stability not checked" in replace(solver, linear_solver="iterative").solve(gently).status.message
 
 
 def test_an_identified_finger_is_checked_with_its_contact_held(problem, monkeypatch):

@@ -3,7 +3,6 @@
 A view is the corners in one photograph, in the order of the board, shape (n, 2), NaN where one is not seen.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 import cv2
@@ -17,8 +16,6 @@ from pinnray.vision.frames.frame import GreyImage
 FEWEST_VIEWS = 4
 MAX_NAMED = 5
 """Photographs of other sizes whose sizes a message names."""
-MAX_SUGGESTIONS = 8
-"""Photographs without the expected board that are searched for another one."""
 
 
 def find_views(
@@ -30,37 +27,24 @@ def find_views(
         The views by the name of the photograph, (width, height) of all, and why others are left out, by name.
 
     Raises:
-        UserError: If the sizes differ, or most photographs show a board of another size.
+        UserError: If the sizes differ.
     """
     views: dict[str, FloatArray] = {}
     left_out: dict[str, str] = {}
-    others = Counter[str]()
     sizes: dict[tuple[int, int], list[str]] = {}
     for name, image in images:
         width, height = image.shape[::-1]
         sizes.setdefault((width, height), []).append(name)
         if len(sizes) > 1:
             continue  # the rest only tells which size is the usual one
-        corners = board.find(image)
-        if corners is not None:
-            if board.determines_pose(np.isfinite(corners[:, 0])):
-                views[name] = corners
-            else:
-                left_out[name] = unusable(corners)
-            continue
-        left_out[name] = f"no board of {board} was found"
-        undecided = len(views) < FEWEST_VIEWS and len(left_out) <= MAX_SUGGESTIONS
-        if undecided and (other := board.suggest(image)):
-            others[other] += 1
+        if (corners := board.find(image)) is None:
+            left_out[name] = f"no board of {board} was found"
+        elif board.determines_pose(np.isfinite(corners[:, 0])):
+            views[name] = corners
+        else:
+            left_out[name] = unusable(corners)
     if len(sizes) > 1:
         raise UserError(_other_sizes(sizes))
-    other, votes = others.most_common(1)[0] if others else ("", 0)
-    searched = min(len(left_out), MAX_SUGGESTIONS)
-    if len(views) < FEWEST_VIEWS and votes > max(1, len(views), searched / 2):
-        raise UserError(
-            f"{len(views)} of {len(views) + len(left_out)} photographs show the board of {board}; "
-            f"{votes} seem to show {other}"
-        )
     return views, next(iter(sizes), (0, 0)), left_out
 
 

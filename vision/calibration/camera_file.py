@@ -1,46 +1,39 @@
-"""Camera files: JSON or YAML with the keys of OpenCV's calibration sample, readable by `cv2.FileStorage`."""
+"""Camera files: JSON with the keys of OpenCV's calibration sample, readable by `cv2.FileStorage`."""
 
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-import cv2
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.atomic import write_text
+from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.text_files import read_json
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.camera_calibration import Calibration
 
-Entry = int | float | str | list[str] | FloatArray
-FORMATS = (".json", ".yml", ".yaml")
-DEEPEST = 100
-"""Depth of nested brackets in a camera file; its own have three."""
-MARKS = re.compile(r"^(?:---|\.\.\.|%).*$", re.MULTILINE)
-"""Lines of YAML between documents."""
-ONE_DOCUMENT: tuple[list[str], ...] = ([], ["---"], ["---", "..."])
-"""Those of a camera file after its first line. Where there are others, OpenCV's reader may never end."""
-
 
 def save_camera(path: Path, camera: Camera) -> None:
-    """Write a camera atomically, as JSON or YAML by the suffix; `load_camera` restores it.
+    """Write a camera atomically; `load_camera` restores it.
 
     Raises:
-        UserError: If the suffix is none of `FORMATS`.
+        UserError: If the suffix is not .json.
     """
-    _write(path, _content(camera))
+    check_format(path)
+    write_json(path, _content(camera))
 
 
 def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str, str] | None = None) -> None:
     """Write a camera with its errors, coverage, board and the versions of the programs that made it.
 
     Raises:
-        UserError: If the suffix is none of `FORMATS`.
+        UserError: If the suffix is not .json.
     """
     board, errors = calibration.board, calibration.view_errors
-    _write(
+    check_format(path)
+    write_json(
         path,
         _content(calibration.camera)
         | {
@@ -49,7 +42,7 @@ def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str
             "coverage": calibration.coverage,
             "nframes": len(errors),
             "image_names": list(errors),
-            "per_view_reprojection_errors": np.array([list(errors.values())]).T,
+            "per_view_reprojection_errors": _entry([[error] for error in errors.values()]),
             "board": type(board).__name__,
             "board_width": board.columns,
             "board_height": board.rows,
@@ -60,86 +53,61 @@ def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str
 
 
 def load_camera(path: Path) -> Camera:
-    """Read a camera file of this program or of OpenCV's calibration sample.
+    """Read a camera file.
 
     Raises:
         UserError: If the file cannot be read, a key is missing or its value is of another kind.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        if _depth(text) > DEEPEST:  # OpenCV's reader ends the process
-            raise UserError(f"cannot read the camera {path}: it is nested too deeply")
-        marks = [mark.rstrip() for mark in MARKS.findall(text)]
-        if text.startswith("%") and marks[1:] not in ONE_DOCUMENT:
-            raise UserError(f"cannot read the camera {path}: it is not one YAML document as OpenCV writes it")
-        storage = cv2.FileStorage(text, cv2.FileStorage_READ | cv2.FileStorage_MEMORY)
-        return _camera(storage, path)  # OpenCV finds some faults only where it looks for a key
-    except OSError as error:
-        raise UserError(f"cannot read the camera {path}: {error.strerror}") from None
-    except (UnicodeDecodeError, cv2.error, SystemError):
-        raise UserError(
-            f"cannot read the camera {path}: it is not JSON or YAML as OpenCV writes it"
-        ) from None
-
-
-def check_format(path: Path) -> None:
-    """Raise `UserError` unless the suffix is one of `FORMATS`."""
-    if path.suffix.lower() not in FORMATS:
-        raise UserError(f"{path}: a camera is written as {', '.join(FORMATS)}; give a name that ends so")
-
-
-def _camera(storage: cv2.FileStorage, path: Path) -> Camera:
-    width, height = (_number(storage, name, path) for name in ("image_width", "image_height"))
-    matrix = _matrix(storage, "camera_matrix", path, sizes=(9,)).reshape(3, 3)
-    model = "fisheye" if storage.getNode("fisheye_model").real() else "brown"
+    content = read_json(path, "camera")
+    if not isinstance(content, dict):
+        raise UserError(f"{path}: a camera has image_width, image_height, camera_matrix and more")
+    width, height = (_number(content, name, path) for name in ("image_width", "image_height"))
+    matrix = _matrix(content, "camera_matrix", path, sizes=(9,)).reshape(3, 3)
+    model = "fisheye" if content.get("fisheye_model") else "brown"
     sizes = (4,) if model == "fisheye" else (4, 5)
-    distortion = _matrix(storage, "distortion_coefficients", path, sizes=sizes)
+    distortion = _matrix(content, "distortion_coefficients", path, sizes=sizes)
     coefficients = tuple(np.resize([*distortion, 0.0], max(sizes)).tolist())
     fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     try:
         camera = Camera(width, height, fx, fy, cx, cy, coefficients, model)
-        return replace(camera, covariance=_covariance(storage, len(camera.intrinsic_names), path))
+        return replace(camera, covariance=_covariance(content, len(camera.intrinsic_names), path))
     except UserError as error:
         raise UserError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
 
 
-def _content(camera: Camera) -> dict[str, Entry]:
-    content: dict[str, Entry] = {
+def check_format(path: Path) -> None:
+    """Raise `UserError` unless the suffix is .json."""
+    if path.suffix.lower() != ".json":
+        raise UserError(f"{path}: a camera is written as JSON; give a name that ends in .json")
+
+
+def _content(camera: Camera) -> dict[str, object]:
+    content: dict[str, object] = {
         "image_width": camera.width,
         "image_height": camera.height,
         "fisheye_model": int(camera.model == "fisheye"),
-        "camera_matrix": camera.matrix,
-        "distortion_coefficients": np.array([camera.distortion]),
+        "camera_matrix": _entry(camera.matrix.tolist()),
+        "distortion_coefficients": _entry([camera.distortion]),
     }
     if camera.covariance is not None:
         content["intrinsics"] = list(camera.intrinsic_names)
-        content["intrinsics_standard_deviations"] = np.array([camera.standard_deviations])
-        content["intrinsics_covariance"] = np.array(camera.covariance)
+        content["intrinsics_standard_deviations"] = _entry([camera.standard_deviations or ()])
+        content["intrinsics_covariance"] = _entry(camera.covariance)
     return content
 
 
-def _write(path: Path, content: Mapping[str, Entry]) -> None:
-    check_format(path)
-    storage = cv2.FileStorage(path.suffix.lower(), cv2.FileStorage_WRITE | cv2.FileStorage_MEMORY)
-    for name, value in content.items():
-        storage.write(name, value)
-    write_text(path, storage.releaseAndGetString())
+def _entry(rows: Sequence[Sequence[float]]) -> dict[str, object]:
+    """A matrix as `cv2.FileStorage` has it."""
+    data = [float(value) for row in rows for value in row]
+    return {"type_id": "opencv-matrix", "rows": len(rows), "cols": len(rows[0]), "dt": "d", "data": data}
 
 
-def _depth(text: str) -> int:
-    """Number of brackets that are open at once, outside quoted texts."""
-    steps = [
-        1 if bracket in "[{" else -1 for bracket in re.findall(r"[\[\]{}]", re.sub(r'"[^"]*"', "", text))
-    ]
-    return int(np.cumsum([0, *steps]).max())
-
-
-def _covariance(storage: cv2.FileStorage, size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:
+def _covariance(content: Mapping[str, Any], size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:
     """The covariance in the file, or a diagonal one from standard deviations, or None."""
-    if not storage.getNode("intrinsics_covariance").empty():
-        covariance = _matrix(storage, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
-    elif not storage.getNode("intrinsics_standard_deviations").empty():
-        deviations = _matrix(storage, "intrinsics_standard_deviations", path, sizes=(size,))
+    if "intrinsics_covariance" in content:
+        covariance = _matrix(content, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
+    elif "intrinsics_standard_deviations" in content:
+        deviations = _matrix(content, "intrinsics_standard_deviations", path, sizes=(size,))
         if (deviations < 0).any():
             raise UserError("a standard deviation is below zero")
         covariance = np.diag(deviations**2)
@@ -148,23 +116,20 @@ def _covariance(storage: cv2.FileStorage, size: int, path: Path) -> tuple[tuple[
     return tuple(map(tuple, covariance.tolist()))
 
 
-def _number(storage: cv2.FileStorage, name: str, path: Path) -> int:
-    node = storage.getNode(name)
-    if not node.isInt():
-        raise UserError(f"{path}: {name} is {'missing' if node.empty() else 'no whole number'}; give pixels")
-    return int(node.real())
+def _number(content: Mapping[str, Any], name: str, path: Path) -> int:
+    if not isinstance(value := content.get(name), int):
+        fault = "no whole number" if name in content else "missing"
+        raise UserError(f"{path}: {name} is {fault}; give pixels")
+    return value
 
 
-def _matrix(storage: cv2.FileStorage, name: str, path: Path, *, sizes: tuple[int, ...]) -> FloatArray:
+def _matrix(content: Mapping[str, Any], name: str, path: Path, *, sizes: tuple[int, ...]) -> FloatArray:
     """The entries of a matrix, whose number must be one of `sizes`."""
-    node = storage.getNode(name)
     what = f"a matrix of {' or '.join(map(str, sizes))} numbers"
-    if node.empty():
+    if name not in content:
         raise UserError(f"{path}: {name} is missing; it must be {what}")
-    try:
-        values = np.asarray(node.mat(), dtype=np.float64).ravel()
-    except (cv2.error, SystemError, TypeError):
-        values = np.empty(0)
-    if len(values) not in sizes:
+    data = content[name].get("data") if isinstance(content[name], dict) else None
+    numbers = data if isinstance(data, list) else []
+    if len(numbers) not in sizes or not all(isinstance(value, int | float) for value in numbers):
         raise UserError(f"{path}: {name} is not {what}")
-    return values
+    return np.asarray(numbers, dtype=np.float64)

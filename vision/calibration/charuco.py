@@ -10,7 +10,6 @@ import numpy as np
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.chessboard import Board
-from pinnray.vision.calibration.dot_grid import DotGrid
 from pinnray.vision.frames.frame import GreyImage
 
 MARKER_FREE = 0.6
@@ -20,9 +19,6 @@ DICTIONARIES = {
     for name in sorted(dir(cv2.aruco))
     if name.startswith("DICT_") and name == name.upper()
 }
-LARGEST = [name for name in DICTIONARIES if not name.endswith(("_50", "_100", "_250"))]
-"""Dictionaries that are not part of a larger one."""
-FEWEST_MARKERS = 3
 
 
 @dataclass(frozen=True)
@@ -86,13 +82,6 @@ class CharucoBoard(Board):
         corners[np.ravel(numbers)] = np.reshape(pixels, (-1, 2))
         return self.refine(image, corners, MARKER_FREE * (self.square - self.marker))
 
-    def suggest(self, image: GreyImage) -> str | None:
-        """Suggest another dictionary for the markers in an image; None if it is this one or there are few."""
-        counts = {name: _markers_seen(image, name) for name in LARGEST}
-        best = max(counts, key=counts.__getitem__)
-        own = self.dictionary.rsplit("_", 1)[0] == best.rsplit("_", 1)[0]
-        return None if own or counts[best] < FEWEST_MARKERS else f"markers {best.removesuffix('_1000')}"
-
     def _opencv(self, *, legacy: bool) -> cv2.aruco.CharucoBoard:
         board = cv2.aruco.CharucoBoard(
             (self.columns + 1, self.rows + 1),
@@ -104,38 +93,25 @@ class CharucoBoard(Board):
         return board
 
 
-def _markers_seen(image: GreyImage, dictionary: str) -> int:
-    settings = cv2.aruco.DetectorParameters()
-    settings.detectInvertedMarker = True
-    markers = cv2.aruco.getPredefinedDictionary(DICTIONARIES[dictionary])
-    detector = cv2.aruco.ArucoDetector(markers, settings)
-    _, numbers, _ = detector.detectMarkers(image)
-    return 0 if numbers is None else len(numbers)
-
-
 def parse_board(
     text: str, square: float, *, marker: float | None = None, dictionary: str = "5X5_100"
 ) -> Board:
     """Parse the name of a board; sides in mm.
 
-    9x6 is a chessboard by inner corners, charuco:8x6 a ChArUco board by squares, circles:7x6 a grid of dots,
-    and acircles:4x11 one with every other row shifted.
+    9x6 is a chessboard by inner corners, and charuco:8x6 a ChArUco board by squares.
 
     Raises:
         UserError: If the text names no possible board.
     """
-    if not (found := re.fullmatch(r"(?:(charuco|a?circles):)?(\d{1,3})x(\d{1,3})", text.strip(), re.I)):
+    if not (found := re.fullmatch(r"(charuco:)?(\d{1,3})x(\d{1,3})", text.strip(), re.I)):
         raise UserError(
-            f"cannot read the board {text!r}; give its inner corners, such as 9x6, the squares of a ChArUco "
-            "board, such as charuco:8x6, or the dots of a grid, such as circles:7x6 or acircles:4x11"
+            f"cannot read the board {text!r}; give its inner corners, such as 9x6, or the squares of a "
+            "ChArUco board, such as charuco:8x6"
         )
-    kind, columns, rows = (found[1] or "").lower(), int(found[2]), int(found[3])
-    if kind != "charuco":
+    columns, rows = int(found[2]), int(found[3])
+    if not found[1]:
         if marker is not None:
-            size = text.split(":")[-1]
-            raise UserError(f"the board {text} has no markers; for a ChArUco board give charuco:{size}")
-        if kind:
-            return DotGrid(columns, rows, square, asymmetric=kind == "acircles")
+            raise UserError(f"the board {text} has no markers; for a ChArUco board give charuco:{text}")
         return Board(columns, rows, square)
     if marker is None:
         raise UserError(f"the board {text} has markers; give their side in mm")

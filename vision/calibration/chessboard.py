@@ -143,22 +143,6 @@ class Board:
         values = np.linalg.svd(np.block(equations), compute_uv=False)
         return bool(values[7] >= LEAST_RANK * values[0])
 
-    def suggest(self, image: GreyImage) -> str | None:
-        """Suggest a size for the board in an image; None if there is none with all of its corners.
-
-        It may be a part of a board, so that one image alone is no proof.
-        """
-        small = _smaller(image, max(image.shape) / LARGE)
-        found, corners, cells = cv2.findChessboardCornersSBWithMeta(small, (3, 3), cv2.CALIB_CB_LARGER)
-        if not found:
-            return None
-        rows, columns = cells.shape
-        other = Board(columns, rows, self.square)
-        refined = other.refine(small, np.reshape(corners, (-1, 2)).astype(np.float64), EDGE * self.square)
-        if not np.isfinite(refined).all():  # OpenCV adds rows to smaller boards
-            return None
-        return f"{max(rows, columns)}x{min(rows, columns)}"
-
 
 def _smaller(image: GreyImage, shrink: float) -> GreyImage:
     """An image with its sides divided by `shrink`; unchanged if that is not above 1."""

@@ -11,13 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
-from pinnray.vision.discs.correlated_noise import CorrelatedNoise, correlated_noise
+from pinnray.vision.discs.correlated_noise import correlated_noise
 from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     COUNT,
-    EDGE,
-    EDGES,
     GLARE,
     GLARES,
     HALO,
@@ -34,21 +32,18 @@ from pinnray.vision.discs.disc_image_model import (
     outline,
     outline_centroid,
 )
-from pinnray.vision.discs.edge_profile import with_edges
 from pinnray.vision.discs.fit_priors import MISSING, Known, prior_and_limits
-from pinnray.vision.discs.hough import SECTORS, sector
 from pinnray.vision.discs.least_squares import (
-    FAINT,
-    NEAR,
     NONE,
     DiscFit,
     DiscPrior,
-    coherent_pixels,
     fit_disc_model,
     misfit,
+    normal_matrices,
     refined_fit,
 )
 from pinnray.vision.discs.pixel_windows import DARKEST, LIGHTEST, PixelWindows
+from pinnray.vision.discs.straight_edges import with_edges
 
 PENALTY = 40.0
 """Gain in logarithmic likelihood from which on an irregular outline is preferred to an ellipse: half of the
@@ -56,30 +51,22 @@ logarithm of some hundred pixels for each of its parameters (G. Schwarz, "Estima
 model", Annals of Statistics 6, 1978)."""
 REFINEMENTS = 3
 """Number of times that the pixels to use are chosen."""
-UNEVEN, EXCURSION = 0.12, 0.3
-"""Largest deviation of a printed dot's outline, root mean square and anywhere, over the radius."""
+EXCURSION = 0.3
+"""Largest deviation of a printed dot's outline, over the radius."""
 ROUGH = 0.06
 """Largest residual of a printed dot, root mean square over the contrast, without the noise."""
 LEAST_SEEN = 0.7
 """Share of an irregular outline that must support its fit."""
+OTHER_SIZE = 5.0
+"""Deviation of a known radius, in standard deviations, from which on a disc counts as partly hidden."""
 GLOSSY, LEAST_GLOSSY = 0.02, 0.45
 """Largest residual, as above, and least share of the outline, of a dot before a glare is sought on it: half a
 dot and a glare could fit as well."""
-OTHER_SIZE = 5.0
-"""Deviation of a known radius, in standard deviations, from which on a disc counts as partly hidden."""
-OTHER_CONTRAST = 0.5
-"""Relative change of a contrast between two fits from which on they are of different shapes."""
-STRONGEST = 512.0
-"""Contrast that no picture shows, grey levels: twice the range, for light that is clipped."""
-FOREIGN, FEWEST = 0.3, 4
-"""Residual over the contrast from which on a pixel may belong to an occluder, and the fewest such pixels."""
-AGREED = 0.9
-"""Share of the pixels of a sector of the edge that agree with the model where nothing hides it."""
 
 
 def better_outlines(
     ellipses: DiscFit, start: FloatArray, window: PixelWindows, radii: FloatArray, known: Known
-) -> tuple[IntArray, DiscFit, CorrelatedNoise]:
+) -> tuple[IntArray, DiscFit, FloatArray]:
     """Fits of irregular outlines that explain the pixels better than ellipses do.
 
     Args:
@@ -91,16 +78,13 @@ def better_outlines(
 
     Returns:
         The numbers of these discs, shape (k,), their fits, whose centres are the centroids of the outlines,
-        and the noise that counts for them.
+        and the noise that counts for them, as of `correlated_noise`.
     """
     outlines, residuals = _outlined(window, start, radii, known)
     noise = np.maximum(np.minimum(ellipses.variance, outlines.variance), window.noise**2)
     gain = misfit(window, ellipses.parameters, noise) - misfit(window, outlines.parameters, noise)
-    change = np.abs(ellipses.parameters[:, CONTRAST] - start[:, CONTRAST])
-    likely = change < OTHER_CONTRAST * np.abs(start[:, CONTRAST])
-    seen = ~(_hidden_in_one_place(window, ellipses) & ellipses.settled & likely)
-    good = _whole(window, outlines, radii, known.tolerance) & (gain > PENALTY) & seen
-    doubtful = ~(ellipses.settled & (ellipses.seen > LEAST_SEEN)) & ~good & seen
+    good = _whole(window, outlines, radii, known.tolerance) & (gain > PENALTY)
+    doubtful = ~(ellipses.settled & (ellipses.seen > LEAST_SEEN)) & ~good
     (tried,) = np.nonzero(doubtful)
     if len(tried):
         lenient, left = _outlined(window.at(tried), start[tried], radii[tried], known.at(tried), lenient=True)
@@ -120,39 +104,11 @@ def better_outlines(
 
 def _whole(window: PixelWindows, outlines: DiscFit, radii: FloatArray, tolerance: float) -> BoolArray:
     """Whether outlines may be those of printed dots that nothing hides, shape (n,)."""
-    parameters = outlines.parameters
-    radius, contrast = parameters[:, RADIUS], np.abs(parameters[:, CONTRAST])
-    waves = outline(parameters)
-    uneven = (waves.std(axis=1) < UNEVEN) & (np.abs(waves - 1).max(axis=1) < EXCURSION)
-    size = np.abs(radius / radii - 1) < OTHER_SIZE * tolerance
+    excursion = np.abs(outline(outlines.parameters) - 1).max(axis=1)
     rough = np.sqrt(np.maximum(outlines.variance - window.noise**2, 0))
-    edges = parameters[:, COUNT + OUTLINE :].reshape(-1, EDGES, EDGE)
-    angle, offset = edges[:, :, 0], edges[:, :, 1]
-    gap = offset - np.cos(angle) * parameters[:, [X]] - np.sin(angle) * parameters[:, [Y]] - radius[:, None]
-    crossed = (gap < -UNEVEN * radius[:, None]) & (np.abs(edges[:, :, 2]) > ROUGH * contrast[:, None])
-    likely = uneven & size & (rough < ROUGH * contrast) & (contrast < STRONGEST) & ~crossed.any(axis=1)
+    likely = (excursion < EXCURSION) & (rough < ROUGH * np.abs(outlines.parameters[:, CONTRAST]))
+    likely &= np.abs(outlines.parameters[:, RADIUS] / radii - 1) < OTHER_SIZE * tolerance
     return np.asarray(outlines.settled & (outlines.seen > LEAST_SEEN) & likely)
-
-
-def _hidden_in_one_place(window: PixelWindows, ellipses: DiscFit) -> BoolArray:
-    """Whether ellipses disagree with the image in one arc, at most half of the edge, and nowhere else."""
-    levels, _ = disc_image(ellipses.parameters.astype(np.float32), window.x, window.y)
-    residuals = window.values - np.clip(levels, 0, 255)
-    agree = coherent_pixels(window, ellipses, residuals)
-    near = (np.abs(window.outside(ellipses.parameters)) < NEAR) & window.within
-    x, y = ellipses.parameters[:, [X, Y]].T[:, :, None]
-    sectors = sector(window.x - x, window.y - y)
-    good = np.stack(
-        [
-            (agree & (here := near & (sectors == number))).sum(axis=1) >= 0.9 * here.sum(axis=1)
-            for number in range(SECTORS)
-        ],
-        axis=1,
-    )
-    changes = (good != np.roll(good, 1, axis=1)).sum(axis=1)
-    foreign = near & (np.abs(residuals) > FOREIGN * np.abs(ellipses.parameters[:, [CONTRAST]]))
-    hidden = (changes == 2) & (good.sum(axis=1) >= SECTORS / 2) & (foreign.sum(axis=1) >= FEWEST)
-    return np.asarray(hidden)
 
 
 def _outlined(
@@ -196,13 +152,11 @@ def _gain_of_glare(window: PixelWindows, fit: DiscFit, residuals: Array, prior: 
     noise = np.sqrt(fit.variance)[:, None]
     counted = window.within & (np.abs(residuals) < NONE * noise)
     counted &= (window.values > DARKEST) & (window.values < LIGHTEST)
-    weighted = derivatives * (counted / noise**2).astype(np.float32)[:, None]
-    normal = (weighted @ derivatives.transpose(0, 2, 1)).astype(np.float64)
-    diagonal = range(normal.shape[1])
-    normal[:, diagonal, diagonal] *= 1 + FAINT
-    normal[:, diagonal, diagonal] += prior.precision + FAINT
-    pull = (weighted @ residuals[:, :, None])[:, :, 0] + prior.precision * (prior.mean - fit.parameters)
-    inverse = np.linalg.inv(normal)
+    inverse = np.linalg.inv(
+        normal_matrices(derivatives, counted.astype(np.float32), fit.variance, prior.precision)
+    )
+    pull = (derivatives @ (counted * residuals)[:, :, None])[:, :, 0] / noise**2
+    pull += prior.precision * (prior.mean - fit.parameters)
     steps = (inverse @ pull[:, :, None])[:, GLARE]
     own = inverse[:, GLARE][:, :, GLARE]
     return np.asarray((steps.transpose(0, 2, 1) @ np.linalg.solve(own, steps))[:, 0, 0] / 2)

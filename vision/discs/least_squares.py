@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.vision.discs.disc_image_model import (
@@ -51,14 +50,11 @@ LENIENT = 2
 TOLERANCE = 0.01
 """Last step of a centre, pixels."""
 STEADY = 0.8
-"""Variance of the noise over that of the iteration before, from which on a fit of a clipped disc has settled:
-expected levels make for short steps."""
+"""Variance of the noise over that of the iteration before, from which on a fit has settled."""
 MODEL_ERROR = 0.04
 """Residual over contrast that is attributed to the model, not to occlusion."""
-DOUBT = 10
-"""Grey levels from those that may be clipped to those that a codec may leave of clipped ones."""
-SURE = 8.0
-"""Distance from a limit, in standard deviations, from which on a clipped pixel tells all."""
+DOUBT = 20.0
+"""Grey levels by which noise or a codec may move a clipped pixel from the limit."""
 NEAR = 2.0
 """Pixels from the edge within which the noise matters most."""
 SHARPEST = 0.3
@@ -157,30 +153,25 @@ def fit_disc_model(
     result = DiscFit.start(start.copy(), window.origins)
     information = np.tile(np.eye(width), (count, 1, 1))
     all_residuals = np.empty_like(window.values)
-    active, diagonal = np.arange(count), range(width)
+    active = np.arange(count)
     bends = list(range(irregular_columns(width)[1] + EDGE - 1, width, EDGE))
     for number in range(STEPS):
         now, allowed, values = result.parameters[active], chosen[active], window.values[active]
         levels, derivatives = disc_image(now.astype(np.float32), window.x, window.y)
-        expected, known = behind_clipping(values, levels, result.variance[active])
-        residuals = expected - levels
+        beyond = beyond_limits(values, levels)
+        counted, residuals = allowed & ~beyond, np.where(beyond, 0, values - levels)
         most = np.maximum(2 * window.noise[active], MODEL_ERROR * np.abs(now[:, CONTRAST]))
         if lenient or number < LENIENT:
             most = most + 1e3
-        noise = np.minimum(SCALE * median_where(np.abs(residuals), allowed & (known > 0.5)), most)
+        noise = np.minimum(SCALE * median_where(np.abs(residuals), counted), most)
         noise = np.maximum(noise, QUANTISATION**0.5)
-        ratio = np.abs(residuals) / noise[:, None].astype(np.float32)
-        agreement = np.clip((NONE - ratio) / (NONE - FULL), 0, 1) * allowed
-        weights = agreement * known
-        weighted = derivatives * weights[:, None]
+        agreement = robust_weights(residuals / noise[:, None].astype(np.float32), allowed)
+        weights = agreement * counted
         squares = (weights * residuals**2).sum(axis=1)
         variance = np.maximum(squares / np.maximum(weights.sum(axis=1) - width, 1), QUANTISATION)
         precision = prior.precision[active]
-        normal = (weighted @ derivatives.transpose(0, 2, 1)) / variance[:, None, None]
-        normal[:, diagonal, diagonal] *= 1 + FAINT
-        normal[:, diagonal, diagonal] += precision + FAINT
-        pulls = agreement * residuals
-        gradient = (derivatives @ pulls[:, :, None])[:, :, 0] / variance[:, None]
+        normal = normal_matrices(derivatives, weights, variance, precision)
+        gradient = (derivatives @ (weights * residuals)[:, :, None])[:, :, 0] / variance[:, None]
         gradient += precision * (prior.mean[active] - now)
         step = np.linalg.solve(normal, gradient[:, :, None])[:, :, 0]
         shortened = np.minimum(1, (limits[active] / np.maximum(np.abs(step), 1e-12)).min(axis=1))
@@ -189,7 +180,7 @@ def fit_disc_model(
         now[:, BLUR] = np.clip(now[:, BLUR], SHARPEST, now[:, RADIUS])
         most_bent = MOST_BENT / now[:, [RADIUS]]
         now[:, bends] = np.clip(now[:, bends], -most_bent, most_bent)
-        steady = (variance > STEADY * result.variance[active]) | (known.min(axis=1) == 1)
+        steady = variance > STEADY * result.variance[active]
         result.parameters[active], information[active], result.variance[active] = now, normal, variance
         all_residuals[active] = residuals
         by_radius = derivatives[:, RADIUS] ** 2
@@ -205,35 +196,33 @@ def fit_disc_model(
     return result, all_residuals
 
 
-def behind_clipping(values: Array, levels: Array, variance: FloatArray) -> tuple[Array, Array]:
-    """Expected grey levels before clipping, and the share of the information that clipping left.
+def robust_weights(ratios: Array, allowed: BoolArray) -> Array:
+    """Weights of residuals over their noise, shape (n, p); zero where a pixel is not allowed."""
+    return np.asarray(np.clip((NONE - np.abs(ratios)) / (NONE - FULL), 0, 1) * allowed, dtype=np.float32)
 
-    Of a clipped pixel it is known only that its level is beyond the limit: with the model's level m and
-    normal noise of variance v, the level is expected at m + √v λ(z) and has the information λ(z) (λ(z) + z),
-    where λ is the ratio of density and distribution at z, the model's excess over the limit by √v.
+
+def normal_matrices(
+    derivatives: Array, weights: Array, variance: FloatArray, precision: FloatArray
+) -> FloatArray:
+    """Normal matrices of discs with the precision of the prior, shape (n, m, m).
 
     Args:
-        values: Grey levels in the image, shape (n, p).
-        levels: The same by the model, without clipping.
+        derivatives: Of the pixels by the parameters, shape (n, m, p).
+        weights: Of the pixels, shape (n, p).
         variance: Of the noise, shape (n,), grey levels².
-
-    Source: J. Tobin, "Estimation of relationships for limited dependent variables", Econometrica 26, 1958.
+        precision: Of the prior, shape (n, m).
     """
-    expected, known = values.copy(), np.ones_like(values)
-    deviation = np.sqrt(variance).astype(np.float32)[:, None]
-    for sign, limit in ((1, LIGHTEST), (-1, DARKEST)):
-        clipped = sign * values >= sign * limit
-        if not clipped.any():
-            continue
-        blurred = (sign * values >= sign * limit - DOUBT) & (sign * levels >= sign * limit + DOUBT)
-        excess = sign * (levels - limit) / deviation
-        bounded = np.maximum(excess, -SURE)
-        hazard = np.exp(-(bounded**2) / 2 - log_ndtr(bounded)) / np.float32(np.sqrt(2 * np.pi))
-        behind = np.where(blurred, 0, np.clip(hazard * (hazard + bounded), 0, 1))
-        pulled = levels + np.where(blurred, 0, sign * deviation * (hazard + bounded - excess))
-        expected = np.where(clipped | blurred, pulled, expected)
-        known = np.where(clipped | blurred, behind, known)
-    return expected, known
+    normal = ((derivatives * weights[:, None]) @ derivatives.transpose(0, 2, 1)) / variance[:, None, None]
+    diagonal = range(normal.shape[1])
+    normal[:, diagonal, diagonal] *= 1 + FAINT
+    normal[:, diagonal, diagonal] += precision + FAINT
+    return np.asarray(normal, dtype=np.float64)
+
+
+def beyond_limits(values: Array, levels: Array) -> BoolArray:
+    """Pixels that the model clips and the image shows as clipped, so that they say no more, shape (n, p)."""
+    light = (levels >= LIGHTEST) & (values >= LIGHTEST - DOUBT)
+    return np.asarray(light | (levels <= DARKEST) & (values <= DARKEST + DOUBT))
 
 
 def _columns(start: FloatArray, prior: DiscPrior) -> list[int]:

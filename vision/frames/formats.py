@@ -8,49 +8,31 @@ from pinnray.runtime.errors import UserError
 PNG, TIFF = b"\x89PNG\r\n\x1a\n", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 HEAD = 64
 """Bytes at the start of a file that tell its format."""
-UNREAD_SUFFIXES = (
-    dict.fromkeys((".heic", ".heif", ".hif"), "HEIC")
-    | {".avif": "AVIF", ".jxl": "JPEG XL"}
-    | dict.fromkeys((".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".pef", ".srw"), "raw")
+UNREAD = "HEIC, AVIF, JPEG XL and raw photographs are not read; convert them to JPEG, PNG or TIFF"
+UNREAD_SUFFIXES = frozenset(
+    {".heic", ".heif", ".hif", ".avif", ".jxl"}
+    | {".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".pef", ".srw"}
 )
-"""Formats of photographs that are not read, by suffix.
+"""Formats of photographs that are not read.
 
 FFmpeg opens some, but gives a tile, a preview or the first picture. HEIC would need libheif (pillow-heif: 6
 MB, of which x265 is under the GPL), which turns photographs as their tag says; all others come as the sensor
 read them, and one calibration fits all.
 """
-_HEIF = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1", b"mif2"})
+_BRANDS = frozenset(b"heic heix heim heis hevc hevx mif1 msf1 mif2 avif avis crx".split())
 SUBFILE, _SMALLER, _MASK = 254, 1, 4
 """A TIFF page's tag NewSubfileType, and its bits: a smaller copy of another page, a mask of one."""
 DESCRIPTION = 8192
 """Bytes at the start of a TIFF in which ImageJ writes how many images it has."""
 
 
-def unread_format(content: bytes) -> str | None:
-    """Name of a format that is not read, by the start of a file; None if it is none.
+def is_unread(content: bytes) -> bool:
+    """True for the start of a photograph in a format that is not read.
 
     Source: ISO/IEC 23008-12 and the AVIF specification, brands in the box `ftyp`; ISO/IEC 18181-2.
     """
-    if content.startswith((b"\xff\x0a", b"\0\0\0\x0cJXL ")):
-        return "JPEG XL"
-    if content[4:8] != b"ftyp":
-        return None
-    if content[8:12] == b"crx ":
-        return "raw"
-    size = int.from_bytes(content[:4], "big")
-    brands = {content[at : at + 4] for at in (8, *range(16, min(size, HEAD), 4))}
-    if content[8:12] in _HEIF | {b"avif", b"avis"}:
-        return "AVIF" if brands & {b"avif", b"avis"} else "HEIC"
-    return None
-
-
-def refusal(name: str) -> str:
-    """A clause on a format that is not read, and the remedy."""
-    if name == "raw":
-        return "raw photographs are not read; convert it to TIFF or PNG"
-    tool = "heif-convert" if name in ("HEIC", "AVIF") else "ImageMagick"
-    camera = ", or set the telephone to take JPEG (most compatible)" if name == "HEIC" else ""
-    return f"{name} is not read; convert it to JPEG or PNG, such as with {tool}{camera}"
+    jpeg_xl = content.startswith((b"\xff\x0a", b"\0\0\0\x0cJXL "))
+    return jpeg_xl or (content[4:8] == b"ftyp" and content[8:12].strip() in _BRANDS)
 
 
 def has_pages(head: bytes) -> bool:

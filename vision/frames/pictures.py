@@ -12,12 +12,12 @@ import cv2
 from pinnray.runtime.atomic import write_bytes
 from pinnray.runtime.errors import UserError
 from pinnray.vision.frames.decoder import JPEG, PNG_HEADER, Decoder, content_of, picture_end
-from pinnray.vision.frames.formats import HEAD, PNG, UNREAD_SUFFIXES, has_pages, refusal, unread_format
+from pinnray.vision.frames.formats import HEAD, PNG, UNREAD, UNREAD_SUFFIXES, has_pages, is_unread
 from pinnray.vision.frames.frame import RIG_MARK, CapturedImage, Image, ImageStream
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
-ANIMATIONS = {".gif": "GIF"}
-"""Pictures of many frames that FFmpeg reads as films, each by itself, by suffix."""
+ANIMATION = ".gif"
+"""Suffix of pictures of many frames that FFmpeg reads as films, each by itself."""
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:
@@ -35,12 +35,12 @@ def picture_paths(source: str | Path) -> list[Path]:
     path = Path(source)
     if path.is_dir():
         shown = [file for file in path.iterdir() if not file.name.startswith(".")]
-        names = UNREAD_SUFFIXES | ANIMATIONS
-        others = sorted((file for file in shown if file.suffix.lower() in names), key=natural_order)
+        foreign = UNREAD_SUFFIXES | {ANIMATION}
+        others = sorted((file for file in shown if file.suffix.lower() in foreign), key=natural_order)
         if others:
             more = f" and {len(others) - 1} more" if len(others) > 1 else ""
-            kind = names[others[0].suffix.lower()]
-            remedy = "a GIF is a film of its own" if kind == "GIF" else refusal(kind)
+            is_gif = others[0].suffix.lower() == ANIMATION
+            remedy = "a GIF is a film of its own" if is_gif else UNREAD
             raise UserError(f"{path} holds {others[0].name}{more}: {remedy}; or take them out")
         found = [file for file in shown if file.suffix.lower() in SUFFIXES and file.is_file()]
     elif path.exists() or not has_magic(str(source)):
@@ -68,8 +68,8 @@ def is_picture(path: Path) -> bool:
     except OSError:
         return False
     suffix = path.suffix.lower()
-    if name := unread_format(head) or UNREAD_SUFFIXES.get(suffix):
-        raise UserError(f"cannot read the picture {path}: {refusal(name)}")
+    if is_unread(head) or suffix in UNREAD_SUFFIXES:
+        raise UserError(f"cannot read the picture {path}: {UNREAD}")
     return suffix in SUFFIXES or has_pages(head)
 
 

@@ -11,8 +11,7 @@ from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import ShapeError
-from pinnray.vision.rig.print_layers import PrintLayers
-from pinnray.vision.rig.shapes import CORNERS, Paint, Scene, Shape, blot, circle, closed, rectangle
+from pinnray.vision.rig.shapes import Paint, Scene, Shape, blot, circle, closed, rectangle
 from pinnray.vision.tracking.workspace import Workspace
 
 PAINTS: dict[str, Paint] = {
@@ -32,10 +31,6 @@ CLAMP_SIZE = (7.0, 3.0)
 """Extent of the clamp behind the base, and beyond its ends, mm."""
 BLADE = ((0.0, 0.0), (0.033, 0.1), (0.033, 0.67))
 """Corners of the right half of the indenter, from the end of the contact, over the finger's height."""
-SPECK, SPECK_CORNERS = 0.1, 16
-"""Radius of a speck of mottle over that of its marker, and corners of the polygon that stands for it."""
-FADED = 0.5
-"""Colour of a speck, from the marker's to the finger's."""
 OVERLAP = 0.3
 """Overlap of the indenter with the finger, which hides it, so that no gap is visible, mm."""
 
@@ -50,8 +45,6 @@ class Bench:
         workspace: Around it.
         paint: Of the markers, one of `PAINTS`.
         irregular: Root mean square deviation of the markers' outlines from circles, over their radius.
-        mottle: Share of the markers' area that light specks cover.
-        layers: Difference between the reflectances of light and dark layers of the finger, relative.
     """
 
     mesh: TriangleMesh
@@ -59,8 +52,6 @@ class Bench:
     workspace: Workspace
     paint: str = "dark"
     irregular: float = 0.0
-    mottle: float = 0.0
-    layers: float = 0.0
 
     def markers(self, displacement: FloatArray) -> FloatArray:
         """Centres of the markers, shape (m, 3), mm, for nodal displacements, shape (n, 2), mm."""
@@ -71,15 +62,6 @@ class Bench:
         """The markers, deformed with the finger, for nodal displacements, shape (n, 2), mm."""
         borders = np.split(self._moved(self._marker_borders, displacement), len(self.mesh.marker_nodes))
         return [Shape(closed(border), PAINTS[self.paint], self.workspace.marker_plane) for border in borders]
-
-    def specks(self, displacement: FloatArray) -> list[Shape]:
-        """Light specks in the markers, deformed with the finger; none without mottle."""
-        if self._speck_borders is None:
-            return []
-        dark, light = np.array(PAINTS[self.paint]), np.array(FINGER)
-        blue, green, red = ((1 - FADED) * dark + FADED * light).tolist()
-        borders = self._moved(self._speck_borders, displacement).reshape(-1, SPECK_CORNERS, 2)
-        return [Shape(closed(border), (blue, green, red), self.workspace.marker_plane) for border in borders]
 
     def scene(self, displacement: FloatArray, occluders: Sequence[Shape] = ()) -> Scene:
         """The scene for nodal displacements, shape (n, 2), mm, with occluders in front."""
@@ -93,9 +75,7 @@ class Bench:
                 *(Shape(block, CLAMP, plane) for block in self._clamps),
                 Shape(self._indenter(moved), INDENTER, plane),
                 Shape(moved[self._border], FINGER, plane),
-                *self._dark_layers(moved),
                 *self.discs(displacement),
-                *self.specks(displacement),
                 *occluders,
             ],
         )
@@ -125,17 +105,6 @@ class Bench:
             blocks.append(np.asarray(block @ frame))
         return blocks
 
-    def _dark_layers(self, moved: FloatArray) -> list[Shape]:
-        """Every other layer of the print with nodes at `moved`; none if all are alike."""
-        if not self.layers:
-            return []
-        blue, green, red = ((1 - self.layers) * np.array(FINGER)).tolist()
-        return [Shape(self._layers.edges(moved), (blue, green, red), self.workspace.marker_plane)]
-
-    @cached_property
-    def _layers(self) -> PrintLayers:
-        return PrintLayers.on(self.mesh.points, self.mesh.triangles)
-
     @cached_property
     def _border(self) -> IntArray:
         return self.mesh.boundary_edges
@@ -148,22 +117,6 @@ class Bench:
             for number, centre in enumerate(self.mesh.markers)
         ]
         return self.mesh.locate(np.concatenate(borders))
-
-    @cached_property
-    def _speck_borders(self) -> LocatedPoints | None:
-        """Borders of the specks, `SPECK_CORNERS` for each; none if there is no mottle."""
-        count = round(self.mottle / SPECK**2)
-        if not count:
-            return None
-        radius = self.finger.marker_radius
-        speck = SPECK * radius * circle((0.0, 0.0), 1.0)[:: CORNERS // SPECK_CORNERS]
-        places = []
-        for number, centre in enumerate(self.mesh.markers):
-            rng = np.random.default_rng((number, count))
-            away = (1 - 2 * SPECK) * radius * np.sqrt(rng.uniform(size=count))
-            angle = rng.uniform(0, 2 * np.pi, count)
-            places.append(centre + away[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-        return self.mesh.locate((np.concatenate(places)[:, None] + speck).reshape(-1, 2))
 
     def _moved(self, where: LocatedPoints, displacement: FloatArray) -> FloatArray:
         """Points of the body after nodal displacements, shape (n, 2), mm."""

@@ -11,7 +11,6 @@ from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.calibration.charuco import DICTIONARIES, CharucoBoard
 from pinnray.vision.calibration.chessboard import Board
-from pinnray.vision.calibration.dot_grid import DotGrid
 from pinnray.vision.rig.shapes import Scene, Shape, rectangle
 from pinnray.vision.tracking.workspace import Workspace
 
@@ -30,13 +29,7 @@ TRIES = 150
 
 
 def board_scene(board: Board) -> Scene:
-    """A board on a wall, in the frame of its corners.
-
-    Raises:
-        UserError: If it is a grid of dots, which is only read.
-    """
-    if isinstance(board, DotGrid):
-        raise UserError(f"a board of {board} is not drawn; take a chessboard or a ChArUco board")
+    """A board on a wall, in the frame of its corners."""
     low = -(1 + MARGIN) * np.full(2, board.square)
     high = (np.array([board.columns, board.rows]) + MARGIN) * board.square
     places = np.indices((board.columns + 1, board.rows + 1)).reshape(2, -1).T - 1

@@ -18,8 +18,7 @@ class Motion(CheckedModel):
     """Number of frames of each part of a recording, and the load as a function of time.
 
     The shutter opens at the start of a frame. The load grows at constant speed, from the closing of the
-    shutter in the last frame at rest until its opening in the first frame that is held; of the first row, so
-    that a rolling shutter sees motion at the end of the last frame at rest.
+    shutter in the last frame at rest until its opening in the first frame that is held.
     """
 
     rest: int = bounded(30, 1, 100_000, "frames", "", "Frames before the pressing")
@@ -29,9 +28,6 @@ class Motion(CheckedModel):
     held: int = bounded(30, 1, 100_000, "frames", "", "Frames held under full load")
     rate: float = bounded(30.0, 0.1, 1000, "1/s", "", "Frames a second")
     shutter: float = bounded(0.3, 0, 0.9, "", "", "Share of the time for which the shutter is open")
-    rolling: float = bounded(
-        0.0, 0, 0.9, "", "", "Rolling shutter: delay of the last row after the first, share of a frame's time"
-    )
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -55,29 +51,11 @@ class Motion(CheckedModel):
 
     def exposed(self, frame: int, steps: int) -> FloatArray:
         """Shares of the load at `steps` times within a frame's exposure; one share if they are equal."""
-        loads = self.load(frame + self._instants(steps))
-        return loads if self.rolling and np.ptp(loads) > 0 else np.unique(loads)
-
-    def open_at(self, steps: int, rows: FloatArray) -> FloatArray:
-        """Shares of the instants of an exposure in what rows of the image see, shape (steps, n).
-
-        Args:
-            steps: Number of instants.
-            rows: Places of the rows, from 0 at the top to 1 at the bottom, shape (n,).
-        """
-        instants = self._instants(steps)[:, None]
-        away = np.abs(instants - self.rolling * rows - self.shutter / 2)
-        near = np.maximum(self.shutter / 2, away.min(axis=0)) + 1e-9
-        seen = (away <= near).astype(np.float64)
-        return np.asarray(seen / seen.sum(axis=0))
-
-    def _instants(self, steps: int) -> FloatArray:
-        """Times from the opening of the shutter for the first row to its closing for the last one."""
-        return np.asarray((np.arange(steps) + 0.5) / steps * (self.rolling + self.shutter))
+        return np.unique(self.load(frame + (np.arange(steps) + 0.5) / steps * self.shutter))
 
     def travel(self, frame: int) -> float:
-        """Growth of the share of the load from the first exposure of a frame's row to the last."""
-        return float(np.ptp(self.load(frame + np.array([0.0, self.rolling + self.shutter]))))
+        """Growth of the share of the load while a frame is exposed."""
+        return float(np.ptp(self.load(frame + np.array([0.0, self.shutter]))))
 
 
 @dataclass(frozen=True, eq=False)

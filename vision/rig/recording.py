@@ -77,13 +77,13 @@ class Recording:
     def frames(self) -> Iterator[tuple[Image, FrameTruth]]:
         """The frames in order, each with its truth."""
         for state, numbers in groupby(range(len(self.motion)), key=self._state):
-            light, truth = self._rolled(*state)
+            light, truth = self._seen(*state)
             for number in numbers:
                 yield self.exposure.develop(light, noise_of(self.seed, number)), truth
 
     def frame(self, number: int) -> tuple[Image, FrameTruth]:
         """One frame, the same as among all."""
-        light, truth = self._rolled(*self._state(number))
+        light, truth = self._seen(*self._state(number))
         return self.exposure.develop(light, noise_of(self.seed, number)), truth
 
     def observations(self, source: str, *, discs: bool = False) -> Observations:
@@ -124,26 +124,6 @@ class Recording:
             self.camera.project(self.bench.markers(self.displaced(load)), self.pose) for load in (0, 1)
         )
         return float(np.linalg.norm(end - start, axis=1).max())
-
-    def _rolled(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, FrameTruth]:
-        """Light and truth of a frame; those of a rolling shutter are means over the instants of each row."""
-        if not self.motion.rolling or len(loads) == 1:
-            return self._seen(loads, occluders)
-        seen = [self._seen([load], occluders) for load in loads]
-        height = self.camera.height
-        shares = self.motion.open_at(len(loads), np.arange(height) / height)
-        light = sum(
-            share[:, None, None].astype(np.float32) * part
-            for share, (part, _) in zip(shares, seen, strict=True)
-        )
-        truths = [truth for _, truth in seen]
-        row = np.mean([truth.pixels[:, 1] for truth in truths], axis=0) / height
-        own = self.motion.open_at(len(loads), row)
-        parts = {
-            name: np.einsum("km,km...->m...", own, np.stack([getattr(truth, name) for truth in truths]))
-            for name in ("world", "pixels", "discs", "seen")
-        }
-        return np.asarray(light), FrameTruth(load=float(np.mean(loads)), **parts)
 
     def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, FrameTruth]:
         """Mean light of the states with these shares of the load, and their truth."""

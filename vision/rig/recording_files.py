@@ -126,7 +126,6 @@ def _settings(recording: Recording) -> dict[str, object]:
         "mesh_sha256": recording.bench.mesh.digest,
         "paint": recording.bench.paint,
         "irregular": recording.bench.irregular,
-        "mottle": recording.bench.mottle,
         "pose": {
             "rotation": recording.pose.rotation.tolist(),
             "translation_mm": recording.pose.translation.tolist(),

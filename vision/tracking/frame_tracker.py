@@ -17,7 +17,6 @@ from pinnray.vision.tracking.data_association import (
     with_predictions,
 )
 from pinnray.vision.tracking.scene import FilmedScene
-from pinnray.vision.tracking.unplaced_markers import why_unplaced
 
 FEWEST = 3
 """Number of markers that must be identified in the first frame."""
@@ -84,8 +83,11 @@ class FrameTracker:
         count, least = int((names >= 0).sum()), min(FEWEST, len(names))
         if count < least:
             raise UserError(
-                f"{count} of {len(names)} markers are where the design has them, and {least} must be; "
-                + why_unplaced(scene, self.plane, detections)
+                f"{count} of {len(names)} markers are where the design has them, and {least} must be; show "
+                "the finger before it is pressed, and give its design, the markers' colour, and the "
+                "workspace: where the fiducials lie around the finger, and how much nearer to the camera the "
+                f"markers are (marker_plane, here {scene.workspace.marker_plane:g} mm), which only a "
+                "calibrated camera accounts for"
             )
         self._lost = 1  # frames since the last search
         self.first = self._accepted(detections, names, image)

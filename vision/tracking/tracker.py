@@ -15,7 +15,6 @@ from pinnray.vision.tracking.frame_tracker import FrameDetections, FrameTracker
 from pinnray.vision.tracking.rest_detection import RestIntervals, find_rest_intervals
 from pinnray.vision.tracking.scene import FilmedScene
 from pinnray.vision.tracking.trajectories import Tracking
-from pinnray.vision.tracking.unplaced_markers import zoom_clause
 
 FAR = 0.5
 """Root mean square distance of the markers at rest from the design's, mm, that is worth a warning, ..."""
@@ -213,8 +212,8 @@ def _rest_warnings(scene: FilmedScene, tracking: Tracking) -> Iterator[str]:
         yield (
             f"lengths between the markers at rest are {abs(larger):.2%} {size} in the film than in the "
             "drawing, and were scaled to it: see at what scale the fiducials were printed, how high the "
-            f"markers are above them{zoom_clause(scene, tracking.plane, larger)}; {found.after:.2g} mm (rms) "
-            "remain"
+            "markers are above them, and whether zoom and focus are those of the calibration; "
+            f"{found.after:.2g} mm (rms) remain"
         )
     if found.after > UNLIKE:
         yield (

@@ -1,4 +1,7 @@
-"""`fem`, `fem-nonlinear` and `fem-3d` against CalculiX on the same mesh, where `ccx` is installed."""
+"""`fem`, `fem-nonlinear` and `fem-3d` against CalculiX on the same mesh, where `ccx` is installed.
+
+Source: CalculiX CrunchiX 2.20 by G. Dhondt and K. Wittig, Debian's package calculix-ccx.
+"""
 
 import subprocess
 from pathlib import Path
@@ -162,20 +165,4 @@ def cells(space: LagrangeSpace | ExtrudedSpace) -> IntArray:
     return np.concatenate([corners, space.edge_nodes(corners[:, TETRAHEDRON])], axis=1)
 
 
-CALCULIX = Case(
-    name="CalculiX",
-    answer="that of CalculiX",
-    source="CalculiX CrunchiX 2.20 by G. Dhondt and K. Wittig, Debian's package calculix-ccx",
-    text="""
-The default finger with elements of 1 mm under the sliding patch, 10 mm deep, against CPE6 elements, and a
-short finger with one rib, 6 mm deep, by `fem-3d` with one layer in half of the depth, 4 mm deep, against
-C3D10 elements; there the displacement is that of the side face. CalculiX reads the nodes, the elements and
-the prescribed displacements, and has its own elements, quadrature and solver. At finite strain (NLGEOM) its
-elastic law is St Venant-Kirchhoff's. It prints seven digits: that is the difference of the linear law. At
-finite strain it integrates with three points a triangle and four a tetrahedron, fewer than `fem-nonlinear`
-and `fem-3d` do; with its number of points they agree to the printed digits, too
-(`tests/verification/test_calculix.py`). Measured where the program `ccx` is installed.
-""",
-    measure=calculix,
-    needs=PROGRAM,
-)
+CALCULIX = Case(name="CalculiX", answer="that of CalculiX", measure=calculix, needs=PROGRAM)

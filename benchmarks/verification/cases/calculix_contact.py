@@ -1,4 +1,7 @@
-"""The default finger under a cylinder, without and with friction, against CalculiX."""
+"""The default finger under a cylinder, without and with friction, against CalculiX.
+
+Source: CalculiX CrunchiX 2.20 by G. Dhondt and K. Wittig, Debian's package calculix-ccx.
+"""
 
 import numpy as np
 
@@ -116,16 +119,5 @@ def deck(problem: Problem, space: LagrangeSpace, ring: FloatArray) -> str:
 
 
 CALCULIX_CONTACT = Case(
-    name="CalculiX in contact",
-    answer="that of CalculiX",
-    source="CalculiX CrunchiX 2.20 by G. Dhondt and K. Wittig, Debian's package calculix-ccx",
-    text="""
-The default finger with elements of 1 mm, St Venant-Kirchhoff, under a cylinder of radius 10 mm that is
-pressed in by 3 mm, without friction and with μ = 0.5. CalculiX has its own elements and a contact of its own:
-surface to surface, with a penalty of 1e4 MPa/mm for pressure and for friction, on a cylinder of curved
-elements. Ours is collocated at the nodes of the front, so that a contact of less than an element differs:
-hence 0.2 % of the displacement and 2 % of the force. Measured where the program `ccx` is installed.
-""",
-    measure=calculix_contact,
-    needs=PROGRAM,
+    name="CalculiX in contact", answer="that of CalculiX", measure=calculix_contact, needs=PROGRAM
 )

@@ -1,4 +1,9 @@
-"""Cook's membrane, against published values."""
+"""Cook's membrane, against published values.
+
+Source: plane stress: P. G. Bergan, C. A. Felippa, A triangular membrane element with rotational degrees of
+freedom, Computer Methods in Applied Mechanics and Engineering 50 (1985) 25-69; plane strain: CoFEA, benchmark
+002, <https://cofea.readthedocs.io>.
+"""
 
 import numpy as np
 
@@ -58,21 +63,4 @@ def membrane(material: Material, total_force: float) -> BoundaryValue:
     return BoundaryValue(mesh, material, {"left": (at_rest, (0, 1))}, {"right": stress})
 
 
-COOK = Case(
-    name="Cook's membrane",
-    answer="published values",
-    source="plane stress: P. G. Bergan, C. A. Felippa, A triangular membrane element with rotational degrees "
-    "of freedom, Computer Methods in Applied Mechanics and Engineering 50 (1985) 25-69; plane strain: CoFEA, "
-    "benchmark 002, <https://cofea.readthedocs.io>",
-    text="""
-The tapered panel with the corners (0, 0), (48, 44), (48, 60) and (0, 44), clamped at the left, with a uniform
-shear traction at the right and 64 by 64 distorted cells. Plane stress: E = 1, ν = 1/3, force 1, compared with
-the best known values according to Bergan and Felippa of the deflection and of the principal stresses at the
-middles of the long sides. Plane strain: E = 70 MPa, force 100 N/mm, ν = 0.3333 and, nearly incompressible,
-0.4999, compared with the deflections of Code_Aster's quadratic tetrahedra on CoFEA's finest mesh (CalculiX
-and Elmer: 32.27 and 32.28 mm at ν = 0.33; 27.52 and 27.56 mm). The published values have three or four
-digits, and their scatter shows that the last is not converged: deflections must agree within 1 % and 0.5 %,
-stresses within 1.5 %.
-""",
-    measure=cook,
-)
+COOK = Case(name="Cook's membrane", answer="published values", measure=cook)

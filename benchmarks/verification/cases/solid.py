@@ -1,4 +1,8 @@
-"""`fem-3d` on bars with known displacements, and between plane stress and plane strain."""
+"""`fem-3d` on bars with known displacements, and between plane stress and plane strain.
+
+Source: bending: S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed., McGraw-Hill, 1970, article
+102; the orders: as for the manufactured solution.
+"""
 
 from dataclasses import replace
 from typing import Any
@@ -12,9 +16,9 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import energy_density_of
 from pinnray.solvers.extrusion import ExtrudedSpace
-from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
+from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace
+from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.fem.linear_solvers import Factorisation
 from pinnray.solvers.fem.solid import Fem3dSolver
 from pinnray.solvers.problem import Load, Material, Problem
 
@@ -111,9 +115,9 @@ def harmonic_errors(cells: int) -> tuple[float, float]:
 
 def solved(
     space: ExtrudedSpace, material: Material, given: FloatArray, held: np.ndarray
-) -> tuple[DistributedSpace[ExtrudedSpace], FloatArray]:
+) -> tuple[DolfinxSpace[ExtrudedSpace], FloatArray]:
     """The elements, and nodal displacements, (N, 3), mm: those given where a mask (N, 3) holds them."""
-    distributed = DistributedSpace(space)
+    distributed = DolfinxSpace(space)
     moduli = distributed.moduli(material.solid_lame)
     energy = energy_density_of("linear", ufl.grad(distributed.function), moduli) * ufl.dx
     force, stiffness = distributed.derivatives(energy)
@@ -140,21 +144,4 @@ def energy_over_plane(plane: str, depth: float, sides: str) -> float:
     return solution.energy / FemSolver(estimate=False).solve(flat).energy
 
 
-SOLID = Case(
-    name="three dimensions",
-    answer="closed forms; the plane states",
-    source="bending: S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed., McGraw-Hill, 1970, "
-    "article 102; the orders: as for the manufactured solution",
-    text="""
-`fem-3d` on a bar of 4 by 2 by 2 mm, ν = 0.45, with distorted elements. The displacement of a bar bent by
-couples is quadratic in x, y and z, and its side faces are free of traction, so quadratic tetrahedra must
-reproduce it to rounding if the ends are moved accordingly. The gradient of a harmonic function is in
-equilibrium without body forces for any elastic constants: with all of the outside moved as exp(a x) cos(b y)
-cos(b z) says, the slopes between 4 and 8 elements across are those of quadratic elements. Between a clamp and
-a patch the energy per depth tends to that of plane strain if the side faces are held, and to that of plane
-stress if the bar is thin (0.02 mm). Elements of 0.125 mm leave 0.1 % of the first and 1 % of the second,
-where u_z, which is continuous, has to follow strains that jump between elements. [CalculiX](#calculix) has
-the same solid elements.
-""",
-    measure=solid,
-)
+SOLID = Case(name="three dimensions", answer="closed forms; the plane states", measure=solid)

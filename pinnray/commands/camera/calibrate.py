@@ -26,19 +26,19 @@ def command(
     without: Repeated = (),
     out: OutputPath = Path("out/camera.json"),
 ) -> int:
-    """Calibrate a camera from photographs of a chessboard, a ChArUco board or a grid of dots.
+    """Calibrate a camera from photographs of a chessboard or a ChArUco board.
 
     Args:
         images: Photographs of the board, all of one size: pictures, folders, or a video.
-        board: Inner corners of a chessboard along either side, such as 9x6; squares of a ChArUco board, such
-            as charuco:8x6; dots of a grid, circles:7x6, or acircles:4x11 with every other row shifted.
-        square: Side of a square or distance between dots, mm; of shifted rows, distance between rows.
+        board: Inner corners of a chessboard along either side, such as 9x6, or squares of a ChArUco board,
+            such as charuco:8x6.
+        square: Side of a square, mm.
         marker: Side of a marker of a ChArUco board, mm.
         dictionary: ArUco dictionary of a ChArUco board.
         model: Lens model: brown up to about 100 degrees of view, fisheye beyond.
         k3: Fit the third radial coefficient too.
         without: Photograph to leave out; may be repeated.
-        out: Camera file, .json or .yaml.
+        out: Camera file, .json.
     """
     from pinnray.film.calibration_report import calibration_table, draw_calibration, view_table
     from pinnray.vision.calibration.camera_calibration import better_lens, calibrate_camera

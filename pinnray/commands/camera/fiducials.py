@@ -9,8 +9,8 @@ from pinnray.runtime.exits import say
 
 @quietable
 def command(
-    finger: FingerOptions = FingerOptions(),
     *,
+    finger: FingerOptions = FingerOptions(),
     marker_plane: float = 0.0,
     board: str = "9x6",
     square: float = 8.0,

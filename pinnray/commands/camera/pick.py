@@ -1,6 +1,5 @@
 """Pick the colour of the markers."""
 
-from math import hypot
 from pathlib import Path
 from typing import Annotated
 
@@ -9,14 +8,6 @@ from cyclopts import Parameter
 from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OutputPath
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.exits import say
-
-AMBIGUOUS = 0.05
-"""Share of the image above which the colour may not tell markers from the rest, unless they stand apart."""
-USUAL_RADII = (3.0, 40.0)
-"""Radii of the discs that show whether they do, pixels."""
-FEWEST = 3
-"""Number of discs that a marker's colour shows at least; a track needs as many."""
 
 
 @quietable
@@ -64,16 +55,6 @@ def command(
     print(f"--colour {chosen}")
     print(f"{share:.2%} of the image" + ("" if circles is None else f", {len(circles)} circles"))
     print(out)
-    if share > AMBIGUOUS:
-        if circles is None:
-            circles = propose_circles(image, chosen, radii=USUAL_RADII)
-        x, y = (sum(place[axis::2]) / len(place[axis::2]) if place else 0.0 for axis in (0, 1))
-        here = [hypot(disc[0] - x, disc[1] - y) <= disc[2] for disc in circles]
-        if not any(here) if place else len(circles) < FEWEST:
-            say(
-                f"warning: {share:.0%} of the image has this colour, and no disc of it stands apart"
-                f"{' at --at' if place else ''}, so it may not tell markers from the rest"
-            )
     return 0
 
 

@@ -13,8 +13,8 @@ from pinnray.runtime.errors import UserError
 def command(
     rest: Path,
     pressed: Path,
-    finger: FingerOptions = FingerOptions(),
     *,
+    finger: FingerOptions = FingerOptions(),
     scale: str = "same",
     out: OutputPath = Path("out/observations.csv"),
 ) -> int:

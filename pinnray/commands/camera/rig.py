@@ -3,28 +3,30 @@
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from pinnray.commands.quiet import quietable
-from pinnray.options.camera import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
+from pinnray.film.rig_settings import RigSettings
 from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
 from pinnray.runtime.errors import UserError
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
 
+SCENE = Parameter(name="*", group=Group("Scene", sort_key=4), negative="")
+EXPOSURE = Parameter(name="*", group=Group("Exposure", sort_key=5))
+MOTION = Parameter(name="*", group=Group("Motion", sort_key=6))
+
 
 @quietable
 def command(
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    *,
     solver: str | None = None,
-    lens: CameraOptions = CameraOptions(),
-    exposure: Annotated[Exposure, Parameter(name="*", group=EXPOSURE)] = Exposure(),
-    motion: Annotated[Motion, Parameter(name="*", group=MOTION)] = Motion(),
-    scene: SceneOptions = SceneOptions(),
-    boards: BoardOptions = BoardOptions(),
+    scene: Annotated[RigSettings, SCENE] = RigSettings(),
+    exposure: Annotated[Exposure, EXPOSURE] = Exposure(),
+    motion: Annotated[Motion, MOTION] = Motion(),
     codec: Annotated[str, Parameter(group=OUTPUT, show_default=True)] = "ffv1",
     out: OutputPath = Path("out/rig"),
 ) -> int:
@@ -36,64 +38,35 @@ def command(
 
     - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
     - pinnray rig --boards 20 --board 9x6 --square 8
-    - pinnray rig --moving 0 --cover 5=0.4 --codec mjpg --size 640x480
+    - pinnray rig --moving 0 --cover 5=0.4 --codec mjpg --frame 640x480
 
     Args:
         solver: Solver of the filmed displacements; default: the finite-strain simulation of `compare`.
         codec: ffv1 or png (lossless), mjpg or mp4v.
         out: Output folder.
     """
-    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.film.filmed_force import filmed_course
-    from pinnray.film.virtual_film import filmed_solution, write_film
-    from pinnray.runtime.output_folder import check_output
-    from pinnray.runtime.stages import Stages
-    from pinnray.vision.rig.occluders import cables, check_covers
-    from pinnray.vision.rig.recording import Recording
-    from pinnray.vision.rig.recording_files import check_codec
-    from pinnray.vision.tracking.workspace import default_workspace
+    from pinnray.camera import rig
 
-    design, mesh_settings = finger.read(options.preset)
+    design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
-    workspace = default_workspace(design).model_copy(update={"marker_plane": scene.marker_plane})
-    camera, pose = lens.read(workspace)
-    board, covered = boards.read(), scene.covered()
-    check_codec(codec)
-    check_output(out)
     solvers = options.read(solver or "")
     if len(solvers) > 1:
         raise UserError("the rig films one finger; name one --solver")
-    filmed = solvers[0] if solvers else None
-    finger.check_cost(design, mesh_settings, solvers, simulated=filmed is None)
-    with Stages() as stages:
-        mesh, _ = shared_mesh(design, mesh_settings, stages)
-        bench = scene.bench(mesh, design, workspace)
-        check_covers(covered, len(mesh.marker_nodes))
-        solution, source = filmed_solution(mesh, design, material, load, filmed, stages)
-        displacement = solution.displacement(mesh.at_nodes())
-        course = filmed_course(solution)
-        recording = Recording(
-            bench=bench,
-            displacement=displacement,
-            camera=camera,
-            pose=pose,
-            exposure=exposure,
-            motion=motion,
-            occluders=cables(bench, course, motion, covered, scene.cover_during, paint=scene.cover_paint),
-            seed=options.seed,
-            course=course,
-        )
-        write_film(
-            recording,
-            solution,
-            out,
-            stages,
-            source=source,
-            codec=codec,
-            board=board,
-            boards=boards.boards,
-            facts={"cover": {"shares": covered, "during": scene.cover_during} if covered else None},
-        )
+    finger.check_cost(design, mesh, solvers, simulated=not solvers)
+    rig(
+        design,
+        solvers[0] if solvers else None,
+        out=out,
+        exposure=exposure,
+        motion=motion,
+        codec=codec,
+        seed=options.seed,
+        size=mesh,
+        material=material,
+        load=load,
+        progress=True,
+        **dict(scene),
+    )
     for path in sorted(out.iterdir()):
         print(path)
     return 0

@@ -4,24 +4,28 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 from rich.console import Console
 from rich.live import Live
 
 from pinnray.commands.quiet import quietable
-from pinnray.options.camera import FilmOptions, ForceOptions
-from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
+from pinnray.film.film import FilmSettings
+from pinnray.options.shared import FilmOptions, FingerOptions, Flag, OutputFlag, OutputPath
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
+from pinnray.solvers.physics import Material
+
+FORCE = Group("Force", sort_key=5)
 
 
 @quietable
 def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
-    finger: FingerOptions = FingerOptions(),
-    options: FilmOptions = FilmOptions(),
-    force: ForceOptions = ForceOptions(),
     *,
+    finger: FingerOptions = FingerOptions(),
+    options: FilmOptions = FilmSettings(),
+    force: Annotated[bool, Parameter(group=FORCE, negative="")] = False,
+    elastic: Annotated[Material, Parameter(name="*", group=FORCE)] = Material(),
     live: Flag = False,
     publish: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     record: Path | None = None,
@@ -40,6 +44,9 @@ def command(
 
     Args:
         source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
+        force: Estimate the indenter's force and its place in every frame; with --live in the newest one. It
+            is in proportion to Young's modulus; the markers correct Poisson's ratio and choose the law of
+            finite strain unless --law gives one.
         live: Show the displacements of every frame as it comes.
         publish: With --live, write a line of JSON for every frame, with the newest force if --force: a file,
             a named pipe, or - for the standard output, whose tables then go to standard error; default: none.
@@ -65,8 +72,10 @@ def command(
 
     if publish is not None and not live:
         raise UserError("--publish is for --live")
+    if elastic.model_fields_set and not force:
+        raise UserError(f"--{min(elastic.model_fields_set)} is for --force")
     design, settings = finger.read(usual=MESH)
-    film, material = options.film(source), force.read()
+    film, material = options.of(source), elastic if force else None
     if material:
         finger.check_cost(design, settings, [make_solver("fem-id")])
     check_output(out)
@@ -88,7 +97,8 @@ def command(
                 film, design, folder, report, video=not without_video, record=record, watch=watch
             )
             if following is not None:
-                forces, pace = following.finish(), following.live_rate
+                following.finish()
+                forces, pace = following.forces, following.live_rate
         if mesh is not None and material and not live:
             with Stages(console) as more, more.stage("force") as report:
                 tracker = force_tracker(mesh, material, observations.points, design.marker_radius)
@@ -97,8 +107,7 @@ def command(
         if tracker is not None and material:
             write_forces(folder, forces, design.depth)
             provenance["force"] = {
-                "material": material.model_dump() | {"law": tracker.laws[0]},
-                "laws_not_excluded": tracker.laws,
+                "material": material.model_dump() | {"law": tracker.law},
                 "mesh": settings and settings.model_dump(),
                 "frames": len(forces),
                 "live": pace and pace._asdict(),

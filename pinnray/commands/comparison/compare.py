@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from pinnray.options.camera import FilmOptions
+from pinnray.film.film import FilmSettings
 from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
 from pinnray.options.shared import (
     OUTPUT,
     Adapt,
+    FilmOptions,
     FingerOptions,
     OptionalOutputPath,
     OutputFlag,
@@ -25,22 +26,19 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 from pinnray.runtime.machine import cores
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from pinnray.film.measured_film import MeasuredFilm
-    from pinnray.solvers.solver import Solver
 
 
 def command(
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    *,
     adapt: Adapt = None,
     solvers: str | None = None,
     measurements: str | None = None,
     truth: str | None = None,
-    film: FilmOptions = FilmOptions(),
+    film: FilmOptions = FilmSettings(),
     reference: str | None = None,
     from_: Annotated[Path | None, Parameter(name=OPTION)] = None,
     out: OptionalOutputPath = None,
@@ -79,13 +77,13 @@ def command(
         quiet: Show no progress and no table.
         json_: Print metrics.json and nothing else.
     """
-    from pinnray.commands.launch import on_ranks
     from pinnray.comparison.pipeline.job import Job
     from pinnray.comparison.pipeline.pipeline import run
     from pinnray.comparison.pipeline.shared_mesh import tolerance_reached
     from pinnray.comparison.pipeline.solving import second_process, worth_starting
     from pinnray.comparison.report.tables import body_table, marker_table
     from pinnray.options.preset_jobs import job_defaults
+    from pinnray.options.solver_choice import spare_solvers
     from pinnray.runtime.output_folder import RUN_FILE
     from pinnray.runtime.stages import Stages
 
@@ -95,16 +93,16 @@ def command(
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
     names = job_defaults(options.preset).solvers if solvers is None else solvers
-    with nullcontext() if on_ranks() or cores() < 2 else second_process(comma_list(names)) as pool:
+    with nullcontext() if cores() < 2 else second_process(comma_list(names)) as pool:
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
-        made = options.read(names)
+        made, set_up = options.read(names), {text.partition(".")[0] for text in options.solver_set}
         physics.check_law(made)
         finger.check_cost(design, mesh, made, simulated=measurements is None)
         job = Job(
             design=design,
             solvers=made,
-            spare=_optional_solvers(made, options, reference) if solvers is None else (),
+            spare=[] if solvers else spare_solvers(made, reference, options.preset, set_up),
             mesh=mesh,
             adapt=adapt,
             material=material,
@@ -156,16 +154,6 @@ def command(
     return 0 if done else NOT_CONVERGED
 
 
-def _optional_solvers(
-    solvers: "Sequence[Solver]", options: SolverOptions, reference: str | None
-) -> list[str]:
-    """Names of the solvers that no other option names."""
-    asked = {text.partition(".")[0] for text in options.solver_set} | {reference}
-    if options.preset is not None:
-        asked |= {solver.name for solver in solvers if solver.settings().get("preset") == options.preset}
-    return [solver.name for solver in solvers if solver.name not in asked]
-
-
 def _truth(name: str | None, measurements: str | None) -> str:
     """The name of what is simulated; nothing is where there are measurements."""
     from pinnray.comparison.evaluation.truths import SLIDING
@@ -175,12 +163,12 @@ def _truth(name: str | None, measurements: str | None) -> str:
     return SLIDING.name if name is None else name
 
 
-def _measurements(source: str | None, options: FilmOptions) -> "Path | MeasuredFilm | None":
+def _measurements(source: str | None, options: FilmSettings) -> "Path | MeasuredFilm | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
-        if source is None and options != FilmOptions():
+        if source is None and options.model_fields_set:
             raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
         from pinnray.film.measured_film import MeasuredFilm
 
-        return None if source is None else MeasuredFilm(options.film(source))
+        return None if source is None else MeasuredFilm(options.of(source))
     return existing(Path(source))

@@ -14,8 +14,8 @@ PICTURE = "design.png"
 
 @quietable
 def command(
-    finger: FingerOptions = FingerOptions(),
     *,
+    finger: FingerOptions = FingerOptions(),
     out: OutputPath = Path("out/cad"),
     formats: str = "step,stl,dxf,svg",
 ) -> int:

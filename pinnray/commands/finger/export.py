@@ -1,68 +1,46 @@
 """Models of a finger for robot simulators."""
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated
 
+from cyclopts import Parameter
 from rich.console import Console
 
 from pinnray.commands.quiet import quietable
-from pinnray.options.shared import FingerOptions, Flag, OutputPath, PhysicsOptions
+from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
+from pinnray.robots.export_settings import ExportSettings, Kind
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
 @quietable
 def command(
-    kind: Literal["mujoco", "sofa", "mesh"],
+    kind: Kind,
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
-    *,
-    hinges: int = 12,
-    loss_factor: float = 0.2,
-    across: int = 1,
-    layers: int = 1,
-    places: int = 6,
-    score: Flag = False,
+    settings: Annotated[ExportSettings, Parameter(name="*", negative="")] = ExportSettings(),
     out: OutputPath = Path("out/export"),
 ) -> int:
-    """Write a finger for MuJoCo, SOFA or any program that reads tetrahedra, in SI units.
+    """Write a finger for MuJoCo or any program that reads tetrahedra, in SI units.
 
     mujoco: a chain of hinges and a flexible body, both fitted to fem-nonlinear under a cylinder at several
-    places, up to --stroke; the default --mesh-size is 1. sofa: a scene and its mesh. mesh: tetrahedra, their
-    surface, and the material.
+    places, up to --stroke; the default --mesh-size is 1. mesh: tetrahedra, their surface, and the material.
 
     Args:
-        kind: Program: mujoco, sofa or mesh.
-        hinges: Number of hinges of the chain.
-        loss_factor: Damping of the material, which is stated and not fitted.
-        across: Least number of tetrahedra through a wall: more are less stiff of themselves, and slower.
-        layers: Layers of tetrahedra through the depth.
-        places: Number of places of the cylinder for the fit.
-        score: Press the models of mujoco at ten loads that the fit has not seen, and compare with
-            fem-nonlinear.
+        kind: Program: mujoco, or mesh for others.
         out: Output folder.
     """
-    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.robots.export import SIZES, ExportSettings, export_finger
+    from pinnray.robots.export import SIZES
     from pinnray.robots.score import score_table
-    from pinnray.runtime.errors import UserError
-    from pinnray.runtime.stages import Stages
-    from pinnray.solvers.problem import Problem
+    from pinnray.simulators import export
     from pinnray.solvers.registry import make_solver
 
     chosen, mesh = finger.read(usual=SIZES)
-    if score and kind != "mujoco":
-        raise UserError(f"--score is of mujoco; no score is made for {kind}")
-    settings = ExportSettings(
-        hinges=hinges, loss_factor=loss_factor, across=across, layers=layers, places=places, score=score
-    )
-    material, load = replace(physics, load=physics.load or "cylinder").read()
+    material, load = physics.read(usual_load="cylinder")
     finger.check_cost(chosen, mesh, [make_solver("fem-nonlinear")] if kind == "mujoco" else [])
-    with Stages() as stages:
-        triangles, _ = shared_mesh(chosen, mesh, stages)
-        done = export_finger(kind, Problem(triangles, material, load, None, chosen), out, settings, stages)
-    for remark in done.remarks:
-        say(f"warning: {remark}")
+    done = export(
+        kind, chosen, out=out, size=mesh, material=material, load=load, progress=True, **dict(settings)
+    )
     if done.scores:
         Console(soft_wrap=True).print(score_table(done.scores))
     for each in done.scores:

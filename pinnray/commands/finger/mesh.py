@@ -10,9 +10,9 @@ from pinnray.runtime.exits import NOT_CONVERGED
 
 @quietable
 def command(
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
-    *,
     adapt: Adapt = None,
     out: OutputPath = Path("out/mesh"),
 ) -> int:

@@ -1,18 +1,18 @@
 """Derivatives of one finger's figures by its parameters."""
 
+from math import isfinite
 from pathlib import Path
 
 from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.exits import say
 
 
 @quietable
 def command(
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
-    *,
     figure: str = "force",
     wall_error: float = 0.1,
     young_error: float = 0.1,
@@ -28,16 +28,9 @@ def command(
         young_error: Half of the 95 % interval of Young's modulus, over its value.
         out: CSV file of the derivatives; the picture is beside it.
     """
-    import numpy as np
-
-    from pinnray.comparison.evaluation.deformed_body import DeformedBody
-    from pinnray.comparison.evaluation.plausibility import problem_remarks
-    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.runtime.stages import Stages
+    from pinnray.designers import sensitivity
     from pinnray.runtime.tables import write_csv
     from pinnray.solvers.finger_figures import QUANTITIES
-    from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
-    from pinnray.solvers.problem import Problem
     from pinnray.solvers.registry import make_solver
 
     if figure not in QUANTITIES:
@@ -50,17 +43,8 @@ def command(
     chosen, settings = finger.read()
     material, load = physics.read()
     finger.check_cost(chosen, settings, [make_solver("fem-nonlinear")])
-    with Stages() as stages:
-        triangles, _ = shared_mesh(chosen, settings, stages)
-        problem = Problem(triangles, material, load, None, chosen)
-        for remark in problem_remarks(problem):
-            say(f"warning: {remark}")
-        with stages.stage("sensitivity") as progress:
-            found = sensitivity_of(problem, progress)
-    _, faults = DeformedBody(triangles).status(found.solution)
-    for fault in faults:
-        say(f"warning: {fault}")
-    known = [name for name in found.derivatives if np.isfinite(getattr(found.figures, name))]
+    found = sensitivity(chosen, size=settings, material=material, load=load, progress=True)
+    known = [name for name in found.derivatives if isfinite(getattr(found.figures, name))]
     if figure not in known:
         raise UserError(
             f"--figure {figure} is not known at the full load alone; there are {', '.join(known)}"

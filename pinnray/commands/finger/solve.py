@@ -20,10 +20,10 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 @quietable
 def command(
     solver: str | None = None,
+    *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    *,
     adapt: Adapt = None,
     measurements: Path | None = None,
     strokes: str | None = None,
@@ -40,7 +40,8 @@ def command(
     """
     from pinnray.comparison.evaluation.certification import with_certificates
     from pinnray.comparison.evaluation.deformed_body import with_body_checks
-    from pinnray.comparison.evaluation.metrics import evaluated, force_curves, write_force_displacement
+    from pinnray.comparison.evaluation.evaluation import evaluated
+    from pinnray.comparison.evaluation.force_curves import force_curves, write_force_displacement
     from pinnray.comparison.evaluation.plausibility import (
         check_positions,
         displacement_remarks,

@@ -1,1 +1,1 @@
-"""Commands that solve many problems: sweep, predict, optimise, gridsearch."""
+"""Commands that solve many problems: sweep, predict, optimise, crossval."""

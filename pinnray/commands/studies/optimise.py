@@ -11,6 +11,7 @@ from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 @quietable
 def command(
     question: Path,
+    *,
     options: StudyOptions = StudyOptions(),
 ) -> int:
     """Find the fingers that no other finger beats: the Pareto front of two or three quantities.
@@ -24,7 +25,7 @@ def command(
     """
     from pinnray.runtime.stages import Stages
     from pinnray.runtime.tables import terminal_table
-    from pinnray.studies.optimum.page import front_grid, write_front
+    from pinnray.studies.optimum.page import front_table, text_table, write_front
     from pinnray.studies.optimum.question import load_question
     from pinnray.studies.optimum.search import search_front
 
@@ -37,10 +38,9 @@ def command(
             paths, designs = write_front(
                 found, job, job.out, stages.record(), formats, command="compare --from {}"
             )
-    grid = front_grid(found)
     columns = [0, *range(2, 2 + len(read.objectives))]  # the table in the file is too wide for a terminal
-    rows = [[row[column] for column in columns] for row in grid.rows]
-    Console().print(terminal_table(grid.title, [grid.headings[column] for column in columns], rows))
+    shown = text_table("Fingers on the front", front_table(found).iloc[:, columns])
+    Console().print(terminal_table(shown.title, shown.headings, shown.rows))
     for path in [*paths, designs[0], designs[-1]]:
         print(path)
     return 0

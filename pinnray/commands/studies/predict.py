@@ -13,7 +13,6 @@ from pinnray.runtime.errors import UserError
 
 if TYPE_CHECKING:
     from pinnray.studies.emulator.emulator import Emulator, Predictions
-    from pinnray.studies.sweep.study import Value
 
 
 @quietable
@@ -52,9 +51,7 @@ def command(
     rows = read_rows(csv) if csv else [finger_given(set)]
     with Stages() as stages:
         emulator = emulator_of(sweep, refit=refit, stages=stages)
-    fingers = [
-        finger_of_options(emulator, row, f"{csv}, row {place}: " if csv else "") for place, row in rows
-    ]
+    fingers = [emulator.inputs.finger(row, f"{csv}, row {place}: " if csv else "") for place, row in rows]
     found = emulator.predict(fingers)
     if csv is None:
         print_table(emulator, found)
@@ -103,17 +100,6 @@ def read_rows(file: Path) -> list[tuple[int, dict[str, str]]]:
         )
         for place, row in enumerate(rows, start=1)
     ]
-
-
-def finger_of_options(emulator: "Emulator", settings: dict[str, str], where: str) -> "dict[str, Value]":
-    """A finger that the emulator predicts; else a `UserError`."""
-    try:
-        finger = emulator.inputs.read(settings)
-        if fault := emulator.inputs.fault(finger):
-            raise UserError(fault)
-    except UserError as error:
-        raise UserError(f"{where}{error}") from None
-    return finger
 
 
 def print_table(emulator: "Emulator", found: "Predictions") -> None:

@@ -12,6 +12,7 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 @quietable
 def command(
     study: Path,
+    *,
     options: StudyOptions = StudyOptions(),
 ) -> int:
     """Solve many fingers: the samples of a study over parameters of design, material and load.
@@ -27,14 +28,14 @@ def command(
     from pinnray.studies.sweep.page import write_page
     from pinnray.studies.sweep.study import load_study
     from pinnray.studies.sweep.sweep import run_sweep
-    from pinnray.studies.sweep.tables import failure_grid, quantity_grid, write_tables
+    from pinnray.studies.sweep.tables import failure_grid, quantity_grid, sample_table, write_frame
 
     formats = read_formats(options.pictures)
     read = load_study(study)
     job = options.job(read, study, "sweep")
     with going_on_from(job.out), Stages() as stages:
         done = run_sweep(job, stages)
-        written = write_tables(done, job.out)
+        written = write_frame(sample_table(done), job.out / "samples")
         with stages.stage("pictures"):
             written += write_page(done, job, job.out, stages.record(), formats)
     quantities, failures = quantity_grid(done), failure_grid(done)

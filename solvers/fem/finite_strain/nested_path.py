@@ -89,6 +89,6 @@ class NestedPath:
         return self._way.stats
 
     def close(self) -> None:
-        """Free what PETSc holds, on all ranks at once."""
+        """Free what PETSc holds."""
         self._path.close()
         self._way.close()

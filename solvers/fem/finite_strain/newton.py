@@ -42,16 +42,13 @@ class ConstrainedNewton:
         self._size = self._off = 0.0
         self._torn = self._near = self._kept = self._tangent = False
         self._part = equilibrium.matrix.createVecRight()
-        comm = equilibrium.distributed.comm
-        self._last = comm.size - 1
-        own = self._part.getLocalSize()
-        border = len(equilibrium.constraints.targets) if comm.rank == self._last else 0
-        self._unknown = PETSc.Vec().createMPI((own + border, PETSc.DETERMINE), comm=comm)
+        self._own = equilibrium.clamped.size
+        size = self._own + len(equilibrium.constraints.targets)
+        self._unknown = PETSc.Vec().createSeq(size)
         self._residual = self._unknown.duplicate()
-        sizes = self._unknown.getSizes()
-        self._jacobian = PETSc.Mat().createPython((sizes, sizes), context=self, comm=comm)
+        self._jacobian = PETSc.Mat().createPython((size, size), context=self, comm=PETSc.COMM_SELF)
         self._jacobian.setUp()
-        self._snes = PETSc.SNES().create(comm)
+        self._snes = PETSc.SNES().create(PETSc.COMM_SELF)
         self._snes.setFunction(self._evaluate, self._residual)
         self._snes.setJacobian(self._factorise, self._jacobian)
         self._snes.setLineSearchPreCheck(self._shorten)
@@ -66,7 +63,7 @@ class ConstrainedNewton:
         linear.destroy()
 
     def close(self) -> None:
-        """Free what PETSc holds, on all ranks at once."""
+        """Free what PETSc holds."""
         for item in (self._snes, self._jacobian, self._residual, self._unknown, self._part):
             item.destroy()
 
@@ -95,11 +92,11 @@ class ConstrainedNewton:
     def mult(self, matrix: PETSc.Mat, step: PETSc.Vec, product: PETSc.Vec) -> None:
         """J times a step, as the line search calls it."""
         nodal, forces = self._split(step)
-        distributed, constraints = self._equilibrium.distributed, self._equilibrium.constraints
-        distributed.distribute(nodal, self._part)
+        elements, constraints = self._equilibrium.elements, self._equilibrium.constraints
+        self._part.array[:] = elements.dofs(nodal)
         force = self._part.duplicate()
         self._equilibrium.matrix.mult(self._part, force)
-        balance = distributed.gather(force) - constraints.at_nodes(forces)
+        balance = elements.nodal(force.array_r) - constraints.at_nodes(forces)
         force.destroy()
         missed = self._scale * constraints.residual(nodal, forces, 0.0)
         self._join(np.where(self._equilibrium.clamped, 0.0, balance), missed, product)
@@ -147,15 +144,10 @@ class ConstrainedNewton:
         return replace(self._state, nodal=nodal, forces=forces)
 
     def _split(self, unknown: PETSc.Vec) -> tuple[FloatArray, FloatArray]:
-        """Displacements, shape (N, 2), and multipliers, shape (k,), the same on every rank."""
+        """Displacements, shape (N, 2), and multipliers, shape (k,)."""
         values = unknown.array_r
-        own = self._part.getLocalSize()
-        self._part.array[:] = values[:own]
-        nodal = self._equilibrium.distributed.gather(self._part)
-        return nodal, self._equilibrium.distributed.comm.bcast(values[own:].copy(), root=self._last)
+        return self._equilibrium.elements.nodal(values[: self._own]), values[self._own :].copy()
 
     def _join(self, nodal: FloatArray, forces: FloatArray, unknown: PETSc.Vec) -> None:
-        self._equilibrium.distributed.distribute(nodal, self._part)
-        own = self._part.getLocalSize()
-        unknown.array[:own] = self._part.array_r
-        unknown.array[own:] = forces[: unknown.getLocalSize() - own]
+        unknown.array[: self._own] = self._equilibrium.elements.dofs(nodal)
+        unknown.array[self._own :] = forces

@@ -2,8 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,9 +11,8 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
 from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from pinnray.solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.fem.finite_strain.nested_path import NestedPath, coarser
-from pinnray.solvers.fem.ranks import on_all_ranks
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
@@ -51,12 +49,13 @@ class FemNonlinearSolver(ElementSettings):
         super().__post_init__()
         if not 0 < self.min_step <= self.first_step <= self.max_step <= 1:
             raise UserError("fem-nonlinear needs 0 < min_step <= first_step <= max_step <= 1")
-        check_tolerance(self.name, self.tolerance)
+        if not 0 < self.tolerance <= 1e-3:
+            raise UserError(f"{self.name} needs 0 < tolerance <= 0.001, not {self.tolerance:g}")
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`."""
         check_problem(self, problem)
-        return on_all_ranks(partial(self._solve, self.coarser(problem)), problem, progress)
+        return self._solve(self.coarser(problem), problem, progress)
 
     def coarser(self, problem: Problem) -> Problem | None:
         """The problem on the coarse elements on which the load is followed; None for the given ones."""
@@ -107,7 +106,7 @@ class FemNonlinearSolver(ElementSettings):
         abscissa = path.force_abscissa(last)
         if followed is path:  # else the tangent there has just been factorised
             path.equilibrium.factorise(last)
-        unstable = path.equilibrium.unstable or 0
+        unstable = path.equilibrium.unstable
         abscissae = followed.abscissae()
         solved = time.perf_counter()
         error = _error(path, problem, space)
@@ -163,23 +162,16 @@ def equilibria_near(problem: Problem, starts: Sequence[FloatArray]) -> list[Equi
         problem: With a law of finite strain and a load without a cylinder.
         starts: Displacements of the nodes of a `LagrangeSpace` of degree 2, shape (N, 2), mm.
     """
-    return on_all_ranks(partial(_equilibria_near, tuple(starts)), problem, silent)
-
-
-def _equilibria_near(
-    starts: Sequence[FloatArray], problem: Problem, progress: Progress
-) -> list[Equilibrium | None]:
     # Many iterations: from a displacement that is off by some percent the first steps are short.
     path = FemNonlinearSolver(max_iterations=ITERATIONS).path(problem, LagrangeSpace(problem.mesh, 2))
     found: list[Equilibrium | None] = []
     for start in starts:
-        if (state := path.settled_from(start)) is None:
+        if (state := path.settled_from(replace(path.equilibrium.rest, nodal=start))) is None:
             found.append(None)
             continue
         equilibrium = path.equilibrium
         equilibrium.factorise(state)
-        energy, unstable = equilibrium.energy(state.nodal), equilibrium.unstable
-        found.append(Equilibrium(state.nodal, energy, unstable or 0))
+        found.append(Equilibrium(state.nodal, equilibrium.energy(state.nodal), equilibrium.unstable))
     path.close()
     return found
 

@@ -125,8 +125,7 @@ class ConstrainedNetwork:
     @property
     def markers_at_rest(self) -> MarkerForces | None:
         """The forces at the markers under the whole load, of a linear law; None without markers."""
-        state = self.step(self.zero_output)
-        return None if state is None else state.markers
+        return self.at_rest().markers
 
     @property
     def load_count(self) -> int:
@@ -173,17 +172,11 @@ class ConstrainedNetwork:
         response = self.linear_response(output, shift)
         return None if response is None else self.constrained_step(output, response, fraction)
 
-    def step_from(self, gradient: torch.Tensor) -> NewtonIterate:
-        """One Newton step to equilibrium from a displacement that need not be one of the network's.
-
-        It minimises the energy's second-order expansion there; for a linear law that is the energy.
-
-        Args:
-            gradient: Of the displacement at the quadrature points, shape (q, 2, 2).
-        """
-        force, hessian = self.energy.expanded(gradient)
-        factors = hessian.factorised(REGULARISATION, definite=self.energy.material.law == "linear")
-        return self.constrained_step(self.zero_output, self._responses(force, factors))
+    def at_rest(self) -> NewtonIterate:
+        """The solution under the whole load, of a linear law."""
+        found = self.step(self.zero_output)
+        assert found is not None  # nothing is inside out at rest
+        return found
 
     def linear_response(self, output: torch.Tensor, shift: float = REGULARISATION) -> LinearResponse | None:
         """One factorisation, and one solve for every spring; None as in `step`."""

@@ -131,18 +131,6 @@ class NetworkEnergy:
         constant = self.material.law == "linear"
         return self.forces(stress[None])[0], self.hessian(tangent[:1] if constant else tangent)
 
-    def expanded(self, gradient: torch.Tensor) -> tuple[torch.Tensor, BlockMatrix]:
-        """Derivative at zero output, N/mm, and Hessian, N/mm^2, of the energy expanded to second order.
-
-        Args:
-            gradient: Displacement gradient at the points about which it is expanded, shape (q, 2, 2).
-        """
-        stress, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
-        if self.material.law == "linear":  # the expansion is the energy, with its derivative of zero
-            return self.forces(torch.zeros_like(stress)[None])[0], self.hessian(tangent[:1])
-        stress = stress - torch.einsum("nijkl,nkl->nij", tangent, gradient)
-        return self.forces(stress[None])[0], self.hessian(tangent)
-
     def gradient(self, output: torch.Tensor) -> torch.Tensor:
         """The gradient alone, N/mm: a twentieth of the time."""
         gradient = self.gradients(output[None])[0]

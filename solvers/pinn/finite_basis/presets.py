@@ -90,6 +90,7 @@ class TrainedPinnSolver(PinnLocalSolver):
     steps: int = 25
     name: ClassVar[str] = "pinn-std"
     preset: ClassVar[str] = "trained"
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=120)
 
@@ -98,8 +99,6 @@ class TrainedPinnSolver(PinnLocalSolver):
     ) -> tuple[ConstrainedNetwork, LoadStep]:
         """The network whose neurons are trained; see `FiniteBasisSolver`."""
         network, start = super().equilibrium(network, coarse, progress)
-        if start.fraction < 1:
-            return network, start
         windows = cast(ShepardWindows, network.energy.basis.windows)
         return with_trained_neurons(network, start, windows, self.steps, progress)
 

@@ -1,22 +1,14 @@
-"""Sparse symmetric systems of dense blocks, by MUMPS."""
+"""Sparse symmetric systems of dense blocks."""
 
 from dataclasses import dataclass
 from typing import Any
-from weakref import finalize
 
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.petsc import PETSc
-
-PREFIX = "pinnray_network_"
-LEAST_FILL = 2
-"""MUMPS' ordering that eliminates first what fills least: a sixth less work than by its own choice."""
-NEGATIVE_PIVOTS = 12
-"""Number of MUMPS' output that counts them."""
-SPARE_WORKSPACE = 14, 200
-"""MUMPS' option for the workspace beyond its estimate, %: indefinite tangents delay many pivots."""
+from pinnray.solvers.symmetric_factors import FactorisationError, SymmetricFactors
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,53 +47,26 @@ class BlockMatrix:
             csr=(starts.astype(index), self.columns.astype(index), scaled.ravel()),
             comm=PETSc.COMM_SELF,
         )
-        stored.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        stored.setOption(PETSc.Mat.Option.SPD, definite)
-        preconditioner = PETSc.PC().create(PETSc.COMM_SELF)
+        factors = SymmetricFactors(stored, definite=definite, roomy=True)
         try:
-            preconditioner.setOperators(stored)
-            preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-            preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-            preconditioner.setFactorSetUpSolverType()
-            PETSc.Options(PREFIX)["mat_mumps_icntl_7"] = LEAST_FILL
-            preconditioner.getFactorMatrix().setOptionsPrefix(PREFIX)
-            preconditioner.getFactorMatrix().setMumpsIcntl(*SPARE_WORKSPACE)
-            preconditioner.setUp()
-            failed = preconditioner.getFactorMatrix().getMumpsInfog(1) < 0
-        except PETSc.Error:
-            failed = True
-        stored.destroy()
-        if failed:
-            preconditioner.destroy()
-            raise UserError("MUMPS cannot factorise the output layer; take fewer neurons")
-        return Factors(scale.ravel(), preconditioner, regularisation)
+            factors.update()
+        except FactorisationError:
+            factors.destroy()
+            raise UserError("MUMPS cannot factorise the output layer; take fewer neurons") from None
+        return Factors(scale.ravel(), factors, regularisation)
 
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """Factors of a matrix in MUMPS, freed with this object: petsc4py would keep them for ever."""
+    """Factors of a matrix with its diagonal scaled to one."""
 
     scale: FloatArray  # One over the roots of the diagonal, shape (n b,)
-    preconditioner: Any  # PETSc's object that holds them
+    scaled: SymmetricFactors
     regularisation: float  # That was added to the unit diagonal of the scaled matrix
-
-    def __post_init__(self) -> None:
-        finalize(self, self.preconditioner.destroy)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """The solutions for right-hand sides, both of shape (r, n b)."""
-        count, size = right.shape
-        given, found = (PETSc.Mat().createDense((size, count), comm=PETSc.COMM_SELF) for _ in range(2))
-        try:
-            for dense in (given, found):
-                dense.setUp()
-            given.getDenseArray()[:] = (right * self.scale).T
-            given.assemble()
-            self.preconditioner.getFactorMatrix().matSolve(given, found)
-            return np.asarray(found.getDenseArray().T * self.scale, dtype=np.float64)
-        finally:
-            given.destroy()
-            found.destroy()
+        return self.scaled.solve(right * self.scale) * self.scale
 
     @property
     def damping(self) -> FloatArray:
@@ -110,9 +75,9 @@ class Factors:
 
     @property
     def negative(self) -> int:
-        """Number of negative eigenvalues: that of negative pivots, by Sylvester's law of inertia."""
-        return int(self.preconditioner.getFactorMatrix().getMumpsInfog(NEGATIVE_PIVOTS))
+        """Number of negative eigenvalues."""
+        return self.scaled.negative
 
     def close(self) -> None:
         """Free the factors."""
-        self.preconditioner.destroy()
+        self.scaled.destroy()

@@ -12,7 +12,6 @@ from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.identification import FemBody
-from pinnray.solvers.identification.contradiction import with_doubts
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
@@ -73,11 +72,7 @@ class PinnIdSolver(IdentifyingSolver):
         """Find the unknowns and solve with them; see `Solver`. Without markers it solves for the load."""
         check_problem(self, problem)
         if problem.observations is not None:
-            found = with_doubts(
-                lambda given: self._solved(problem, given, progress)[0],
-                problem.observations,
-                lambda given: self._elements(problem).expected(given),
-            )
+            found, _, _ = self._solved(problem, problem.observations, progress)
             progress(1.0, found.force_phrase)
             return found
         level = replace(

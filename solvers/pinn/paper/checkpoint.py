@@ -1,12 +1,10 @@
 """Files of a training: checkpoints, with the digest of their problem, and the history.
 
-Checkpoints are safetensors files, replaced atomically; the history is CSV and, for TensorBoard, event files.
+Checkpoints are safetensors files, replaced atomically; the history is CSV.
 """
 
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -18,10 +16,12 @@ from pinnray.runtime.atomic import atomic_path, write_bytes
 from pinnray.runtime.errors import UserError
 
 FILE = "checkpoint.safetensors"
+UNITS = {"PDE": "MPa", "BC": "mm2", "ASM": "mm2", "total": "MPa", "energy": "N mm/mm", "seconds": "s"}
 
 
 def save_checkpoint(folder: Path, state: Mapping[str, torch.Tensor], digest: str) -> None:
     """Write a state atomically."""
+    folder.mkdir(parents=True, exist_ok=True)
     content = {name: tensor.contiguous() for name, tensor in state.items()}
     write_bytes(folder / FILE, save(content, {"digest": digest}))  # safetensors hides that a disk is full
 
@@ -48,35 +48,8 @@ def load_checkpoint(folder: Path, digest: str) -> dict[str, torch.Tensor] | None
     return state
 
 
-UNITS = {"PDE": "MPa", "BC": "mm2", "ASM": "mm2", "total": "MPa", "energy": "N mm/mm", "seconds": "s"}
-
-
-class HistoryFiles:
-    """Writes `history.csv` and, if TensorBoard is installed, its event files.
-
-    Args:
-        folder: Where they are written.
-        columns: Names of the columns, the epoch first.
-        done: Number of epochs already recorded there.
-    """
-
-    def __init__(self, folder: Path, columns: Sequence[str], done: int) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
-        self._path, self._columns, self._done = folder / "history.csv", columns, done
-        self._board: Any = None
-        if find_spec("tensorboard"):
-            from torch.utils.tensorboard import SummaryWriter
-
-            self._board = SummaryWriter(folder, purge_step=done + 1)
-
-    def write(self, history: FloatArray) -> None:
-        """Write a history of shape (epochs, columns)."""
-        titles = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in self._columns]
-        with atomic_path(self._path) as partial:
-            np.savetxt(partial, history, delimiter=",", header=",".join(titles), comments="", fmt="%.9g")
-        if self._board is not None:
-            for row in history[self._done :]:
-                for name, value in zip(self._columns[1:], row[1:], strict=True):
-                    self._board.add_scalar(name, value, int(row[0]))
-            self._board.flush()
-            self._done = len(history)
+def write_history(folder: Path, columns: Sequence[str], history: FloatArray) -> None:
+    """Write `history.csv` from values of shape (epochs, columns)."""
+    titles = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in columns]
+    with atomic_path(folder / "history.csv") as partial:
+        np.savetxt(partial, history, delimiter=",", header=",".join(titles), comments="", fmt="%.9g")

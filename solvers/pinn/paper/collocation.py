@@ -9,14 +9,11 @@ from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 
-Collocation = Literal["nodes", "elements", "random"]
-"""`nodes`: the mesh's nodes, all alike (the paper); `elements`: the rule of degree 2 in every triangle;
-`random`: as many points as nodes, drawn uniformly in the body."""
+Collocation = Literal["nodes", "elements"]
+"""`nodes`: the mesh's nodes, all alike (the paper); `elements`: the rule of degree 2 in every triangle."""
 
 
-def collocation_points(
-    mesh: TriangleMesh, collocation: Collocation, seed: int
-) -> tuple[FloatArray, FloatArray]:
+def collocation_points(mesh: TriangleMesh, collocation: Collocation) -> tuple[FloatArray, FloatArray]:
     """Points of the body, shape (n, 2), mm, and their weights in a mean over it, shape (n,), of sum one.
 
     The mean over nodes is the paper's. It has a bias towards dense parts of the mesh.
@@ -24,17 +21,9 @@ def collocation_points(
     if collocation == "elements":
         rule = body_quadrature(mesh)
         return rule.location.points, rule.weights / rule.weights.sum()
-    points = mesh.points if collocation == "nodes" else _uniform_points(mesh, len(mesh.points), seed)
-    return points, np.full(len(points), 1 / len(points))
+    return mesh.points, np.full(len(mesh.points), 1 / len(mesh.points))
 
 
 def base_points(mesh: TriangleMesh, count: int) -> FloatArray:
     """Evenly spaced points of the base, along all its pieces, shape (count, 2), mm."""
     return evenly_spaced_points(mesh, "base", count)
-
-
-def _uniform_points(mesh: TriangleMesh, count: int, seed: int) -> FloatArray:
-    rng = np.random.default_rng(seed)
-    cells = rng.choice(len(mesh.areas), count, p=mesh.areas / mesh.areas.sum())
-    barycentric = rng.dirichlet(np.ones(3), count)
-    return np.asarray(np.einsum("nc,ncx->nx", barycentric, mesh.points[mesh.triangles[cells]]))

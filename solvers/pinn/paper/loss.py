@@ -1,10 +1,8 @@
-"""The loss: its terms, with their gradients in the parameters, summed over threads and processes.
+"""The loss: its terms, and their sum with its gradient in the parameters, in chunks over threads.
 
-Terms of one name are added and have one factor in the loss. `add` returns the contribution of some rows of a
-term's points and adds factor times its gradient in the parameters in logistic form to `sums`.
+Terms of one name are added and have one factor in the loss.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,12 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-import torch.distributed
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import Lame, stress_of
-from pinnray.solvers.pinn.paper.mlp_passes import MlpPass
-from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
+from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
 from pinnray.solvers.pinn.threading import map_in_threads, slices
 
 
@@ -31,12 +27,10 @@ class EnergyTerm:
     name: str = "PDE"  # Of the term
     divisible: bool = True  # Points can be evaluated in chunks
 
-    def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
-        """Half of stress times displacement gradient; its derivative by that gradient is the stress."""
-        gradient = networks.input_gradients().transpose(0, 1).flatten(1)
-        stress = (gradient @ self.stiffness).mul_(self.weights[rows, None])
-        networks.backward_input_gradients((factor * stress).unflatten(1, (2, 2)).transpose(0, 1), sums)
-        return 0.5 * float((stress * gradient).sum())
+    def value(self, network: ModifiedMlp, parameters: torch.Tensor, rows: slice) -> torch.Tensor:
+        """The part of some rows of the points: half of stress times displacement gradient."""
+        gradient = network.gradients(parameters, self.points[rows]).transpose(0, 1).flatten(1)
+        return 0.5 * self.weights[rows] @ ((gradient @ self.stiffness) * gradient).sum(dim=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +49,12 @@ class DisplacementTerm:
         """False with a functional, which couples the points."""
         return self.functional is None
 
-    def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
-        """Weighted squares of the differences."""
-        values = networks.values()
-        if self.functional is None:
-            difference = values - self.targets[:, rows]
-            weighted = self.weights[:, rows] * difference
-            factors = weighted
-        else:
-            difference = values @ self.functional.T - self.targets
-            weighted = self.weights * difference
-            factors = weighted @ self.functional
-        networks.backward_values(2 * factor * factors, sums)
-        return float((weighted * difference).sum())
+    def value(self, network: ModifiedMlp, parameters: torch.Tensor, rows: slice) -> torch.Tensor:
+        """The part of some rows of the points; of all with a functional."""
+        values = network.values(parameters, self.points[rows])
+        if self.functional is not None:
+            values, rows = values @ self.functional.T, slice(None)
+        return (self.weights[:, rows] * (values - self.targets[:, rows]).square()).sum()
 
 
 LossTerm = EnergyTerm | DisplacementTerm
@@ -77,32 +64,6 @@ def stiffness_matrix(lame: Lame) -> FloatArray:
     """Hooke's law as a matrix on (du/dx, du/dy, dv/dx, dv/dy), shape (4, 4), MPa; it is symmetric."""
     return stress_of("linear", np.eye(4).reshape(4, 2, 2), lame)[0].reshape(4, 4)
 
-
-@dataclass(frozen=True)
-class ProcessGroup:
-    """One of several processes of torchrun, which share a training's points and sum their gradients."""
-
-    rank: int  # Its number; 0 reports and writes
-    count: int  # Number of processes
-
-    @classmethod
-    def from_environment(cls) -> "ProcessGroup":
-        """The processes of torchrun (RANK, WORLD_SIZE), connected by Gloo, or this one alone."""
-        count = int(os.environ.get("WORLD_SIZE", "1"))
-        if count == 1:
-            return ONE_PROCESS
-        if not torch.distributed.is_initialized():
-            torch.distributed.init_process_group("gloo")
-        return cls(torch.distributed.get_rank(), count)
-
-    def sum(self, *tensors: torch.Tensor) -> None:
-        """Replace tensors by their sums over all processes."""
-        if self.count > 1:
-            for tensor in tensors:
-                torch.distributed.all_reduce(tensor)
-
-
-ONE_PROCESS = ProcessGroup(0, 1)
 
 LANES = 16
 """Fixed groups in which chunks are summed, so that rounding is independent of the number of threads."""
@@ -128,38 +89,35 @@ class Loss:
     network: ModifiedMlp  # The networks
     terms: Sequence[LossTerm]  # The terms
     factors: Mapping[str, float]  # Weight of the terms by their names
-    processes: ProcessGroup = ONE_PROCESS  # Processes that share the chunks
 
     def __call__(self, parameters: torch.Tensor) -> LossEvaluation:
         """The loss and its gradient at parameters of shape (networks, parameters)."""
-        weights = self.network.weights(self.network.in_logistic_form(parameters))
 
         def lane(chunks: list[Chunk]) -> tuple[dict[str, float], torch.Tensor]:
             values = dict.fromkeys(self.factors, 0.0)
             gradient = torch.zeros_like(parameters)
-            sums = self.network.weights(gradient)
+            own = parameters.detach().requires_grad_()
             for term, rows in chunks:
-                networks = MlpPass(self.network, weights, term.points[rows])
-                values[term.name] += term.add(networks, rows, self.factors[term.name], sums)
+                value = term.value(self.network, own, rows)
+                values[term.name] += float(value.detach())
+                gradient += torch.autograd.grad(self.factors[term.name] * value, own)[0]
             return values, gradient
 
-        values = torch.zeros(len(self.factors), dtype=torch.float64)
+        terms = dict.fromkeys(self.factors, 0.0)
         gradient = torch.zeros_like(parameters)
-        for of_lane, gradient_of_lane in map_in_threads(lane, self._lanes):
-            values += torch.tensor(list(of_lane.values()), dtype=torch.float64)
+        for values, gradient_of_lane in map_in_threads(lane, self._lanes):
+            for name, value in values.items():
+                terms[name] += value
             gradient += gradient_of_lane
-        self.processes.sum(values, gradient)
-        terms = dict(zip(self.factors, values.tolist(), strict=True))
         total = sum(self.factors[name] * value for name, value in terms.items())
-        return LossEvaluation(terms, total, self.network.in_logistic_form(gradient))
+        return LossEvaluation(terms, total, gradient)
 
     @cached_property
     def _lanes(self) -> list[list[Chunk]]:
-        """The chunks of this process, in groups; one chunk a term on a GPU."""
+        """The chunks in groups; one chunk a term on a GPU."""
         chunks: list[Chunk] = []
         for term in self.terms:
             count = len(term.points)
             size = CHUNK if term.divisible and not term.points.is_cuda else count
             chunks += [(term, rows) for rows in slices(count, size)]
-        lanes = [chunks[start::LANES] for start in range(min(LANES, len(chunks)))]
-        return lanes[self.processes.rank :: self.processes.count]
+        return [chunks[start::LANES] for start in range(min(LANES, len(chunks)))]

@@ -1,4 +1,4 @@
-"""The paper's modified MLP: shape, initial weights, and views of its parameters.
+"""The paper's modified MLP: shape, initial weights, values and derivatives.
 
 With X = (x, y) and `*` by element (S. Wang, Y. Teng, P. Perdikaris: Understanding and mitigating gradient
 flow pathologies in physics-informed neural networks, SIAM J. Sci. Comput. 43 (2021) A3055-A3081):
@@ -76,12 +76,23 @@ class ModifiedMlp:
             matrix.normal_(0, variance**0.5, generator=generator)
         return parameters.to(dtype)
 
-    def in_logistic_form(self, parameters: torch.Tensor) -> torch.Tensor:
-        """Twice all parameters but the output's, as `mlp_passes` takes them.
+    def values(self, parameters: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
+        """Outputs at points (n, 2), or at points of each network's own, (networks, n, 2): (networks, n)."""
+        weights = self.weights(parameters)
+        points = points.expand(self.networks, -1, -1)
+        with_one = torch.cat([points, torch.ones_like(points[..., :1])], dim=-1)
+        a, b, first = torch.tanh(with_one[:, None] @ weights.first).unbind(1)
+        hidden = first if self.literal_gate else torch.lerp(a, b, first)
+        for matrix, bias in zip(weights.gates, weights.biases, strict=True):
+            hidden = torch.lerp(a, b, torch.tanh(torch.baddbmm(bias, hidden, matrix)))
+        return (hidden @ weights.output)[..., 0] + weights.output_bias
 
-        tanh(s) = 2 σ(2 s) - 1 with the logistic function σ, which torch evaluates several times as fast.
-        Applied to a gradient in the doubled parameters it gives that in the parameters.
+    def gradients(self, parameters: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
+        """Derivatives of the outputs by x and y at points (n, 2): (networks, n, 2).
+
+        They can be differentiated by the parameters where these require it.
         """
-        doubled = 2 * parameters
-        doubled[:, -self.width - 1 :] = parameters[:, -self.width - 1 :]
-        return doubled
+        with torch.enable_grad():
+            own = points.repeat(self.networks, 1, 1).requires_grad_()
+            total = self.values(parameters, own).sum()
+            return torch.autograd.grad(total, own, create_graph=parameters.requires_grad)[0]

@@ -13,23 +13,10 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import Weighting
 from pinnray.solvers.pinn.network_solver import NetworkSolver
 from pinnray.solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
-from pinnray.solvers.pinn.paper.loss import (
-    ONE_PROCESS,
-    DisplacementTerm,
-    EnergyTerm,
-    Loss,
-    LossTerm,
-    ProcessGroup,
-    stiffness_matrix,
-)
+from pinnray.solvers.pinn.paper.loss import DisplacementTerm, EnergyTerm, Loss, LossTerm, stiffness_matrix
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
 from pinnray.solvers.pinn.paper.trained_field import MlpField, assess_training
-from pinnray.solvers.pinn.paper.training import (
-    OPTIMISERS,
-    CheckpointStore,
-    Training,
-    TrainingSettings,
-)
+from pinnray.solvers.pinn.paper.training import CheckpointStore, Training, TrainingSettings
 from pinnray.solvers.pinn.threading import pool, torch_threads
 from pinnray.solvers.problem import Problem, contact_functional
 from pinnray.solvers.solution import Solution
@@ -37,7 +24,7 @@ from pinnray.solvers.solver import Cost, Progress, TrainingContext, check_proble
 
 PRECISIONS = {"single": torch.float32, "double": torch.float64}
 
-FREE = ("epochs", "patience", "min_change", "checkpoint_every", "threads", "device")
+FREE = ("epochs", "checkpoint_every", "threads", "device")
 """Settings that may change when a training is resumed."""
 
 
@@ -53,14 +40,10 @@ class PaperPinnSolver(NetworkSolver):
         layers: Gated layers of each network.
         base_points: Evenly spaced points of the base where the displacement should vanish.
         collocation: Where the energy is evaluated: "nodes" of the shared mesh with equal weights, as in the
-            paper, "elements", by quadrature in its triangles, or "random", uniformly in the body.
-        optimiser: "adam".
+            paper, or "elements", by quadrature in its triangles.
         device: "cpu" or "cuda".
         precision: "single" or "double".
         literal_gate: Whether the first gate has a hidden layer of its own, as printed in the paper.
-        patience: The training ends early when the mean loss of so many epochs is no better than that of
-            as many before; 0 never ends it, as in the paper.
-        min_change: Relative decrease of that mean which counts as better.
         checkpoint_every: Epochs between checkpoints.
         threads: Threads of the processor; 0 takes as many as torch is set to.
         seed: Of the random numbers.
@@ -73,29 +56,22 @@ class PaperPinnSolver(NetworkSolver):
     layers: int = 4
     base_points: int = 1000
     collocation: Collocation = "nodes"
-    optimiser: str = "adam"
     device: Literal["cpu", "cuda"] = "cpu"
     precision: Literal["single", "double"] = "single"
     literal_gate: bool = False
-    patience: int = 0
-    min_change: float = 1e-4
     checkpoint_every: int = 1000
     threads: int = 0
     seed: int = 0
     _context: TrainingContext = field(default=TrainingContext(), init=False, repr=False, compare=False)
     name: ClassVar[str] = "pinn-std"
     preset: ClassVar[str] = "paper"
-    cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=16_600)
+    cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=21_000)
 
     def __post_init__(self) -> None:
         self.check_positive("epochs", "learning_rate", "bc_weight", "width", "layers")
         if self.base_points < 2:
             raise UserError(f"{self.name}: base_points must be at least 2, got {self.base_points}")
-        self.check_not_negative("patience", "checkpoint_every", "threads", "seed")
-        if self.optimiser not in OPTIMISERS:
-            raise UserError(
-                f"{self.name}: optimiser must be {' or '.join(OPTIMISERS)}, got {self.optimiser!r}"
-            )
+        self.check_not_negative("checkpoint_every", "threads", "seed")
         if self.device == "cuda" and not torch.cuda.is_available():
             raise UserError(f"{self.name}: device cuda needs a GPU and torch's CUDA build; take device=cpu")
         _ = self.weighting
@@ -119,14 +95,13 @@ class PaperPinnSolver(NetworkSolver):
         """
         check_problem(self, problem)
         started = time.perf_counter()
-        processes = ProcessGroup.from_environment()
         area = float(problem.mesh.areas.sum())
         with torch_threads(self.threads) as threads, pool():
-            loss = self.loss(problem, processes)
+            loss = self.loss(problem)
             initial = self.network.initial(self.seed, PRECISIONS[self.precision]).to(self.device)
             settings = TrainingSettings(**{e.name: getattr(self, e.name) for e in fields(TrainingSettings)})
-            training = Training(loss, initial, settings, area, self._store(problem, processes))
-            training.run(progress if processes.rank == 0 else silent, self._context.reference_energy)
+            training = Training(loss, initial, settings, area, self._store(problem))
+            training.run(progress, self._context.reference_energy)
             field = MlpField(self.network, training.parameters.double().cpu())
             energy, reaction, status = assess_training(problem, field, training)
         seconds = time.perf_counter() - started
@@ -146,20 +121,19 @@ class PaperPinnSolver(NetworkSolver):
                 "seed": self.seed,
                 "device": self.device,
                 "threads": threads,
-                "processes": processes.count,
             },
             history=dict(zip(training.columns, training.history.T, strict=True)),
         )
 
-    def _store(self, problem: Problem, processes: ProcessGroup) -> CheckpointStore | None:
+    def _store(self, problem: Problem) -> CheckpointStore | None:
         """Where to save; a checkpoint belongs to the problem and to all settings but those of `FREE`."""
         if self._context.folder is None:
             return None
         binding = {name: value for name, value in self.settings().items() if name not in FREE}
         digest = content_hash([problem.digest, binding])
-        return CheckpointStore(self._context.folder, digest, self._context.resume, writes=processes.rank == 0)
+        return CheckpointStore(self._context.folder, digest, self._context.resume)
 
-    def loss(self, problem: Problem, processes: ProcessGroup = ONE_PROCESS) -> Loss:
+    def loss(self, problem: Problem) -> Loss:
         """The paper's loss: L_PDE + bc_weight L_BC and, of a solver that assimilates, its factor times L_ASM.
 
         L_ASM is the mean square of the misfits' lengths, mm²; with unequal weights, the weighted mean.
@@ -168,7 +142,7 @@ class PaperPinnSolver(NetworkSolver):
         def tensor(array: FloatArray) -> torch.Tensor:
             return torch.tensor(np.asarray(array), dtype=PRECISIONS[self.precision], device=self.device)
 
-        body, shares = collocation_points(problem.mesh, self.collocation, self.seed)
+        body, shares = collocation_points(problem.mesh, self.collocation)
         base = base_points(problem.mesh, self.base_points)
         contact, functional = contact_functional(problem)
         targets = np.array([[value or 0.0] for value in problem.load.displacement])
@@ -199,7 +173,7 @@ class PaperPinnSolver(NetworkSolver):
                     functional=tensor(means),
                 )
             )
-        return Loss(self.network, terms, factors, processes)
+        return Loss(self.network, terms, factors)
 
 
 @dataclass(frozen=True, kw_only=True)

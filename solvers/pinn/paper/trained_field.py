@@ -9,7 +9,6 @@ import torch
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.energy_and_force import energy_and_force
-from pinnray.solvers.pinn.paper.mlp_passes import MlpPass
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
 from pinnray.solvers.pinn.paper.training import Training
 from pinnray.solvers.pinn.threading import CHUNK, map_in_threads, slices
@@ -26,18 +25,19 @@ class MlpField:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        return self._evaluate(location, MlpPass.values)
+        return self._evaluate(location, self.network.values)
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        return self._evaluate(location, MlpPass.input_gradients)
+        return self._evaluate(location, self.network.gradients)
 
-    def _evaluate(self, location: LocatedPoints, quantity: Callable[[MlpPass], torch.Tensor]) -> FloatArray:
+    def _evaluate(
+        self, location: LocatedPoints, quantity: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+    ) -> FloatArray:
         points = torch.from_numpy(np.array(location.points))
-        weights = self.network.weights(self.network.in_logistic_form(self.parameters))
 
         def evaluate(rows: slice) -> torch.Tensor:
-            return quantity(MlpPass(self.network, weights, points[rows])).transpose(0, 1)
+            return quantity(self.parameters, points[rows]).transpose(0, 1)
 
         rows = slices(len(points), max(CHUNK // self.network.width, 8))
         return np.asarray(torch.cat(map_in_threads(evaluate, rows)).numpy())

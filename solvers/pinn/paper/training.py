@@ -1,8 +1,7 @@
-"""The training loop: epochs of an optimiser with history, checkpoints, early stop and divergence check."""
+"""The training loop: epochs of Adam with history, checkpoints and divergence check."""
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +9,9 @@ import numpy as np
 import torch
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.pinn.paper.checkpoint import HistoryFiles, load_checkpoint, save_checkpoint
+from pinnray.solvers.pinn.paper.checkpoint import load_checkpoint, save_checkpoint, write_history
 from pinnray.solvers.pinn.paper.loss import Loss, LossEvaluation
 from pinnray.solvers.solver import Progress, TrainingDiverged
-
-OPTIMISERS: dict[str, Callable[..., torch.optim.Optimizer]] = {"adam": torch.optim.Adam}
-"""By the names of the settings; called with the parameters and `lr`."""
 
 DIVERGED = 1e3
 """Ratio of the loss to its first value above which the training has diverged."""
@@ -25,11 +21,8 @@ DIVERGED = 1e3
 class TrainingSettings:
     """Settings of the training; see `PaperPinnSolver` for their meaning."""
 
-    optimiser: str
     learning_rate: float
     epochs: int
-    patience: int
-    min_change: float
     checkpoint_every: int
 
 
@@ -40,7 +33,6 @@ class CheckpointStore:
     folder: Path  # The folder of the checkpoint and the history
     digest: str  # Of the problem and the settings that determine the result
     resume: bool  # Whether to continue from a checkpoint in the folder
-    writes: bool  # Whether this process writes
 
 
 class Training:
@@ -65,13 +57,12 @@ class Training:
         self.parameters = initial
         self.columns = ("epoch", *loss.factors, "total", "energy", "seconds")
         self._loss, self._settings, self._area, self._store = loss, settings, area, store
-        self._stepper = OPTIMISERS[settings.optimiser]([initial], lr=settings.learning_rate)
+        self._stepper = torch.optim.Adam([initial], lr=settings.learning_rate)
         self._rows: list[tuple[float, ...]] = []
         saved = load_checkpoint(store.folder, store.digest) if store and store.resume else None
         if saved:
             self._restore(saved)
         self._started = time.perf_counter() - (self._rows[-1][-1] if self._rows else 0.0)
-        self._files = HistoryFiles(store.folder, self.columns, self.epoch) if store and store.writes else None
 
     @property
     def epoch(self) -> int:
@@ -95,7 +86,7 @@ class Training:
         """
         last, done, started = self._state(), self.epoch, time.perf_counter()
         try:
-            while self.epoch < self._settings.epochs and not self.settled():
+            while self.epoch < self._settings.epochs:
                 evaluation = self._step()
                 last = self._state()
                 if self._settings.checkpoint_every and self.epoch % self._settings.checkpoint_every == 0:
@@ -107,30 +98,15 @@ class Training:
             raise
         self._save(last)
 
-    def settled(self) -> bool:
-        """Whether the mean loss of the last `patience` epochs is no better than that of as many before."""
-        count = self._settings.patience
-        if count == 0 or self.epoch < 2 * count or self.epoch % count:
-            return False
-        total = self.history[-2 * count :, self.columns.index("total")].reshape(2, count).mean(axis=1)
-        return bool(total[1] > (1 - self._settings.min_change) * total[0])
-
     def _step(self) -> LossEvaluation:
         """One step of the optimiser."""
-        evaluations: list[LossEvaluation] = []
-
-        def closure() -> float:
-            evaluation = self._loss(self.parameters)
-            self._check(evaluation.total)
-            evaluations.append(evaluation)
-            self.parameters.grad = evaluation.gradient
-            return evaluation.total
-
-        self._stepper.step(closure)
-        terms, total, _ = evaluations[0]
+        evaluation = self._loss(self.parameters)
+        terms, total, self.parameters.grad = evaluation
+        self._check(total)
+        self._stepper.step()
         seconds = time.perf_counter() - self._started
         self._rows.append((self.epoch + 1, *terms.values(), total, self._area * terms["PDE"], seconds))
-        return evaluations[0]
+        return evaluation
 
     def _text(self, evaluation: LossEvaluation, pace: float, reference: float | None) -> str:
         energy, epochs = self._area * evaluation.terms["PDE"], self._settings.epochs
@@ -170,14 +146,14 @@ class Training:
         self._stepper.load_state_dict({"state": {0: values} if values else {}, "param_groups": groups})
 
     def _save(self, state: tuple[int, dict[str, torch.Tensor]]) -> None:
-        if self._store is None or self._files is None:
+        if self._store is None:
             return
         epoch, tensors = state
         history = self.history[:epoch]
         save_checkpoint(
             self._store.folder, {**tensors, "history": torch.from_numpy(history)}, self._store.digest
         )
-        self._files.write(history)
+        write_history(self._store.folder, self.columns, history)
 
 
 def _duration(seconds: float) -> str:

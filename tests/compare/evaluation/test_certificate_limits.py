@@ -20,8 +20,7 @@ GOOD = Certificate(
     load=np.array([np.nan, 0.1]),
     work=8.2,
     stroke=10.0,
-    regions={"tip": Region(0.25, 0.5, 0.1, 0.2)},
-    density=np.array([0.01, 0.02]),
+    regions={"tip": Region(area=0.25, excess=0.5, rel_l2_displacement=0.1, rel_l2_von_mises=0.2)},
 )
 """A converged solution: its energy is 4 N mm/mm under `fem`, its stroke 10 mm."""
 

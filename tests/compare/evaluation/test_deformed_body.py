@@ -9,7 +9,6 @@ import pytest
 from pinnray.comparison.evaluation.deformed_body import DeformedBody, with_body_checks
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.report.html_report import report_html
-from pinnray.comparison.report.output_files import metrics
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 
@@ -107,7 +106,7 @@ def test_the_warning_names_all_and_the_simulated_finger(fem, pinn, mesh, compare
     named = f"fem, pinn-std, the simulated finger: {SELF}"
     assert [remark.startswith(named) for remark in remarks].count(True) == 1
     comparison = compared(*checked, warnings=remarks)
-    assert metrics(comparison)["warnings"] == remarks
+    assert list(comparison.scores.warnings) == remarks
     assert f"<li>{named};" in report_html(comparison, [], {})
     small = moved(fem, mesh, lambda points: 0.01 * points)
     assert with_body_checks([small], mesh, truth=small) == ([small], [])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import ForceCurve, force_curves, write_force_displacement
+from pinnray.comparison.evaluation.force_curves import ForceCurve, force_curves, write_force_displacement
 from pinnray.comparison.figures.force_charts import draw_force_displacement
 from pinnray.runtime.figure import MEASURED
 from pinnray.solvers.problem import Load
@@ -85,8 +85,8 @@ def test_the_force_on_the_simulated_finger_is_a_cross(followed, fem):
 
 
 def test_the_whole_curve_of_the_simulated_finger_and_an_identified_force_are_drawn(followed, fem):
-    size, path = Estimated(0.6, 0.5, 0.8), [(0.4, 0.3), (1.0, 0.6)]
-    found = replace(fem, solver="fem-id", in_sample=True, identified=IdentifiedForce(size, None, path))
+    force = IdentifiedForce(Estimated(0.6, 0.5, 0.8), None)
+    found = replace(fem, solver="fem-id", in_sample=True, identified=force)
     truth = replace(followed, solver="truth")
     curves = force_curves([fem, followed], Load())
     page = page_of(
@@ -96,8 +96,6 @@ def test_the_whole_curve_of_the_simulated_finger_and_an_identified_force_are_dra
     pink = [line for line in axes.lines if line.get_color() == MEASURED and line.get_marker() == "None"]
     np.testing.assert_allclose(pink[0].get_ydata(), 3.0 * STEPS**2)
     assert "fem-id, 0.6 N/mm, identified" in page.text
-    (lesser,) = [line for line in axes.lines if line.get_linestyle() == ":"]
-    np.testing.assert_allclose(lesser.get_xydata(), [[0, 0], [4, 0.3], [10, 0.6]])
     (interval,) = axes.containers[0].lines[2]  # type: ignore[attr-defined]
     np.testing.assert_allclose(interval.get_segments()[0][:, 1], [0.5, 0.8])
     assert (page.cut_off(), page.overlaps()) == ([], [])

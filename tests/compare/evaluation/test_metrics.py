@@ -3,16 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.comparison.evaluation.evaluation import field_difference, weighted_percentile
-from pinnray.comparison.evaluation.metrics import (
-    MEANS,
-    force_error,
-    held_out_errors,
-    marker_errors,
-    pick_reference,
-    reference_differences,
-    truth_differences,
-)
+from pinnray.comparison.evaluation.comparison import pick_reference
+from pinnray.comparison.evaluation.differences import Differences, FieldDifference, weighted_percentile
+from pinnray.comparison.evaluation.metrics import MEANS, MarkerErrors, Scores, TruthDifferences, force_error
 
 
 @pytest.mark.parametrize(
@@ -30,26 +23,40 @@ def test_weighted_percentile_of_three_values(percent, expected):
     assert weighted_percentile(values, weights, percent) == expected
 
 
-def test_errors_at_the_markers_by_hand(fem, observe):
-    moved = replace(fem, marker_displacement=np.array([[1.0, -2.0], [50.0, 50.0], [-5.0, 6.0]]))
-    errors = marker_errors(moved, observe(np.zeros((3, 2)), hidden=(1,)))
+def test_errors_at_the_markers_by_hand(observe):
+    moved = np.array([[1.0, -2.0], [50.0, 50.0], [-5.0, 6.0]])
+    errors = MarkerErrors.of(moved, observe(np.zeros((3, 2)), hidden=(1,)))
     np.testing.assert_array_equal(errors.ae_u, [1, np.nan, 5])
     np.testing.assert_array_equal(errors.ae_v, [2, np.nan, 6])
-    assert dict(zip(MEANS, errors[2:], strict=True)) == {"mae_u": 3, "mae_v": 4, "mae_sum": 7, "mae_rss": 5}
-    assert np.isnan(marker_errors(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2)))[2:]).all()
+    assert errors.model_dump(include=set(MEANS)) == {"mae_u": 3, "mae_v": 4, "mae_sum": 7, "mae_rss": 5}
+    unseen = MarkerErrors.of(moved, observe(np.zeros((3, 2)), hidden=(0, 1, 2)))
+    assert np.isnan([getattr(unseen, name) for name in MEANS]).all()
 
 
-def test_held_out_errors_are_of_what_the_solver_was_not_given(fem, observe):
+def test_held_out_errors_are_of_what_the_solver_was_not_given(fem, observe, compared):
     seen = observe(fem.marker_displacement + 1.0)
-    assert held_out_errors(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2))) is None
-    free = held_out_errors(fem, seen)
-    assert free is not None
+
+    def held_out(evaluation, observations=seen):
+        return compared(evaluation, observations=observations).scores["fem"].held_out
+
+    assert held_out(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2))) is None
+    free = held_out(fem)
     assert (free.mae_u, free.mae_v) == pytest.approx((1, 1))  # it was given no marker
     given = replace(fem, in_sample=True)
-    assert held_out_errors(given, seen) is None
-    told = held_out_errors(replace(given, left_out=fem.marker_displacement + 3.0), seen)
-    assert told is not None
+    assert held_out(given) is None
+    told = held_out(replace(given, left_out=fem.marker_displacement + 3.0))
     assert (told.mae_u, told.mae_v) == pytest.approx((2, 2))
+
+
+def test_the_numbers_come_back_from_their_file(estimated, pinn, compared, tmp_path):
+    """With those that do not exist, such as the force of a truth that nobody knows."""
+    scores = compared(estimated, replace(pinn, in_sample=True), warnings=["careful"]).scores
+    scores.write(tmp_path)
+    again = Scores.read(tmp_path)
+    assert np.isnan(again["fem"].force_to_truth_rel)
+    again.write(tmp_path / "again")
+    files = [(place / "metrics.json").read_text() for place in (tmp_path, tmp_path / "again")]
+    assert files[0] == files[1]
 
 
 @pytest.mark.parametrize(
@@ -62,26 +69,26 @@ def test_held_out_errors_are_of_what_the_solver_was_not_given(fem, observe):
     ],
 )
 def test_difference_of_fields_by_hand(values, reference, expected):
-    difference = field_difference(np.array(values), np.array(reference), np.array([1.0, 3.0]))
-    assert difference == pytest.approx(expected)
+    difference = FieldDifference.of(np.array(values), np.array(reference), np.array([1.0, 3.0]))
+    assert (difference.rel_l2, difference.mean, difference.p95) == pytest.approx(expected)
 
 
 def test_a_reference_of_zeros_has_no_relative_difference():
-    assert np.isnan(field_difference(np.ones(2), np.zeros(2), np.ones(2)).rel_l2)
+    assert np.isnan(FieldDifference.of(np.ones(2), np.zeros(2), np.ones(2)).rel_l2)
 
 
 def test_a_tenth_more_everywhere(pinn, fem):
-    differences = reference_differences(pinn, fem)
+    differences = Differences.between(pinn, fem)
     for difference in (differences.displacement, differences.von_mises, differences.stress["xy"]):
         assert difference.rel_l2 == pytest.approx(0.1)
-    assert differences.energy == pytest.approx(0.21)
+    assert differences.rel_energy == pytest.approx(0.21)
     assert differences.mae_markers == pytest.approx(0.1 * np.abs(fem.marker_displacement).sum(axis=1).mean())
 
 
 def test_strain_differences_tell_components_apart(fem):
     strain = fem.strain.copy()
     strain[:, 0, 0] += 0.5
-    differences = reference_differences(replace(fem, strain=strain), fem)
+    differences = Differences.between(replace(fem, strain=strain), fem)
     assert {name: d.mean for name, d in differences.strain.items()} == pytest.approx(
         {"xx": 0.5, "yy": 0, "xy": 0}
     )
@@ -97,7 +104,8 @@ def test_differences_from_the_truth_are_those_of_whole_tensors(fem):
     strain = fem.strain.copy()
     strain[:, 0, 0] += 0.3
     strain[:, 1, 1] += 0.4
-    differences = truth_differences(replace(fem, strain=strain, displacement=2 * fem.displacement), fem)
+    other = replace(fem, strain=strain, displacement=2 * fem.displacement)
+    differences = TruthDifferences.between(other, fem)
     assert differences.strain.mean == pytest.approx(0.5)
     assert differences.displacement.rel_l2 == pytest.approx(1)
     assert differences.von_mises.rel_l2 == 0
@@ -110,4 +118,4 @@ def test_the_error_of_the_force_is_that_of_its_size(fem, factor, expected):
 
 def test_the_95th_percentile_of_a_difference_is_below_a_twentieth_of_the_area():
     values = np.random.default_rng(0).permutation(np.arange(1.0, 1001.0))
-    assert field_difference(values, np.zeros(1000), np.ones(1000)).p95 == 950
+    assert FieldDifference.of(values, np.zeros(1000), np.ones(1000)).p95 == 950

@@ -60,8 +60,7 @@ def test_what_may_be_a_real_finger_is_not_warned_of(measured, problem, scale):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda moved: moved / 10, "look like centimetres, or the stroke was another"),
-        (lambda moved: moved / 5, "times those of fem for a stroke of 10 mm; check unit and stroke"),
+        (lambda moved: moved / 10, "times those of fem for a stroke of 10 mm; check unit and stroke"),
         (lambda moved: np.vstack([[0, -60], moved[1:]]), "marker 1 moved by 60 mm, 3 times farther than any"),
         (lambda moved: 0 * moved, "no marker moved"),
         (lambda moved: moved * (-1) ** np.arange(9)[:, None], "unlike those of fem (cosine"),  # no pattern

@@ -1,13 +1,12 @@
 """The simulated truths: walls, laws and loads, and fields at points that move with the walls."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from pinnray.comparison.crossval.folds import LoadCase
-from pinnray.comparison.crossval.study import CrossvalStudy
-from pinnray.comparison.crossval.true_fields import FieldSampler, TrueField, TruthTask, simulate_truth
 from pinnray.comparison.evaluation.truths import (
     LAWS,
     SLIDING,
@@ -25,6 +24,9 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.registry import make_solver
+from pinnray.studies.crossval.folds import LoadCase
+from pinnray.studies.crossval.study import CrossvalStudy
+from pinnray.studies.crossval.true_fields import FieldSampler, TrueField, TruthTask, simulate_truth
 
 FULL = LoadCase("full", Load(), 1.0, 35.0)
 
@@ -33,12 +35,17 @@ FULL = LoadCase("full", Load(), 1.0, 35.0)
 def study(tmp_path, coarse_mesh, monkeypatch) -> CrossvalStudy:
     monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
     study = CrossvalStudy(design=Design(), variants=[], out=tmp_path, mesh=MeshSettings(size=1.0))
-    coarse_mesh.save(study.mesh_file)
     return study
 
 
-def true_field(study: CrossvalStudy, truth: Truth, case: LoadCase = FULL) -> TrueField:
-    return TrueField.load(simulate_truth(TruthTask(study, truth, case))["joints"])
+@pytest.fixture
+def true_field(study, coarse_mesh) -> Callable[..., TrueField]:
+    """`true_field(truth, case)`: at the markers of the joints."""
+
+    def found(truth: Truth, case: LoadCase = FULL, **changes: Any) -> TrueField:
+        return simulate_truth(TruthTask(replace(study, **changes), truth, case, coarse_mesh))["joints"]
+
+    return found
 
 
 def test_walls_are_redrawn_around_the_axes_of_the_ribs():
@@ -70,9 +77,9 @@ def test_the_source_names_law_and_load(mesh):
 
 
 @pytest.mark.usefixtures("few_elements")
-def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, coarse_mesh):
+def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(true_field, coarse_mesh):
     """By hand, as before there were other truths; force and contact are those of the solution."""
-    found = true_field(replace(study, mesh=MeshSettings(size=2.0)), SLIDING)
+    found = true_field(SLIDING, mesh=MeshSettings(size=2.0))
     problem = Problem(finger_mesh(Design(), settings=MeshSettings(size=1.0)))
     solution = simulate(problem)
     points = body_quadrature(coarse_mesh).location.points
@@ -82,10 +89,10 @@ def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, co
 
 
 @pytest.mark.slow
-def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_mesh):
+def test_fields_are_compared_at_points_that_move_with_the_walls(study, true_field, coarse_mesh):
     """The finger with the same walls on a coarse mesh of its own is near; at fixed points it would not be."""
     truth = TRUTHS["base"]
-    found = true_field(study, truth)
+    found = true_field(truth)
     finger = truth.finger(study.design)
     other = finger_mesh(finger, settings=MeshSettings(size=1.0))
     solution = simulate(Problem(other), truth=truth)
@@ -103,26 +110,26 @@ def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_me
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_elements")
-def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkeypatch):
+def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(true_field, monkeypatch):
     truth = TRUTHS["cylinder"]
-    found = true_field(study, truth)
+    found = true_field(truth)
     assert found.contact.middle == pytest.approx(35.0, abs=1.0)  # within the contact, which rolls to the tip
     assert 1.0 < found.contact.width < 3.0
 
-    def again(*_: object) -> None:
+    def again(*_: object, **__: object) -> None:
         raise RuntimeError("simulated again")
 
-    monkeypatch.setattr("pinnray.comparison.crossval.true_fields.simulate", again)
-    assert true_field(study, truth).contact == found.contact
+    monkeypatch.setattr("pinnray.studies.crossval.true_fields.simulate", again)
+    assert true_field(truth).contact == found.contact
     half = replace(FULL, name="half", share=0.5)
     with pytest.raises(RuntimeError, match="simulated again"):
-        true_field(study, truth, half)
+        true_field(truth, half)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_elements")
 @pytest.mark.parametrize("name", [name for name, truth in TRUTHS.items() if not truth.solid])
-def test_every_truth_comes_to_its_full_load(study, name):
-    found = true_field(replace(study, mesh=MeshSettings(size=2.0)), TRUTHS[name])
+def test_every_truth_comes_to_its_full_load(true_field, name):
+    found = true_field(TRUTHS[name], mesh=MeshSettings(size=2.0))
     assert 0.1 < found.contact.force < 2.0  # N/mm: thick or thin, sliding or not, it is one finger
     assert np.isfinite(found.sampled.gradient).all()

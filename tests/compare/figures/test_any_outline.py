@@ -7,7 +7,7 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from pinnray.comparison.evaluation.comparison import Results
-from pinnray.comparison.evaluation.metrics import evaluated
+from pinnray.comparison.evaluation.evaluation import evaluated
 from pinnray.comparison.figures.gallery import draw
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.presets import load_design

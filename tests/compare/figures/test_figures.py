@@ -12,15 +12,12 @@ from PIL import Image
 from pinnray.comparison.evaluation.certification import with_certificates
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import held_out_errors, marker_errors
-from pinnray.comparison.figures import FORMATS, draw_all, pictures_beside
+from pinnray.comparison.figures import FORMATS, draw_all
 from pinnray.comparison.figures.fields import QUANTITIES, draw_field
 from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
 from pinnray.comparison.figures.overlay import overlay_extent
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.figure import DPI, WIDTH
-from pinnray.runtime.processes.child import ProcessFailed
-from pinnray.runtime.processes.pool import Pool
 from pinnray.solvers.problem import Problem
 from tests.compare.figures.drawn_pages import Page, page_of
 
@@ -62,13 +59,13 @@ def pages(drawings: dict[str, Illustration]) -> dict[str, Page]:
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
     """In letters, not in pixels; and the same file every time."""
-    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", {"energy": GALLERY["energy"]})
+    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", {"convergence": GALLERY["convergence"]})
     first, second = (
         [path.read_bytes() for path in sorted(folder.glob(f"*.{kind}"))]
         for folder in (tmp_path / "first", tmp_path / "second")
         if draw_all(folder, comparison, formats=[kind])
     )
-    assert len(first) == 1 + (kind == "pdf")  # one file of all
+    assert len(first) == 1
     assert first == second
     assert all((b"/FontFile2" if kind == "pdf" else b"<path") in content for content in first)
 
@@ -76,17 +73,14 @@ def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, 
 def test_every_picture_is_told_in_numbers_to_those_who_cannot_see_it(drawings, comparison) -> None:
     for name, drawing in drawings.items():
         assert re.search(r"\d", drawing.alt), name
-        if name in ("overlay", "marker_errors", "energy", *FIELDS):
+        if name in ("overlay", "marker_errors", *FIELDS):
             assert all(f"{each.label} " in drawing.alt for each in comparison.evaluations), name
     largest = np.hypot(*comparison.evaluations[0].node_displacement.T).max()
     assert drawings["overlay"].alt.startswith(f"Largest displacement, mm: fem {largest:.3g}, ")
 
 
 FIELDS = tuple(quantity.name for quantity in QUANTITIES if quantity.name not in LIKE_OTHERS)
-ALL = (
-    *("overlay", "marker_errors", *FIELDS, "differences", "force_displacement", "excess", "energy"),
-    *("convergence", "design", "mesh"),
-)
+ALL = (*("overlay", "marker_errors", *FIELDS, "force_displacement", "design", "mesh", "convergence"),)
 
 
 def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawings, tmp_path, monkeypatch):
@@ -107,34 +101,6 @@ def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawing
         assert (picture.path.stem, low < 60, high) == (picture.path.stem, True, 255)
 
 
-def test_a_second_process_draws_half_as_this_one_and_its_end_does_not_lose_them(
-    comparison, tmp_path, monkeypatch
-):
-    chosen = {name: GALLERY[name] for name in ("marker_errors", "von_mises", "strain_xx", "mesh")}
-    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", chosen)
-    monkeypatch.setattr("pinnray.comparison.figures.fields.QUANTITIES", [QUANTITIES[0], QUANTITIES[2]])
-    monkeypatch.setattr("pinnray.comparison.figures.BESIDE", ("marker_errors",))
-    monkeypatch.setattr("pinnray.comparison.figures.LARGE", 0)
-    alone, died = tmp_path / "alone", ProcessFailed(-9)
-    expected = [replace(each, path=each.path.name) for each in draw_all(alone, comparison)]
-    with Pool(1) as pool:
-        for place, lost in ((tmp_path / "beside", False), (tmp_path / "lost", True)):
-            with pictures_beside(place, comparison, (), pool) as beside:
-                assert beside is not None
-                if lost:
-                    monkeypatch.setattr(beside.drawn, "result", lambda: died)
-                pictures = draw_all(place, comparison, beside=beside)
-            assert [replace(each, path=each.path.name) for each in pictures] == expected
-            for each in expected:
-                assert (place / each.path).read_bytes() == (alone / each.path).read_bytes()
-
-
-def test_fields_are_drawn_here_where_a_second_process_would_not_help(comparison, tmp_path):
-    for formats, pool in (((), None), (("pdf",), Pool(1)), ((), Pool(1))):  # the last: the mesh is small
-        with pictures_beside(tmp_path, comparison, formats, pool) as beside:
-            assert beside is None
-
-
 @pytest.mark.parametrize("name", ALL)
 def test_no_text_leaves_the_page_or_runs_into_another(name, drawings, pages):
     assert drawings[name].caption.endswith(".")
@@ -149,12 +115,12 @@ def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     more += [replace(told, solver="gp"), replace(told, solver="statfem", converged=False)]
     eight = compared(fem, pinn, failed, *more)
-    for name in ("overlay", "marker_errors", "von_mises", "excess", "convergence", "differences"):
+    for name in ("overlay", "marker_errors", "von_mises", "convergence"):
         page = page_of(draw(eight, name).figure)
         assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
 
 
-@pytest.mark.parametrize("name", ["overlay", "marker_errors", *FIELDS, "excess"])
+@pytest.mark.parametrize("name", ["overlay", "marker_errors", *FIELDS])
 def test_a_solver_that_failed_is_marked(name: str, pages: dict[str, Page]) -> None:
     assert "fem-nonlinear (not converged)" in pages[name].text
 
@@ -162,8 +128,9 @@ def test_a_solver_that_failed_is_marked(name: str, pages: dict[str, Page]) -> No
 def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(fem, pinn, observations, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     untold = replace(told, solver="pinn-x", left_out=None)
-    errors = held_out_errors(told, observations), marker_errors(told, observations)
     comparison = compared(fem, told, untold)
+    own = comparison.scores[told.solver]
+    errors = own.held_out, own.markers
     overlay, bars = (page_of(draw(comparison, name).figure) for name in ("overlay", "marker_errors"))
     for kind, found in zip(("held out", "training"), errors, strict=True):
         assert found is not None
@@ -273,9 +240,6 @@ def test_differences_are_from_the_truth_where_it_is_known(fem, pinn, evaluate, c
     distances = [float(found) for found in re.findall(r"rel. L² ([\d.]+)\s%", text)]
     assert distances == pytest.approx([100 * 0.05 / 1.05] * 2, rel=0.01)  # 1 and 1.1 from 1.05
     assert "truth, simulated" in text.splitlines()[1:4]
-    shared = page_of(draw(known, "differences").figure)
-    assert "one scale for all" in shared.text
-    assert shared.text.count("rel. L²") == 2
 
 
 def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, compared, evaluate):

@@ -6,7 +6,6 @@ import pytest
 from pinnray.comparison.figures.solver_charts import (
     approaches_reference,
     draw_convergence,
-    draw_energy,
     draw_losses,
     readable,
     records_by_kind,
@@ -27,7 +26,7 @@ def test_records_are_grouped_by_their_first_column(fem, pinn, evaluate):
 
 
 def test_without_a_record_there_is_no_chart_of_energy(fem, compared):
-    assert draw_energy(compared(fem)) is draw_convergence(compared(fem)) is None
+    assert draw_convergence(compared(fem)) is None
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,6 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-SOFTWARE_WEBGL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-"""Options under which Chromium has WebGL on a machine without a graphics card."""
-
 TIMEOUT = 120_000
 """Milliseconds after which an action counts as failed, on a machine that is busy with other tests."""
 
@@ -31,10 +28,10 @@ class Opened:
 
 
 @contextmanager
-def chromium(*options: str) -> Iterator[Browser]:
+def chromium() -> Iterator[Browser]:
     """The browser that the system has; `make test` installs it."""
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=list(options))
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"))
         try:
             yield browser
         finally:

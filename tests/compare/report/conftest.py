@@ -12,7 +12,7 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.figures.gallery import draw
 from pinnray.comparison.report.html_report import write_report
-from tests.compare.report.browser import SOFTWARE_WEBGL, chromium
+from tests.compare.report.browser import chromium
 
 TITLES = {"marker_errors": "Errors at the markers", "von_mises": "Von Mises stress"}
 """Beginnings of the alternative texts of the report's pictures."""
@@ -20,7 +20,7 @@ TITLES = {"marker_errors": "Errors at the markers", "von_mises": "Von Mises stre
 
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    with chromium(*SOFTWARE_WEBGL) as started:
+    with chromium() as started:
         yield started
 
 

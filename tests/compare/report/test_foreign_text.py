@@ -1,7 +1,6 @@
 """Text and names of others: they stay text in every page, and never lead out of the output folder."""
 
 import ast
-import csv
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -14,12 +13,11 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.pipeline.job import Job, checked
 from pinnray.comparison.report.html_report import report_html
-from pinnray.comparison.report.output_files import metrics
-from pinnray.comparison.report.runs import read_runs, write_side_by_side
+from pinnray.comparison.report.tables import write_summary
 from pinnray.geometry import Design, UserError
 from pinnray.geometry.drawing.description import Description
 from pinnray.runtime.atomic import write_json
-from pinnray.runtime.html import PNG, SMALL, template_environment
+from pinnray.runtime.html import PNG, template_environment
 from pinnray.solvers.registry import make_solver
 from tests.program import ROOT, SOURCES
 
@@ -71,67 +69,23 @@ def test_the_report_escapes_every_text_of_others(hostile: Results, tmp_path: Pat
     found, plain = Elements(page), Elements(report_html(hostile, [], {}))
     assert "x-evil" not in found.names
     assert found.running == []
-    assert page.count("<script") == page.count("</script>") == 4
+    assert page.count("<script") == page.count("</script>") == 3
     assert found.text.count("x-evil") > plain.text.count("x-evil") > 10
 
 
-def test_the_page_of_runs_escapes_numbers_and_folders_of_others(hostile, tmp_path, capsys):
-    folders = [tmp_path / f"run {number} <x-evil onerror=x()> & '\"" for number in range(2)]
-    for number, folder in enumerate(folders):
-        write_json(folder / "metrics.json", metrics(hostile))
-        options = {"seed": {HOSTILE: number}, "left_out": {HOSTILE: HOSTILE}, "failed": {HOSTILE: HOSTILE}}
-        write_json(folder / "run.json", options)
-    assert main(["report", *map(str, folders), "--out", str(tmp_path / "both")]) == 0
-    found = Elements((tmp_path / "both" / "runs.html").read_text(encoding="utf-8"))
-    assert "x-evil" not in found.names
-    assert found.running == []
-    assert "x-evil" in found.text
-
-
-@pytest.mark.parametrize("padding", [0, SMALL], ids=["small", "large"])
-@pytest.mark.parametrize("content", [b"key of mine", b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n"])
-def test_the_page_of_runs_takes_pictures_alone(hostile, tmp_path, monkeypatch, content, padding):
-    """Another file would be passed on with the page, and for EPS Pillow runs a program."""
-    runs: list[object] = []
-    monkeypatch.setattr("subprocess.check_call", lambda *given, **_: runs.append(given))
-    for name in ("one", "two"):
-        write_json(tmp_path / name / "metrics.json", metrics(hostile))
-        write_json(tmp_path / name / "run.json", {})
-    picture = tmp_path / "one" / "figures" / "overlay.png"
-    picture.parent.mkdir()
-    picture.write_bytes(content + b"%" * padding)
-    with pytest.raises(UserError, match=r"overlay\.png is no PNG picture"):
-        write_side_by_side(tmp_path / "both", read_runs([tmp_path / "one", tmp_path / "two"]))
-    assert runs == []
-
-
-def test_a_run_with_a_link_is_not_read(hostile: Results, tmp_path: Path) -> None:
-    write_json(tmp_path / "run" / "metrics.json", metrics(hostile))
-    write_json(tmp_path / "run" / "run.json", {})
-    (tmp_path / "mine.png").write_bytes(b"")
-    (tmp_path / "run" / "figures").mkdir()
-    (tmp_path / "run" / "figures" / "overlay.png").symlink_to(tmp_path / "mine.png")
-    with pytest.raises(UserError, match=r"figures/overlay\.png is a link, which no run has made"):
-        read_runs([tmp_path / "run"])
-
-
 def test_a_text_of_others_is_no_formula_and_no_command_of_the_terminal(hostile, tmp_path, capsys):
-    numbers = metrics(hostile)
+    numbers = hostile.scores.content()
     numbers["solvers"]["=1+1\x1b[2J"] = numbers["solvers"].pop(numbers["reference"])
     numbers["reference"] = "=1+1\x1b[2J"
-    for name in ("-one", "two"):
-        write_json(tmp_path / name / "metrics.json", numbers)
-        write_json(tmp_path / name / "run.json", {})
-    folders = [str(tmp_path / name) for name in ("-one", "two")]
-    assert main(["report", folders[0]]) == 0
-    assert main(["report", *folders, "--out", str(tmp_path / "both")]) == 0
+    write_json(tmp_path / "metrics.json", numbers)
+    assert main(["report", str(tmp_path)]) == 0
     assert main(["report", str(tmp_path / "\x1b[2J")]) == 2
     said = "".join(capsys.readouterr())
     assert "=1+1\N{REPLACEMENT CHARACTER}[2J" in said
     assert "\x1b" not in said
-    cells = [cell for row in csv.reader((tmp_path / "both" / "runs.csv").open()) for cell in row]
-    assert {"'=1+1\x1b[2J", "'-one"} <= {*cells}
-    assert [cell for cell in cells if cell.startswith(("=", "+", "@", "-o"))] == []
+    named = replace(hostile, evaluations=[replace(hostile.evaluations[0], solver="=1+1\x1b[2J")])
+    write_summary(tmp_path / "summary.csv", replace(named, reference=named.evaluations[0]))
+    assert "\n'=1+1\x1b[2J," in (tmp_path / "summary.csv").read_text(encoding="utf-8")
 
 
 def test_no_template_and_no_script_puts_text_in_as_html() -> None:

@@ -77,7 +77,7 @@ def test_it_asks_for_nothing_from_outside(content: Results, tmp_path: Path) -> N
     Image.new("RGB", (4, 3), "red").save(tmp_path / "overlay.png")
     html = render(content, [Picture(tmp_path / "overlay.png", "Deformed finger", "Two fingers.", "An alt.")])
     assert "<link" not in html
-    packed = r'(?<=id="viewer-data">)[^<]*|(?<=id="viewer-library">)[^<]*'
+    packed = r'(?<=id="viewer-data">)[^<]*'
     assert re.findall(r"url\(|@import|https?://", re.sub(packed, "", html)) == []
     assert [source[:22] for source in Page(html).values("src")] == ["data:image/png;base64,"]
     assert {link[0] for link in Page(html).values("href")} == {"#"}

@@ -74,7 +74,7 @@ def test_nothing_moves_for_a_reader_who_wants_no_motion(viewer: Page) -> None:
     viewer.emulate_media(reduced_motion="no-preference")
 
 
-@pytest.mark.parametrize("without", ["scripts", "WebGL"])
+@pytest.mark.parametrize("without", ["scripts", "a canvas"])
 def test_still_pictures_stand_in_for_the_viewer(browser: Browser, written: Path, without: str) -> None:
     page = browser.new_page(java_script_enabled=without != "scripts")
     page.set_default_timeout(TIMEOUT)

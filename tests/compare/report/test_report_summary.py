@@ -1,6 +1,5 @@
 """The answers that a report opens with, from metrics whose answers are known."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,17 +8,15 @@ import pytest
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.report.output_files import metrics
 from pinnray.comparison.report.summary import RunAnswer, answers
-from pinnray.comparison.report.text import truth_sentences
 from pinnray.geometry.observations import Observations
 
 TRUST, MARKERS = "May the network be trusted here?", "Did the markers help?"
 CONVERGED = "What is not converged?"
 
 
-def asked(comparison: Results, **said: dict[str, str]) -> dict[str, RunAnswer]:
-    return {answer.question: answer for answer in answers(metrics(comparison), **said)}
+def asked(comparison: Results) -> dict[str, RunAnswer]:
+    return {answer.question: answer for answer in answers(comparison.scores)}
 
 
 @pytest.fixture
@@ -70,20 +67,3 @@ def test_stress_and_force_are_answered_where_they_are_known(compared, fem, given
     answer = asked(compared(fem, stronger, truth=evaluate("fem-nonlinear", 1.5)))[MARKERS]
     assert answer.verdict.endswith("in displacement fem-asm, in von Mises stress fem-asm, in force none.")
     assert "simulated body" in answer.verdict
-
-
-def test_what_the_markers_change_is_told_of_displacement_stress_and_force(fem, pinn, compared):
-    """The truth is the reference times 1.1; the stress of the solver that was given markers is tripled."""
-    given = replace(pinn, in_sample=True, von_mises=3 * pinn.von_mises)
-    plain, changed, answer = truth_sentences(compared(fem, given, truth=pinn))
-    assert re.findall(r"[\d.]+(?=\xa0%)", plain) == ["9.09"] * 3
-    told = [("0", "nearer"), ("200", "farther"), ("0", "nearer")]
-    assert re.findall(r"([\d.]+)\xa0% \((\w+)\)", changed) == told
-    assert re.findall(r": ([^.]+)\.", answer) == ["pinn-std", "none", "pinn-std"]
-
-
-def test_there_is_nothing_to_say_without_a_truth_or_a_solver_with_markers(fem, pinn, compared):
-    given = replace(pinn, in_sample=True)
-    assert truth_sentences(compared(fem, given)) == []
-    assert truth_sentences(compared(fem, pinn, truth=pinn)) == []
-    assert truth_sentences(compared(given, fem, truth=pinn)) == []

@@ -15,8 +15,9 @@ from tests.compare.report.browser import opened
 
 pytestmark = pytest.mark.slow
 
-CANVAS = "document.getElementById('viewer-canvas')"
-ZOOM = f"{CANVAS}.layout.scene.aspectratio.x"
+ZOOM = "pinnrayViewer.look.scale"
+FOOT = -44
+"""Rows below the body, for bars of colour and length."""
 SOLVER = "pinnrayFields.manifest.solvers[%d]"
 
 
@@ -90,9 +91,8 @@ def test_nothing_is_clipped(viewer: Page, width: int) -> None:
 def test_markers_and_contact_are_drawn_where_they_are(viewer: Page, pinn, mesh, observations) -> None:
     viewer.select_option("#viewer-solver", label="pinn-std")
     viewer.wait_for_timeout(300)
-    clouds = viewer.evaluate(f"{CANVAS}.data.slice(3).map(({{x, y}}) => x.map((value, n) => [value, y[n]]))")
-    seen, crosses, arrow = (np.array(cloud, dtype=np.float64) for cloud in clouds)
-    crosses = np.nanmean(crosses.reshape(-1, 6, 2), axis=1)  # each of two strokes
+    marks = viewer.evaluate("pinnrayViewer.shown[0].marks")
+    seen, crosses, arrow = (np.array(marks[name]) for name in ("seen", "crosses", "way"))
     np.testing.assert_allclose(seen, observations.points + observations.displacements, atol=1e-6)
     np.testing.assert_allclose(crosses, mesh.markers + pinn.marker_displacement, atol=2e-3)
     contact = np.unique(mesh.boundary("contact"))
@@ -113,13 +113,12 @@ def test_the_scale_bar_has_its_length(viewer: Page, mesh: TriangleMesh, key: str
     viewer.locator("#viewer-canvas").focus()
     viewer.keyboard.press(key)
     viewer.wait_for_timeout(400)
-    bar = viewer.evaluate(
-        f"(() => {{ const {{ shapes: [line], annotations: [word] }} = {CANVAS}.layout;"
-        f" return [(line.x1 - line.x0) * {CANVAS}.clientWidth, parseFloat(word.text)]; }})()"
-    )
-    rows = shot(viewer)[:-80]  # without bars of colour and length
+    bar = viewer.evaluate("pinnrayViewer.bar")
+    rows = shot(viewer)[:FOOT]
     body = np.flatnonzero((np.ptp(rows, axis=2) > 30).any(axis=0))  # coloured: neither page nor outline
-    assert (body[-1] - body[0]) / np.ptp(mesh.points[:, 0]) == pytest.approx(bar[0] / bar[1], rel=0.02)
+    assert (body[-1] - body[0]) / np.ptp(mesh.points[:, 0]) == pytest.approx(
+        bar["pixels"] / bar["length"], rel=0.02
+    )
 
 
 def fields(page: Page, solver: int, quantity: int, load: float, against: str = "undefined") -> FloatArray:
@@ -144,12 +143,11 @@ def test_two_fields_lie_side_by_side_and_move_together(viewer: Page) -> None:
     viewer.select_option("#viewer-beside", label="pinn-std")
     viewer.wait_for_timeout(400)
     assert viewer.inner_text("#viewer-title").endswith("left fem; right pinn-std")
-    coloured = np.ptp(shot(viewer)[:-80], axis=2) > 30
+    coloured = np.ptp(shot(viewer)[:FOOT], axis=2) > 30
     middle = coloured.shape[1] // 2
     assert coloured[:, : middle - 5].sum() == pytest.approx(coloured[:, middle + 5 :].sum(), rel=0.2)
     viewer.locator("#viewer-in").click()
-    both = f"[{CANVAS}.layout.scene, {CANVAS}.layout.scene2].map((scene) => scene.aspectratio.x)"
-    left, right = viewer.evaluate(both)
+    left, right = viewer.evaluate("pinnrayViewer.shown.map(({ at }) => at.scale)")
     assert left == right
     viewer.select_option("#viewer-beside", label="the same minus truth")
     assert viewer.inner_text("#viewer-title").endswith("left fem; right fem minus truth")

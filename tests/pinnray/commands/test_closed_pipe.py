@@ -1,7 +1,6 @@
 """Output that nobody reads any more, as of `compare | head -1`: no message, and the shell's exit code."""
 
 import os
-import re
 import subprocess
 import sys
 
@@ -44,16 +43,13 @@ def unread(code: str, words: str, *streams: str) -> subprocess.CompletedProcess[
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        pytest.param(COMMAND, "solvers", marks=pytest.mark.slow),  # a table by Rich
-        pytest.param(COMMAND, "--help", marks=pytest.mark.slow),  # by Cyclopts
-        pytest.param(COMMAND, "mesh --mesh-size 3 --out {out}", marks=pytest.mark.slow),  # by print
+        pytest.param(COMMAND, "--help", marks=pytest.mark.slow),  # by Rich
         (LONG, ""),
     ],
 )
-def test_a_closed_pipe_ends_a_command_quietly(code, words, tmp_path):
-    done = unread(code, words.format(out=tmp_path), "stdout")
-    assert done.returncode == 141
-    assert re.sub(r"mesh: .* s\n", "", done.stderr) == ""  # a line of progress
+def test_a_closed_pipe_ends_a_command_quietly(code, words):
+    done = unread(code, words, "stdout")
+    assert (done.returncode, done.stderr) == (141, "")
 
 
 @pytest.mark.slow

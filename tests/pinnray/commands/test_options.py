@@ -1,16 +1,17 @@
 """Options of every command: --quiet, defaults in its help, completion in a shell."""
 
-from dataclasses import fields
 from importlib import import_module
 from inspect import getdoc
 from pathlib import Path
 
 import pytest
 
+import pinnray as pr
 from pinnray.cli import main
 from pinnray.commands.app import COMMANDS, pinnray
 from pinnray.options.shared import PhysicsOptions
-from pinnray.solvers.problem import Physics
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import BAD_INPUT
 
 HOMES = {command.rpartition(".")[2]: f"pinnray.commands.{command}" for command in COMMANDS}
 NAMES = [name for name in pinnray if not name.startswith("-")]
@@ -52,10 +53,35 @@ def test_a_shell_completes_commands_and_options(tmp_path):
     assert all(word in text for word in (*NAMES, "--mesh-size", "--seed"))
 
 
-def test_options_of_material_and_load_have_the_names_and_the_defaults_of_the_schema() -> None:
-    """But for law, load and the elastic constants: solver, preset and material may give these."""
-    own = {field.name: field.default for field in fields(PhysicsOptions)}
-    assert own.pop("material") is own.pop("young") is own.pop("poisson") is None
-    schema = Physics().model_dump()
-    assert own | {"law": "linear", "load": "mean"} == {name: schema[name] for name in own}
-    assert PhysicsOptions().values().keys() == own.keys() - {"law", "radius"}
+def test_a_preset_and_a_material_give_what_no_option_gives() -> None:
+    options = PhysicsOptions(material="tpu-95a", poisson=0.4)
+    assert options.values("paper") == {"load": "point", "young": 26.0, "poisson": 0.4}
+    assert PhysicsOptions(load="mean").read("paper")[1].kind == "mean"  # though it is the usual one
+
+
+@pytest.mark.parametrize(
+    ("options", "keywords"),
+    [
+        ("", {}),
+        ("--reference fem-asm", {"reference": "fem-asm"}),
+        ("--preset trained", {"preset": "trained"}),
+        ("--preset paper", {"preset": "paper"}),
+        ("--solvers fem,gp", {"solvers": ["fem", "gp"]}),
+    ],
+)
+def test_shell_and_python_choose_the_same_solvers_and_leave_out_the_same(options, keywords, monkeypatch):
+    """Where they cannot do the job."""
+    jobs = []
+
+    def seen(job, *_):
+        jobs.append(job)
+        raise UserError("enough")
+
+    monkeypatch.setattr("pinnray.comparison.pipeline.pipeline.run", seen)
+    assert main(["compare", *options.split()]) == BAD_INPUT
+    with pytest.raises(UserError, match="enough"):
+        pr.compare(out="out", **keywords)
+    shell, python = jobs
+    assert [each.name for each in shell.solvers] == [each.name for each in python.solvers]
+    assert [each.settings() for each in shell.solvers] == [each.settings() for each in python.solvers]
+    assert list(shell.spare) == list(python.spare)

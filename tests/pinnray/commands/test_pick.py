@@ -46,26 +46,3 @@ def test_a_picture_comes_through_a_pipe(monkeypatch, capsys):
         monkeypatch.setattr("sys.stdin", file)
         assert main(["pick", "-", "--at", "51,39", "--radii", "5,12"]) == 0
     assert "3 circles" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("options", "warned"),
-    [
-        # markers that stand apart: a track finds discs, and a cloth of the same colour is none
-        ("--at 51,39", False),
-        ("--at 51,39 --radii 5,12", False),
-        ("--at 47,37,53,43", False),
-        ("--colour 40,60:50,75:40,60 --radii 5,12", False),
-        # the cloth
-        ("--at 20,65", True),
-        ("--at 10,60,30,75 --radii 5,12", True),
-    ],
-)
-def test_a_colour_that_is_common_is_warned_of_where_no_disc_stands_apart(options, warned, capsys):
-    image = cv2.imread("shots/2.png")
-    image[55:] = RED
-    cv2.imwrite("shots/2.png", image)
-    assert main(["pick", "shots/2.png", *options.split()]) == 0
-    shown = capsys.readouterr()
-    assert float(shown.out.splitlines()[1].split("%")[0]) > 25
-    assert ("no disc of it stands apart at --at" in shown.err) == (shown.err != "") == warned

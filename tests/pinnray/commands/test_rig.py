@@ -12,7 +12,7 @@ from pinnray.vision.measurements import read_measurements
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 
-QUICK = "--mesh-size 1 --size 480x270 --rest 2 --moving 0 --held 2"
+QUICK = "--mesh-size 1 --frame 480x270 --rest 2 --moving 0 --held 2"
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_the_run_says_what_it_depends_on_and_may_be_replaced(folder):
         "camera.json",
         "boards/000.png",
     }
-    assert run["cover"] == {"shares": {"5": 0.5}, "during": "held"}
+    assert (run["rig"]["cover"], run["rig"]["cover_during"]) == (["5=0.5"], "held")
     before = filmed(folder)
     options = f"{QUICK} --tilt 4 --noise 2 --seed 3 --cover 5=0.5 --cover-during held"
     assert main(["rig", *options.split(), "--out", str(folder)]) == 0

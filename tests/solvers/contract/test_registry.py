@@ -7,7 +7,6 @@ import pytest
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.registry import (
     BUILT_IN,
-    FORMER,
     PRESETS,
     MissingLibraryError,
     make_solver,
@@ -18,8 +17,8 @@ from pinnray.solvers.solver import Traits
 
 
 def test_settings_are_converted_from_text():
-    made = make_solver("fem", degree="1", estimate="no", linear_solver="direct")
-    assert made.settings() == {"degree": 1, "estimate": False, "linear_solver": "direct"}
+    made = make_solver("fem", degree="1", estimate="no")
+    assert made.settings() == {"degree": 1, "estimate": False}
 
 
 @pytest.mark.parametrize(("name", "preset"), [(name, preset) for name in PRESETS for preset in PRESETS[name]])
@@ -28,12 +27,6 @@ def test_a_preset_keeps_the_name_and_can_be_made_from_its_own_settings(name, pre
     assert solver.name == name
     assert solver.settings()["preset"] == preset
     assert make_solver(name, **solver.settings()) == solver
-
-
-@pytest.mark.parametrize("name", FORMER)
-def test_a_former_name_answers_with_its_preset_and_one_line(name):
-    with pytest.warns(UserWarning, match=f"{name} is now the preset local of {FORMER[name]}"):
-        assert make_solver(name, seed="3") == make_solver(FORMER[name], preset="local", seed=3)
 
 
 def test_the_first_preset_is_the_usual_one():

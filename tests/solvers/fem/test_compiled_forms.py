@@ -9,7 +9,7 @@ import dolfinx.jit
 import pytest
 
 from pinnray.solvers.fem import dolfinx_compat
-from pinnray.solvers.fem.dolfinx_compat import DistributedSpace
+from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace
 from pinnray.solvers.lagrange import LagrangeSpace
 
 
@@ -26,7 +26,7 @@ def cache(monkeypatch, tmp_path):
 
 def half_compiled(cache: Path, mesh) -> list[Path]:
     """Compile a space, and leave it as a process would that was killed before the compiler's end."""
-    DistributedSpace(LagrangeSpace(mesh, 2))
+    DolfinxSpace(LagrangeSpace(mesh, 2))
     left = list(cache.glob("libffcx_*.c"))
     for file in cache.iterdir():
         if file not in left:
@@ -40,14 +40,14 @@ def test_a_form_that_a_killed_run_left_half_compiled_is_compiled_again(cache, co
     assert left
     for file in left:
         os.utime(file, times=(0, time.time() - dolfinx_compat.ABANDONED_S - 1))
-    DistributedSpace(LagrangeSpace(coarse_mesh, 2))
+    DolfinxSpace(LagrangeSpace(coarse_mesh, 2))
     assert all(file.with_suffix(".c.cached").exists() for file in left)
 
 
 def test_a_form_just_left_is_waited_for_until_it_is_old(cache, coarse_mesh, monkeypatch):
     left = half_compiled(cache, coarse_mesh)
     monkeypatch.setattr(dolfinx_compat, "ABANDONED_S", time.time() - min(f.stat().st_mtime for f in left) + 2)
-    DistributedSpace(LagrangeSpace(coarse_mesh, 2))
+    DolfinxSpace(LagrangeSpace(coarse_mesh, 2))
     assert all(file.with_suffix(".c.cached").exists() for file in left)
 
 

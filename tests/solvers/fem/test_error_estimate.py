@@ -132,8 +132,10 @@ def test_at_a_small_stroke_the_finite_strain_estimate_is_the_linear_one(short_me
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "load",
-    [Load(displacement=(0.0, -5.0)), Load(kind="patch", displacement=(None, -5.0))],
-    ids=["mean", "slide"],
+    [
+        pytest.param(Load(displacement=(0.0, -5.0)), id="mean"),
+        pytest.param(Load(kind="patch", displacement=(None, -5.0)), id="slide", marks=pytest.mark.release),
+    ],
 )
 def test_estimates_at_finite_strain_are_within_a_factor_of_two(short_mesh, graded, load):
     """Seen: 1.03 in energy, 1.03 to 1.11 for displacements, 1.5 to 1.6 for the von Mises stress."""

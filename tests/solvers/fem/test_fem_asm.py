@@ -42,9 +42,9 @@ def dense(problem, solver):
     """The minimiser by Lagrange multipliers on the whole stiffness, without the solver's algebra."""
     space = LagrangeSpace(problem.mesh, solver.degree)
     equilibrium, size = DiscreteEquilibrium(problem, space), space.nodes.size
-    matrix = equilibrium.distributed.assemble_matrix(equilibrium.tangent, [])
+    matrix = equilibrium.elements.assemble_matrix(equilibrium.tangent, [])
     matrix.convert("dense")
-    node_of_dof = np.repeat(equilibrium.distributed._node_of_dof, 2) * 2 + np.tile([0, 1], len(space.nodes))
+    node_of_dof = np.repeat(equilibrium.elements._node_of_dof, 2) * 2 + np.tile([0, 1], len(space.nodes))
     stiffness = np.zeros((size, size))
     stiffness[np.ix_(node_of_dof, node_of_dof)] = matrix.getDenseArray()
     misfit = misfit_of(problem, MarkerSettings(weights=solver.weights, scale=solver.scale))

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from pinnray.runtime.errors import ShapeError, UserError
-from pinnray.solvers.fem.identification import FemBody, fem_law_tracker
+from pinnray.solvers.fem.identification import FemBody, fem_force_tracker
 from pinnray.solvers.identification.model import EXACT, ResponseModel
 from pinnray.solvers.identification.tracker import ForceTracker
 from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
-from pinnray.solvers.problem import Material
 
 NOISE, RADIUS = 0.005, 0.8
 FORCE, POSITION = (0.2, 0.03), 37.0
@@ -21,7 +20,7 @@ PRINTED = {"front_thickness": 2.06, "back_thickness": 1.95, "rib_thickness": 2.0
 
 @pytest.fixture(scope="module")
 def tracker_of(problem):
-    return lambda: fem_law_tracker(problem, problem.mesh.markers, RADIUS, ["neo-hookean"], degree=1)
+    return lambda: fem_force_tracker(problem, problem.mesh.markers, RADIUS, degree=1)
 
 
 def marker_path(problem, shares, finger):
@@ -143,67 +142,6 @@ def test_markers_that_no_force_explains_are_told(drawn_path, tracker_of):
     assert found.inflation > 5
     assert "times as far off as noise explains" in found.status
     assert found.high - found.low > 3 * (plain.high - plain.low)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("law", ["neo-hookean", "st-venant-kirchhoff"])
-def test_the_law_is_that_of_the_finger(problem, law):
-    own = replace(problem, material=Material(law=law))
-    places, forces = marker_path(own, SHARES[:18], {})
-    tracker = fem_law_tracker(problem, problem.mesh.markers, RADIUS, degree=1)
-    found = readings(tracker, places)
-    assert tracker.laws[0] == law  # the other one is dropped where it is improbable
-    true = np.linalg.norm(forces, axis=1)
-    assert np.sqrt(np.mean((column(found, "size") - true) ** 2)) < 0.03 * true.max()
-
-
-def fails_below(tracker, law, largest):
-    """Leave a law without an equilibrium in frames whose motion, root mean square, mm, is below a limit."""
-    lost = tracker._trackers[law]
-    searched = lost._searched
-
-    def search(prior, rows, observed, noise):
-        moved = np.sqrt(2 * np.mean(observed**2))
-        return None if moved < largest else searched(prior, rows, observed, noise)
-
-    lost._searched = search
-
-
-def laws_followed(problem, *laws):
-    return fem_law_tracker(problem, problem.mesh.markers, RADIUS, laws, degree=1)
-
-
-def test_the_laws_are_compared_where_the_first_one_has_no_equilibrium(problem, drawn_path):
-    places, forces = drawn_path
-    tracker = laws_followed(problem, "st-venant-kirchhoff", "neo-hookean")
-    fails_below(tracker, "st-venant-kirchhoff", np.inf)
-    found = readings(tracker, places[:16])
-    assert found[15].size == pytest.approx(np.linalg.norm(forces[15]), rel=0.03)
-
-
-def test_a_law_that_had_no_equilibrium_in_a_frame_may_win_in_a_later_one(problem, drawn_path):
-    places, _ = drawn_path
-    tracker = laws_followed(problem, "st-venant-kirchhoff", "neo-hookean")
-    fails_below(tracker, "neo-hookean", 0.5 * np.sqrt((places[15] ** 2).sum(axis=1).mean()))
-    assert tracker.laws[0] == "st-venant-kirchhoff"
-    readings(tracker, places[:6])
-    assert tracker.laws == ("st-venant-kirchhoff", "neo-hookean")
-    readings(tracker, places[6:16])
-    assert tracker.laws[0] == "neo-hookean"
-
-
-def test_old_evidence_does_not_speak_for_a_law_that_has_no_equilibrium_now(problem, drawn_path):
-    places, _ = drawn_path
-    tracker = laws_followed(problem, "neo-hookean", "st-venant-kirchhoff")
-    readings(tracker, places[:5])
-    assert len(tracker.laws) == 2  # the motion is too small to tell
-    fails_below(tracker, "st-venant-kirchhoff", np.inf)
-    off = (
-        places[5:16] + 0.5 * SHARES[5:16, None, None] * np.eye(9)[4][:, None]
-    )  # evidence far below any earlier one
-    for reading in readings(tracker, off):
-        assert np.isfinite(reading.size)
-        assert tracker.laws[0] == "neo-hookean"
 
 
 def test_arrays_of_another_finger_are_refused(tracker_of):

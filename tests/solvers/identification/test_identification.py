@@ -260,13 +260,3 @@ def test_a_contact_elsewhere_or_with_friction_is_found(problem, load, named):
     size = np.hypot(load[2], load[3])
     assert solution.stats["force_low"] < size < solution.stats["force_high"], named
     np.testing.assert_allclose(solution.reaction, load[2:], atol=0.1 * size)
-
-
-def test_the_force_at_lesser_loads_is_that_of_the_finger_that_was_found(identified, problem):
-    _, _, solution = identified
-    path = solution.identified.path
-    assert path[-1] == pytest.approx((1.0, solution.identified.size.value))
-    for share, size in path[:-1]:
-        lesser = replace(problem, load=Load(displacement=(None, -6.0 * share)))
-        moved = FemIdSolver(degree=1).transferred(solution, solution.problem, lesser)
-        assert np.linalg.norm(moved.reaction) == pytest.approx(size, rel=1e-3)

@@ -84,7 +84,7 @@ def test_where_first_order_does_not_settle_the_network_seeks_the_unknowns(proble
         return replace(response, slopes=1.3 * response.slopes)
 
     def counted(self, law, measurement, near, *rest, **options):
-        asked.append(type(self._models[law].body))
+        asked.append(type(self._model(law).body))
         return fit(self, law, measurement, near, *rest, **options)
 
     monkeypatch.setattr(pinn_id, "_projected", off)

@@ -55,21 +55,15 @@ def test_initial_weights_are_glorot_normal():
     assert max(bias.abs().max() for bias in (first[:, :, -1], *biases, output_bias)) == 0
 
 
-@pytest.mark.parametrize("kind", ["nodes", "elements", "random"])
-def test_shares_make_a_mean(coarse_mesh, kind):
-    points, shares = collocation_points(coarse_mesh, kind, 0)
-    assert shares.sum() == pytest.approx(1.0, rel=1e-12)
-    assert len(coarse_mesh.locate(points)) == len(points), "all in the body"
-
-
-def test_elements_integrate_and_random_points_estimate(coarse_mesh):
-    """The mean of x² over the body exactly; random points err by the deviation over √n, some 2 %."""
+@pytest.mark.parametrize(("kind", "tolerance"), [("elements", 1e-12), ("nodes", 0.3)])
+def test_shares_make_a_mean(coarse_mesh, kind, tolerance):
+    """The mean of x² over the body exactly by elements; nodes are biased towards dense parts."""
     corners = coarse_mesh.points[coarse_mesh.triangles, 0]
     exact = (corners**2).sum(axis=1) + (corners[:, [1, 2, 0]] * corners).sum(axis=1)
     mean = (coarse_mesh.areas * exact / 6).sum() / coarse_mesh.areas.sum()
-    for kind, tolerance in (("elements", 1e-12), ("random", 0.08)):
-        points, shares = collocation_points(coarse_mesh, kind, 0)
-        assert (shares * points[:, 0] ** 2).sum() == pytest.approx(mean, rel=tolerance), kind
+    points, shares = collocation_points(coarse_mesh, kind)
+    assert shares.sum() == pytest.approx(1.0, rel=1e-12)
+    assert (shares * points[:, 0] ** 2).sum() == pytest.approx(mean, rel=tolerance)
 
 
 def test_base_points_are_evenly_spaced_over_the_whole_base(coarse_mesh):

@@ -1,4 +1,4 @@
-"""Matérn's kernels by Bessel functions, for any smoothness."""
+"""Matérn's kernel of processes with two derivatives, by Bessel functions."""
 
 import numpy as np
 from scipy.special import gamma, kv
@@ -6,10 +6,9 @@ from scipy.special import gamma, kv
 from pinnray.runtime.arrays import FloatArray
 
 
-def matern(first: FloatArray, second: FloatArray, length: float, smoothness: float = 2.5) -> FloatArray:
-    """Equation 4.14 of Rasmussen and Williams, and its limit; points (n, 2) and (m, 2): shape (n, m)."""
+def matern(first: FloatArray, second: FloatArray, length: float) -> FloatArray:
+    """Equation 4.14 of Rasmussen and Williams; points (n, 2) and (m, 2): shape (n, m)."""
     distance = np.sqrt(((first[:, None] - second) ** 2).sum(axis=2))
-    if np.isinf(smoothness):
-        return np.asarray(np.exp(-0.5 * (distance / length) ** 2))
+    smoothness = 2.5
     x = np.maximum(np.sqrt(2 * smoothness) * distance / length, 1e-8)
     return np.asarray(2 ** (1 - smoothness) / gamma(smoothness) * x**smoothness * kv(smoothness, x))

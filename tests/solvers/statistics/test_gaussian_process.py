@@ -11,7 +11,6 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.statistics.gaussian_process import GaussianProcessSolver
-from pinnray.solvers.statistics.kernel_field import SMOOTHNESS
 from tests.solvers.conftest import hiding, observed_at
 from tests.solvers.statistics.kernels import matern
 
@@ -64,13 +63,12 @@ def test_mean_and_deviation_are_those_of_the_process(solution, coarse_mesh):
         np.testing.assert_allclose(deviation**2, variance, atol=1e-5)
 
 
-@pytest.mark.parametrize("kernel", SMOOTHNESS)
-def test_the_constants_are_those_that_scikit_learn_finds(problem, kernel):
+def test_the_constants_are_those_that_scikit_learn_finds(problem):
     """From its start in its ranges: 1e-6 of them, where the search ends at the flat top of the likelihood."""
-    found = GaussianProcessSolver(kernel=kernel).solve(problem).field.posterior.constants  # type: ignore[attr-defined]
+    found = GaussianProcessSolver().solve(problem).field.posterior.constants  # type: ignore[attr-defined]
     observations = problem.observations
     seen = observations.visible
-    start = ConstantKernel(10.0, (1e-4, 1e6)) * Matern(30.0, (1.0, 1000.0), SMOOTHNESS[kernel])
+    start = ConstantKernel(10.0, (1e-4, 1e6)) * Matern(30.0, (1.0, 1000.0), 2.5)
     for axis in (0, 1):
         process = GaussianProcessRegressor(start, alpha=observations.standard_deviations[seen, axis] ** 2)
         fitted = process.fit(observations.points[seen], observations.displacements[seen, axis])
@@ -103,16 +101,15 @@ def test_three_markers_will_do_where_none_is_left_out(coarse_mesh):
     assert GaussianProcessSolver().refitter(Problem(coarse_mesh))(few).left_out is None
 
 
-@pytest.mark.parametrize("kernel", ["matern32", "gaussian"])
-def test_the_evidence_is_that_of_the_normal_distribution(problem, kernel):
-    solution = GaussianProcessSolver(kernel=kernel).solve(problem)
+def test_the_evidence_is_that_of_the_normal_distribution(problem):
+    solution = GaussianProcessSolver().solve(problem)
     observations = problem.observations
-    seen, smoothness = observations.visible, {"matern32": 1.5, "gaussian": np.inf}[kernel]
+    seen = observations.visible
     points, expected = observations.points[seen], 0.0
     constants = solution.field.posterior.constants  # type: ignore[attr-defined]
     for axis in (0, 1):
         variance, length = constants.amplitudes[axis] ** 2, constants.lengths[axis]
-        covariance = variance * matern(points, points, length, smoothness)
+        covariance = variance * matern(points, points, length)
         covariance += np.diag(observations.standard_deviations[seen, axis] ** 2)
         expected += multivariate_normal.logpdf(observations.displacements[seen, axis], cov=covariance)
     assert solution.stats["log_evidence"] == pytest.approx(expected, abs=1e-4)

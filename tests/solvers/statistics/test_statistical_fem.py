@@ -102,9 +102,8 @@ def test_no_other_constants_are_more_likely(solution, units):
         assert log_likelihood(*(found * change)) < best
 
 
-@pytest.mark.parametrize("kernel", ["matern32", "matern52", "gaussian"])
-def test_the_likelihood_falls_as_its_derivatives_say(solution, kernel):
-    data = replace(solution.field.posterior.data, kernel=kernel)
+def test_the_likelihood_falls_as_its_derivatives_say(solution):
+    data = solution.field.posterior.data
     for place in ([0.1, -1.0, -2.0, 3.0], [-0.2, 0.3, -1.0, 2.5]):
         _, slopes = minus_log_likelihood(data, np.array(place))
         expected = approx_fprime(np.array(place), lambda at: minus_log_likelihood(data, at)[0])

@@ -16,7 +16,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.problem import Problem
 from pinnray.studies.optimum.designs import write_designs
-from pinnray.studies.optimum.page import front_grid, front_sentences, page_tables
+from pinnray.studies.optimum.page import front_sentences, front_table, page_tables
 from pinnray.studies.optimum.pictures import cylinder_at_end
 from pinnray.studies.optimum.question import Limit, Question
 from pinnray.studies.optimum.search import Optimum, search_front
@@ -101,12 +101,12 @@ def test_a_search_that_was_stopped_goes_on_to_the_same_runs(found, tmp_path, mon
     with pytest.raises(KeyboardInterrupt):
         search_front(job)
     monkeypatch.setattr("pinnray.studies.optimum.search.finish", judge)
-    assert search_front(job).fingers == found.fingers
+    assert search_front(job).samples == found.samples
 
 
 @pytest.mark.slow
 def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, monkeypatch):
-    best = found.fingers[found.front[0]]["rib_count"]
+    best = found.samples[found.front[0]]["rib_count"]
 
     def strict(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
         for number in sorted(tasks.keys() - journal.numbers()):
@@ -116,7 +116,7 @@ def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, 
 
     monkeypatch.setattr("pinnray.studies.optimum.search.finish", strict)
     other = search_front(StudyJob(QUESTION, Path(), tmp_path / "out", 1))
-    crossed = [n for n, finger in enumerate(other.fingers) if finger["rib_count"] == best]
+    crossed = [n for n, finger in enumerate(other.samples) if finger["rib_count"] == best]
     assert crossed
     assert not set(crossed) & set(other.front)
     assert f"{len(crossed)} runs do not count: the finger goes" in " ".join(front_sentences(other))
@@ -199,11 +199,12 @@ def test_a_search_with_few_converged_runs_takes_further_samples(tmp_path, monkey
 
 
 def test_the_tables_of_the_page_are_narrow_and_complete(found: Optimum) -> None:
-    tables, grid = page_tables(found), front_grid(found)
+    tables, whole = page_tables(found), front_table(found)
     headings = [heading for table in tables for heading in table.headings]
-    assert [int(row[1]) for row in grid.rows] == found.front
+    assert list(whole["run"]) == found.front
+    assert list(whole["force_N"]) == [found.measurements[run].values["force"] for run in found.front]
     plain = {heading.replace("\n", "_").replace("mm/N", "mm_per_N") for heading in headings}
-    assert plain == {*grid.headings}
+    assert plain == {*whole.columns}
     letters = [sum(max(map(len, heading.split("\n"))) + 2 for heading in table.headings) for table in tables]
     assert max(letters) < 130  # of the 140 that 62 rem hold
 

@@ -9,26 +9,21 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from pinnray.cli import main
-from pinnray.comparison.figures.style import axes_at
 from pinnray.geometry.cache import cad_files
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.figure import figure
 from pinnray.solvers.solution import Solution
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement, measured
-from pinnray.studies.sweep.page import slow_sentence
-from pinnray.studies.sweep.pictures import draw_medians
 from pinnray.studies.sweep.quantities import quantities
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import opened
 from pinnray.studies.sweep.study import load_study
-from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
+from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep, run_tasks
 from pinnray.studies.sweep.tables import failure_grid, sample_table
 from pinnray.studies.sweep.workers import Workers
 from tests.conftest import inline
@@ -178,33 +173,19 @@ def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> Non
 def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     tmp_path, monkeypatch, request, ending, limit, state, said
 ):
-    monkeypatch.setattr("pinnray.studies.sweep.workers._measured", ending)
-    monkeypatch.setattr("pinnray.studies.sweep.workers.GRACE_S", 1.0)
-    monkeypatch.setattr("pinnray.studies.sweep.workers.DEATHS", 2)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.sampled", ending)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.GRACE_S", 1.0)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.DEATHS", 2)
     study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
     sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", state, "done"]
     assert [(row[0], row[2]) for row in failure_grid(sweep).rows] == [(state, said)]
     assert list(sample_table(sweep)["state"]) == ["done", state, "done"]
-    monkeypatch.setattr("pinnray.studies.sweep.workers._measured", answered)
+    monkeypatch.setattr("pinnray.studies.sweep.sweep.sampled", answered)
     request.getfixturevalue("in_line")
     longer = study.model_copy(update={"time_limit": 600.0})
     again = run_sweep(StudyJob(longer, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
-
-
-def test_a_finger_that_takes_much_longer_than_the_others_is_told(tmp_path: Path) -> None:
-    found = [Measurement(number, "done", "", 64.0 if number == 2 else 0.6) for number in range(3)]
-    (sentence,) = slow_sentence(Sweep(load_study(study_file(tmp_path, 3)), [{}] * 3, found))
-    assert sentence.startswith("Number 2 took 64 s")
-
-
-def test_medians_are_drawn_of_enough_samples_alone() -> None:
-    with figure(2.0) as drawn:
-        axes = axes_at(drawn, (1, 1, 1, 1))
-        for count, lines in ((16, 0), (64, 1)):
-            draw_medians(axes, np.linspace(0, 1, count), np.linspace(0, 1, count))
-            assert len(axes.lines) == lines
 
 
 def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
@@ -215,21 +196,23 @@ def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(monkeypatch):
+def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(tmp_path):
     from distributed import KilledWorker, LocalCluster
 
-    def dying(task: SimpleNamespace) -> Measurement:
+    def dying(task: SimpleNamespace, report: object) -> list[Measurement]:
         if task.number == 1:
             raise KilledWorker("sample", SimpleNamespace(address="tcp://a"), 0)  # as the scheduler does
         return answered(task)
 
-    monkeypatch.setattr("pinnray.studies.sweep.workers.measured", dying)
     tasks = {number: SimpleNamespace(number=number) for number in range(3)}
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
         Workers(1, cluster.scheduler_address) as workers,
+        opened(tmp_path / "journal.sqlite") as journal,
     ):
-        found = {each.number: each.state for part in ({0: tasks[0]}, tasks) for each in workers.answers(part)}
+        for part in ({0: tasks[0]}, {1: tasks[1], 2: tasks[2]}):
+            run_tasks(dying, part, tasks, journal, workers, deaths=8)
+        found = {each.number: each.state for each in journal.measurements()}
     assert found == {0: "done", 1: "failed", 2: "done"}
 
 

@@ -192,22 +192,6 @@ def test_boards_that_are_never_tilted_do_not_determine_the_camera():
         calibrate_views(flat, BOARD, SIZE)
 
 
-@pytest.mark.parametrize(("parts", "hint"), [(2, "count them"), (5, "5 seem to show 4x3")])
-def test_another_board_is_named_only_if_most_photographs_show_it(parts, hint):
-    """Of a board that is hard to see OpenCV may find a part here and there."""
-
-    class Unseen(Board):
-        def find(self, image: np.ndarray) -> None:
-            return None
-
-        def suggest(self, image: np.ndarray) -> str | None:
-            return "4x3" if image[0, 0] else None
-
-    images = {str(number): np.full((9, 9), number < parts, np.uint8) for number in range(8)}
-    with pytest.raises(UserError, match=f"0 of 8 photographs show the board of 9x6 inner corners; {hint}$"):
-        calibrate_camera(images.items(), Unseen(9, 6, 25.0))
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Six small photographs by a pinhole with a focal length of 300 pixels, and one without a board."""

@@ -31,17 +31,15 @@ def test_undistorting_is_undone_by_distorting(camera, least):
     np.testing.assert_allclose(camera.distort(straight), GRID, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["camera.json", "new/camera.YAML"])
 @pytest.mark.parametrize("camera", [CAMERA, KNOWN])
-def test_a_file_gives_the_same_camera_back(camera, name, tmp_path):
-    save_camera(tmp_path / name, camera)
-    assert load_camera(tmp_path / name) == camera
+def test_a_file_gives_the_same_camera_back(camera, tmp_path):
+    save_camera(tmp_path / "new" / "camera.JSON", camera)
+    assert load_camera(tmp_path / "new" / "camera.JSON") == camera
 
 
-@pytest.mark.parametrize("name", ["camera.json", "camera.yml"])
-def test_opencv_reads_the_file(name, tmp_path):
-    save_camera(tmp_path / name, CAMERA)
-    storage = cv2.FileStorage(str(tmp_path / name), cv2.FILE_STORAGE_READ)
+def test_opencv_reads_the_file(tmp_path):
+    save_camera(tmp_path / "camera.json", CAMERA)
+    storage = cv2.FileStorage(str(tmp_path / "camera.json"), cv2.FILE_STORAGE_READ)
     assert storage.getNode("image_width").real() == 1280
     assert storage.getNode("camera_matrix").mat()[0].tolist() == [1100, 0, 652]
     assert storage.getNode("distortion_coefficients").mat().ravel().tolist() == list(CAMERA.distortion)

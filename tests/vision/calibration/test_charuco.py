@@ -77,17 +77,3 @@ def test_a_hand_may_hide_most_of_the_board(covered, usable):
     seen = np.isfinite(found[:, 0])
     assert 0 < seen.sum() <= 14
     assert CHARUCO.determines_pose(seen) == usable
-
-
-@pytest.mark.parametrize(
-    ("board", "named"),
-    [
-        (CharucoBoard(7, 5, 20.0, 15.0, "4X4_50"), "markers 5X5"),
-        (CharucoBoard(4, 4, 20.0, 15.0, "7X7_50"), "markers 5X5"),
-        (CHARUCO, None),
-    ],
-)
-def test_another_board_is_not_found_but_named(board, named):
-    image, _ = picture(TILTS[0])
-    assert (board.find(image) is None) == (named is not None)
-    assert board.suggest(image) == named

@@ -11,14 +11,12 @@ from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.frames.frame import GreyImage
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.render import render
-from pinnray.vision.rig.shapes import Scene, Shape, blot, circle, closed, rectangle
+from pinnray.vision.rig.shapes import Scene, Shape, blot, circle, closed
 
 PAPER, INK = 0.75, 0.2
 """Reflectances."""
 SPECK = 0.1
 """Radius of a speck over that of the dot."""
-LAYER, ACROSS = 3.2, 0.6
-"""Width of a lighter and a darker layer of a print, pixels, and the direction across them, rad."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,6 @@ class PrintedDots:
         radius: Of discs of the same area, pixels.
         irregular: Root mean square deviation of the outline, over the radius.
         mottle: Share of the area that specks cover.
-        layers: Difference between the reflectances of every other layer of the paper, relative.
         count: Number of dots.
         exposure: Light, lens and camera.
         seed: Of places, outlines and noise.
@@ -38,7 +35,6 @@ class PrintedDots:
     radius: float
     irregular: float = 0.0
     mottle: float = 0.0
-    layers: float = 0.0
     count: int = 24
     exposure: Exposure = field(default_factory=lambda: Exposure(noise=1.0, gradient=0.0, monochrome=True))
     seed: int = 0
@@ -58,7 +54,7 @@ class PrintedDots:
 
     def picture(self) -> GreyImage:
         """The dots, as a grey image."""
-        shapes = self._stripes()
+        shapes: list[Shape] = []
         for number, centre in enumerate(self.centres):
             rng = np.random.default_rng((self.seed, number))
             shapes.append(Shape(closed(blot(centre, self.radius, self.irregular, rng)), (INK,) * 3, 1.0))
@@ -71,16 +67,6 @@ class PrintedDots:
         flat = Camera(self.across * self.side, rows * self.side, 1.0, 1.0, 0.0, 0.0)  # a mm is a pixel
         pose = Pose(np.zeros(3), np.zeros(3))
         return render(Scene((PAPER,) * 3, shapes), flat, pose, self.exposure, seed=self.seed)
-
-    def _stripes(self) -> list[Shape]:
-        """Every other layer over the whole picture; none if all are alike."""
-        if not self.layers:
-            return []
-        reach = 2.0 * self.side * max(self.across, -(-self.count // self.across))
-        turn = np.array([[np.cos(ACROSS), -np.sin(ACROSS)], [np.sin(ACROSS), np.cos(ACROSS)]])
-        starts = np.arange(-reach, reach, LAYER)
-        bands = [rectangle((start, -reach), (start + LAYER / 2, reach)) @ turn.T for start in starts]
-        return [Shape(np.concatenate(bands), ((1 - self.layers) * PAPER,) * 3, 1.0)]
 
 
 def darkness_centroids(grey: GreyImage, dots: PrintedDots) -> FloatArray:

@@ -4,13 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import truncnorm
 
 from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.vision.discs import fit_stages
-from pinnray.vision.discs.disc_detector import luma_of
 from pinnray.vision.discs.disc_fit import FittedDiscs, fit_discs
 from pinnray.vision.discs.disc_image_model import (
     BLUR,
@@ -24,15 +20,12 @@ from pinnray.vision.discs.disc_image_model import (
     RADIUS,
     disc_image,
 )
-from pinnray.vision.discs.least_squares import behind_clipping
-from pinnray.vision.discs.pixel_windows import DARKEST, LIGHTEST
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.shapes import area, blot, centroid, closed
 from pinnray.vision.tracking.scene import FilmedScene
 from pinnray.vision.tracking.tracker import track
 from tests.vision import films
-from tests.vision.discs import printed_dots
 from tests.vision.discs.printed_dots import INK, PAPER, PrintedDots, darkness_centroids
 
 COUNTED = 48
@@ -95,66 +88,20 @@ def test_no_plain_centroid_is_more_accurate(radius, changes):
     assert rms(errors[discs.found]) < 1.2 * rms(plain)
 
 
-@pytest.mark.parametrize(
-    ("radius", "period"),
-    [
-        pytest.param(12.0, 3.2, marks=pytest.mark.release),
-        (4.0, 8.0),
-    ],
-)
-def test_the_layers_of_a_print_are_told_from_the_edges_of_its_dots(radius, period, monkeypatch):
-    """0.3 to 0.6 times the error of a plain centroid; 0.4 to 2 times with the layers left in."""
-    monkeypatch.setattr(printed_dots, "LAYER", period)
-    discs, errors, plain = measured(PrintedDots(radius, 0.03, layers=0.1, count=COUNTED, seed=3))
-    # Small dots on layers of their own size could be hidden: of 288, 275 are found.
-    assert discs.found.sum() >= COUNTED - 3
-    found = errors[discs.found]
-    assert rms(found) < 0.75 * rms(plain)
-    assert covered(discs, errors) > 0.85  # 0.89 to 0.97; 0.7 to 0.8 with the layers left in
-
-
-@pytest.mark.parametrize("frame", [0, 5])
-def test_walls_that_join_beside_a_marker_are_no_layers(frame, monkeypatch):
-    """What a blurred joint leaves of the ground was taken for a wave that moves a marker by 0.1 to 0.4 px."""
-    image, truth = replace(films.recording(), exposure=Exposure(noise=2.0, blur=2.5)).frame(frame)
-    guesses = np.column_stack([truth.pixels, np.full(len(truth.pixels), 7.38)])
-    found = fit_discs(luma_of(image), guesses, radii=7.38)
-    monkeypatch.setattr(fit_stages, "WAVES", 0)
-    without = fit_discs(luma_of(image), guesses, radii=7.38)
-    assert found.found.all()
-    assert (found.centres == without.centres).all()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("radius", "changes"),
     [
         (4.0, {"mottle": 0.1}),  # 0.85 by the residuals alone, of which the outline takes up half
         (4.0, {"exposure": exposure(white=400.0, gradient=0.3), "irregular": 0.03}),
-        (4.0, {"exposure": exposure(noise=6.0), "irregular": 0.05}),  # 1.00 by outlines that are no noise
         (12.0, {"exposure": exposure(white=400.0)}),  # 0.99 if light is uneven by assumption
     ],
-    ids=["specks", "uneven light on clipped white", "noisy", "even light on clipped"],
+    ids=["specks", "uneven light on clipped white", "even light on clipped"],
 )
 def test_the_intervals_of_dots_hold(radius, changes):
     dots = PrintedDots(radius, count=96, seed=5, **changes)
     discs, errors, _ = measured(dots)
     assert 0.89 < covered(discs, errors) < 0.99  # 192 coordinates, each deviation of 0.95 is 0.016
-
-
-@pytest.mark.parametrize(("value", "sign"), [(255, 1), (0, -1)])
-def test_clipped_pixels_are_expected_where_a_truncated_normal_distribution_is(value, sign):
-    limit, deviation = (LIGHTEST, 3.0) if sign > 0 else (DARKEST, 3.0)
-    levels = limit + deviation * np.linspace(-3, 3, 13)
-    expected, known = behind_clipping(
-        np.full((1, 13), value, np.float32), levels.astype(np.float32)[None], np.array([deviation**2])
-    )
-    low, high = (
-        ((limit - levels) / deviation, np.inf) if sign > 0 else (-np.inf, (limit - levels) / deviation)
-    )
-    clipped = truncnorm(low, high, loc=levels, scale=deviation)
-    np.testing.assert_allclose(expected[0], clipped.mean(), atol=0.01)
-    np.testing.assert_allclose(known[0], 1 - clipped.var() / deviation**2, atol=0.002)
 
 
 def test_derivatives_of_an_irregular_disc_are_differences():
@@ -189,14 +136,6 @@ def test_the_outline_of_a_blot_has_the_discs_area_and_centroid():
     np.testing.assert_allclose(centroid(edges), (3.0, -2.0), atol=1e-9)
     reach = np.linalg.norm(edges[:, 0] - (3.0, -2.0), axis=1) / 0.8
     assert reach.std() == pytest.approx(0.05, rel=0.02)
-
-
-def test_specks_cover_the_share_that_the_bench_is_told(coarse_mesh):
-    bench = Bench(coarse_mesh, Design(), films.WORKSPACE, mottle=0.1)
-    rest = np.zeros_like(coarse_mesh.points)
-    shares = [area(speck.edges) / area(bench.discs(rest)[0].edges) for speck in bench.specks(rest)]
-    assert sum(shares) / len(coarse_mesh.markers) == pytest.approx(0.1, rel=0.05)
-    assert not replace(bench, mottle=0.0).specks(rest)
 
 
 @pytest.mark.release

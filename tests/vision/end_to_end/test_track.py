@@ -103,6 +103,13 @@ def test_markers_at_the_fiducials_height_are_told_from_those_nearer_by_their_sca
     assert "0.40% smaller in the film than in the drawing" in said
 
 
+def test_hough_takes_the_sheet_with_a_camera(listed: ListedDiscs) -> None:
+    high = SPACE.model_copy(update={"marker_plane": 20.0})
+    pictures = [picture(listed, MARKERS + share * PRESSED, height=20.0) for share in SHARES]
+    tracking = track(film(pictures), replace(SCENE, workspace=high, method="hough"))
+    np.testing.assert_allclose(tracking.observations("a film").displacements, PRESSED, atol=0.15)
+
+
 def test_a_person_ends_a_camera_and_breaks_off_a_film(listed: ListedDiscs) -> None:
     pictures = [*pressed(listed), picture(listed, MARKERS)]
     tracking = track(film(pictures, live=True, stop=8), SCENE)

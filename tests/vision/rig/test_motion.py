@@ -23,13 +23,3 @@ def test_the_load_grows_at_constant_speed_between():
     assert motion.travel(5) == pytest.approx(0.5 / 7.5)
     assert motion.travel(1) == 0
     assert 0 < means[0] < means[-1] < 1
-
-
-def test_a_rolling_shutter_opens_later_for_lower_rows():
-    motion = Motion(rest=3, moving=7, held=4, shutter=0.25, rolling=0.5)
-    loads = motion.exposed(5, 300)
-    rows = np.array([0.0, 0.5, 1.0])
-    seen = loads @ motion.open_at(300, rows)
-    np.testing.assert_allclose(seen, motion.load(5 + 0.5 * rows + 0.125), atol=1e-3)
-    assert motion.travel(5) == pytest.approx(0.75 / 7.75)
-    np.testing.assert_allclose(motion.open_at(4, rows).sum(axis=0), 1)

@@ -96,23 +96,6 @@ def test_motion_blur_is_the_mean_of_what_is_seen_while_the_shutter_is_open(bench
     np.testing.assert_allclose(truth.pixels, pixels, atol=1e-3)
 
 
-def test_rows_of_a_rolling_shutter_are_those_of_frames_taken_later(bench):
-    sharp, motion = Exposure(noise=0, blur=0.7), Motion(rest=1, moving=2, held=1, shutter=0.0, rolling=0.8)
-    recording = film(bench, exposure=sharp, motion=motion)
-    image, truth = recording.frame(1)
-    for marker in (0, 7):
-        row = truth.pixels[marker, 1] / CAMERA.height
-        state = recording.displaced(float(motion.load(1 + 0.8 * row)))
-        np.testing.assert_allclose(
-            truth.pixels[marker], CAMERA.project(bench.markers(state), POSE)[marker], atol=0.6
-        )  # half of the step between the instants
-        around = np.s_[int(truth.pixels[marker, 1]), :]
-        later = render(bench.scene(state), CAMERA, POSE, sharp)
-        assert np.abs(image[around].astype(float) - later[around]).mean() < 2
-    still = film(bench, exposure=sharp, motion=motion.model_copy(update={"rolling": 0.0})).frame(1)
-    assert np.abs(truth.pixels - still[1].pixels).max() > 2
-
-
 def test_a_cable_hides_the_share_of_a_marker_that_it_is_told_to(bench):
     still = np.zeros_like(bench.mesh.points)
     disc = bench.discs(still)[4]

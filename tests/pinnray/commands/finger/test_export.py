@@ -32,14 +32,13 @@ def test_the_models_for_mujoco_are_near_finite_elements_at_loads_that_they_have_
     assert (tmp_path / "score.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_mesh_and_scene_are_written_with_the_material(tmp_path):
+def test_a_mesh_is_written_with_the_material(tmp_path):
     short = [f"{name}={getattr(SHORT, name)}" for name in ("height", "tip_length", "rib_count")]
     finger = [word for each in short for word in ("--set", each)]
     common = [*finger, "--mesh-size", "2", "--young", "3", "--out", str(tmp_path)]
     assert main(["export", "mesh", *common]) == 0
-    assert main(["export", "sofa", *common]) == 0
     names = {each.name for each in tmp_path.iterdir()}
-    assert names == {"finger.msh", "finger.vtk", "finger.stl", "finger.scn", "material.json"}
+    assert names == {"finger.vtk", "finger.stl", "material.json"}
     assert json.loads((tmp_path / "material.json").read_text())["young_Pa"] == 3e6
 
 

@@ -29,7 +29,7 @@ def test_the_number_of_triangles_is_known_before_the_mesh_is_made(name, size):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["compare", "crossval", "solve fem-nonlinear", "rig", "gridsearch"])
+@pytest.mark.parametrize("command", ["compare", "crossval", "solve fem-nonlinear", "rig"])
 def test_a_fine_mesh_asks_for_consent_before_anything_is_done(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("pinnray.options.cost.free_memory_gb", lambda: 4.0)

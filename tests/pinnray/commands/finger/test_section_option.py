@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from pinnray.cli import main
-from pinnray.comparison.crossval.study import CrossvalStudy
 from pinnray.comparison.pipeline.job import Job
 from pinnray.geometry.cache import drawn_finger
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.shared import FingerOptions
+from pinnray.studies.crossval.study import CrossvalStudy
 from tests.geometry.drawing.files import write_beam_mesh
 
 BEAM = "M 0 0 L 0 -10 L 60 -10 L 60 0 Z"

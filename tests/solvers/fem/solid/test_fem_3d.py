@@ -5,20 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.comparison.crossval.true_fields import FieldSampler
 from pinnray.comparison.evaluation.certification import with_certificates
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.fem.linear_solvers import Multigrid
-from pinnray.solvers.fem.solid import FaceField, Fem3dSolver, affordable
+from pinnray.solvers.fem.solid import FaceField, Fem3dSolver
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import State
+from pinnray.studies.crossval.true_fields import FieldSampler
 from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import bar_mesh
-from tests.solvers.fem.test_fem_ranks import reported
 
 SLIDING = Load(kind="patch", displacement=(None, -4.0))
 
@@ -118,65 +116,3 @@ def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
     np.testing.assert_array_equal(sampled.state(solution.problem).von_mises, expected)
     plane = State.from_gradient(sampled.gradient[:, :2, :2], solution.problem).von_mises
     assert np.abs(plane - expected).max() > 0.01 * expected.max()
-
-
-@pytest.mark.release
-@pytest.mark.mpi
-def test_two_ranks_find_what_one_finds(start_ranks, wedge, tmp_path):
-    wedge.save(tmp_path / "mesh.npz")
-    process = start_ranks(2, "-m", "tests.solvers.fem.rank_programs", "solid", str(tmp_path / "mesh.npz"))
-    load = Load(displacement=(0.0, -2.0))
-    alone = Fem3dSolver(layers=1).solve(Problem(wedge, Material(law="neo-hookean"), load))
-    reported(process, 0, [alone], wedge)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("law", "load"),
-    [
-        ("linear", SLIDING),
-        ("linear", Load(displacement=(0.0, -4.0))),  # a mean: two more solves, for unit forces
-        ("neo-hookean", SLIDING),
-    ],
-)
-def test_multigrid_finds_what_factors_find(wedge, law, load):
-    problem = Problem(wedge, Material(law=law), load)
-    direct, iterative = (
-        Fem3dSolver(layers=1, linear_solver=method).solve(problem) for method in ("direct", "iterative")
-    )
-    assert iterative.status.converged
-    assert iterative.stats["iterations"] > 0
-    assert iterative.energy == pytest.approx(direct.energy, rel=1e-7)  # Newton's is 1e-8 of the force
-    gap = iterative.displacement(wedge.markers) - direct.displacement(wedge.markers)
-    assert np.abs(gap).max() < 1e-5  # mm
-
-
-@pytest.mark.slow
-def test_an_indefinite_matrix_is_solved_by_minres(wedge):
-    """The stiffness minus 4e-6 of its diagonal has a negative eigenvalue."""
-    finite = Problem(wedge, Material(law="neo-hookean"))
-    equilibrium = DiscreteEquilibrium(finite, ExtrudedSpace.of(wedge, 1, 1.0))
-    system = equilibrium.distributed, equilibrium.matrix, equilibrium.clamped
-    multigrid = Multigrid(*system, tolerance=1e-6, tangent=True)
-    equilibrium.matrix.setDiagonal((1 - 4e-6) * equilibrium.matrix.getDiagonal())
-    equilibrium.matrix.assemble()
-    force = np.where(equilibrium.clamped, 0.0, 1.0)
-    equilibrium.factors.update()
-    exact = equilibrium.factors.solve(force)
-    assert (exact * force).sum() < 0  # it gives way against the force
-    multigrid.update()
-    found = multigrid.solve(force)
-    assert np.linalg.norm(found - exact) < 1e-4 * np.linalg.norm(exact)
-
-
-@pytest.mark.parametrize(
-    ("asked", "free", "iterative"),
-    [
-        ("auto", 40.0, False),  # factors fit
-        ("auto", 10.0, True),  # they do not, but coarser matrices do
-        ("direct", 40.0, False),
-        ("iterative", 40.0, True),
-    ],
-)
-def test_the_linear_solver_is_chosen_by_memory(asked, free, iterative):
-    assert affordable(1_000_000, 13, asked, free).iterative is iterative

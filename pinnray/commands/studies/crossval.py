@@ -1,0 +1,125 @@
+"""Score solvers on held-out markers, loads and fields."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.text import Text
+
+from pinnray.commands.quiet import quietable
+from pinnray.options.shared import (
+    FingerOptions,
+    OptionalOutputPath,
+    PhysicsOptions,
+    SolverOptions,
+    comma_list,
+    existing_table,
+    going_on_from,
+    read_formats,
+    read_processes,
+)
+from pinnray.runtime.exits import NOT_CONVERGED, say
+
+if TYPE_CHECKING:
+    from pinnray.solvers.physics import Material
+    from pinnray.studies.crossval.study import SolverVariant
+
+TEXTS = ("solver", "held out")
+"""Headings of columns of words."""
+
+
+@quietable
+def command(
+    *,
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
+    schemes: str = "one-out,tip-out,random,load-out",
+    truth: str = "sliding",
+    layouts: str | None = None,
+    seeds: int = 5,
+    noise: float = 0.005,
+    frame: str = "fixed",
+    measurements: Path | None = None,
+    processes: int | None = None,
+    pictures: str = "",
+    out: OptionalOutputPath = None,
+) -> int:
+    """Score solvers on markers, loads and fields that they were not given.
+
+    A truth is a finite-strain simulation on a finer mesh; the marker displacements are taken from it with
+    noise. The default --mesh-size is 0.5. Finished folds are kept: the same command again goes on where it
+    was stopped.
+
+    Args:
+        solvers: Names of solvers, separated by commas. One that can choose the weight of the markers runs in
+            three variants (linear law).
+        schemes: Hold-out schemes, separated by commas.
+        truth: Truths, separated by commas, or all: sliding, stvk, gent, print, base, cylinder, oblique,
+            mixed, friction, rubbing, 3d, sticking.
+        layouts: Marker layouts at which the same truth is sampled, separated by commas; default: the
+            design's own.
+        seeds: Number of noise draws.
+        noise: Standard deviation of a simulated marker's displacement, mm.
+        frame: How the simulated pressed pictures lie, and how well that is known: fixed, or such as
+            "turn 3 deg, shift 0.3 mm, scale 1 %".
+        measurements: CSV file of marker displacements; default: simulated.
+        processes: Solvers run at a time; default: one per core.
+        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
+        out: Output folder; default out/crossval-DESIGN.
+    """
+    from pinnray.geometry.registration import Registration
+    from pinnray.runtime.stages import Stages
+    from pinnray.runtime.tables import terminal_table
+    from pinnray.studies.crossval.cross_validation import cross_validate
+    from pinnray.studies.crossval.folds import LOAD
+    from pinnray.studies.crossval.study import SIZES, CrossvalStudy
+    from pinnray.studies.crossval.tables import all_tables, truth_tables
+    from pinnray.vision.measurements import read_measurements
+
+    design, mesh = finger.read(options.preset, SIZES)
+    material, load = physics.read(options.preset)
+    file = existing_table(measurements)
+    study = CrossvalStudy(
+        design=design,
+        mesh=mesh,
+        material=material,
+        load=load,
+        variants=read_variants(options, solvers, material),
+        schemes=comma_list(schemes),
+        truths=comma_list(truth),
+        layouts=comma_list(layouts) if layouts else (),
+        seeds=seeds,
+        noise=noise,
+        frame=Registration.parse(frame),
+        measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
+        out=out or Path("out") / f"crossval-{design.name}",
+        processes=read_processes(processes),
+        picture_formats=read_formats(pictures),
+    )
+    made = [variant.solver for variant in study.variants]
+    physics.check_law(made)
+    finger.check_cost(design, mesh, made, simulated=True)
+    if study.measurements and LOAD in study.schemes:
+        say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")
+    with going_on_from(study.out), Stages() as stages:
+        result = cross_validate(study, stages)
+    several = result.samples["truth"].nunique() > 1
+    for table in truth_tables(result)[-1:] if several else all_tables(result):
+        Console().print(terminal_table(table.title, table.headings, table.rows, left=TEXTS, narrow=True))
+        Console().print(Text(f"{table.caption}\n", style="table.caption"))
+    for name in ("report.html", "samples.csv", "scores.csv", "crossval.json"):
+        print(study.out / name)
+    for name, message in result.failed.items():
+        say(f"error: {name} failed, and is tried again by the same command: {message}")
+    return 0 if result.samples["converged"].all() and not result.failed else NOT_CONVERGED
+
+
+def read_variants(options: SolverOptions, names: str, material: "Material") -> "list[SolverVariant]":
+    """The solvers and their variants; a single one where --solver-set chooses the weight of the markers."""
+    from pinnray.studies.crossval.study import solver_variants
+
+    keys = [text.partition("=")[0].split(".") for text in options.solver_set]
+    fixed = [key[0] for key in keys if key[1:] in (["choose"], ["weights"])]
+    return solver_variants(options.read(names), material, fixed=fixed)
