@@ -135,8 +135,8 @@ def contact_on_front(p: Parameters) -> RuleResult:
     end = p.height - tip_tangent(p) - MIN_CONTACT_MARGIN
     return RuleResult(
         min(low - MIN_CONTACT_MARGIN, end - high),
-        f"contact outside the front face: it reaches from x = {low:.6g} to {high:.6g} mm, the face allows "
-        f"{MIN_CONTACT_MARGIN:g} to {end:.6g} mm",
+        f"contact outside the front face: at contact_position {p.contact_abscissa:.6g} mm it reaches from "
+        f"x = {low:.6g} to {high:.6g} mm, the face allows {MIN_CONTACT_MARGIN:g} to {end:.6g} mm",
     )
 
 

@@ -46,6 +46,7 @@ def assembled(
     Raises:
         UserError: If a curve does not close, the markers differ in diameter, or one is no circle.
     """
+    check_extent(pieces, scale)  # in a wrong unit no marker would be a circle
     discs = _discs([piece for piece in pieces if piece.label == "markers"])
     diameters = [diameter for _, diameter in discs]
     if diameters and np.ptp(diameters) > 0.01 * max(diameters):
