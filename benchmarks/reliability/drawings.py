@@ -1,7 +1,7 @@
 """Random drawings as programs write them: each read to 1e-6 of its area, or refused in one line.
 
 `python -m benchmarks.reliability.drawings COUNT [SEED]` makes DXF, SVG and STEP files of random
-sections: blocks, units, hidden layers, placements, short lines and gaps. What a refusal proposes
+sections: blocks, units, hidden layers, copies, placements, short lines and gaps. What a refusal proposes
 (`units`, `tolerance`) must work. Areas and distances of markers are computed here, without the readers' code.
 """
 
@@ -137,7 +137,7 @@ def dxf(random: np.random.Generator, sketch: Sketch, path: Path) -> float:
 
 
 def svg(random: np.random.Generator, sketch: Sketch, path: Path) -> float:
-    """An SVG file: some unit, transformed, also through a copy, beside what is not drawn."""
+    """An SVG file: some unit, transformed, also through copies, beside what is not drawn."""
     unit = str(random.choice(list(UNITS)))
     scale = float(random.choice([0.5, 1, 3]))
     turn = f"rotate({random.uniform(0, 360):.9g}) scale({random.choice([-1, 1]) * scale} {scale})"
