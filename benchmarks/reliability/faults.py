@@ -43,10 +43,6 @@ JOBS = {
     "rig": (RIG,),
     "track": (f"{RIG} --out FOLDER/film", TRACK),
     "crossval": ("crossval --solvers fem --schemes one-out --seeds 1 --mesh-size 4 --processes 1",),
-    "gridsearch": (
-        "gridsearch --mesh-size 4 --epochs 4 --learning-rates 1e-3,1e-2 --bc-weights 1 --processes 1 "
-        "--solver-set pinn-std.checkpoint_every=2",
-    ),
 }
 """Commands by name, the last of which meets the faults; `FOLDER` stands for the folder that it runs in."""
 REPLACING = ("compare", "rig", "track")

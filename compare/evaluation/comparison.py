@@ -5,11 +5,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import Scores
+from pinnray.comparison.evaluation.metrics import scores_of
+from pinnray.comparison.evaluation.scores import Scores
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.adaptive_refinement import Adaptation
 from pinnray.solvers.problem import Load, Material
@@ -44,7 +48,7 @@ class Results:
     @cached_property
     def scores(self) -> Scores:
         """Every number of the run, computed once."""
-        return Scores.of(self)
+        return scores_of(self)
 
     def __repr__(self) -> str:
         solvers, seen = ", ".join(each.solver for each in self.evaluations), self.observations
@@ -62,6 +66,12 @@ class Results:
         """The evaluations whose fields are drawn and written: all, and the truth's under the name `truth`."""
         true = [] if self.truth is None else [replace(self.truth, solver=TRUTH)]
         return [*self.evaluations, *true]
+
+    def observed(self, evaluation: Evaluation) -> FloatArray:
+        """Places where markers were seen, shape (k, 2), mm, in the finger's frame as a solver found it."""
+        given = self.observations
+        off = evaluation.shown_displacement - evaluation.marker_displacement
+        return np.asarray((given.points + given.displacements - off)[given.visible])
 
     @property
     def remarks(self) -> list[str]:

@@ -1,15 +1,23 @@
-"""Triangles to pixels: each triangle in its number, in quarters of pixels, and colours given to the numbers.
+"""Triangles to pixels: PyVista off the screen, with a camera given exactly and no text.
 
-A body that is drawn in many colours is rasterised once. Type, axes and legends are matplotlib's; both use the
-same extent in mm, so that they fit to the pixel.
+VTK draws every triangle in its number, in quarters of pixels, and colours are given to the numbers: a body
+that is drawn in many colours is rendered once. Type, axes and legends are matplotlib's; both use the same
+extent in mm, so that they fit to the pixel.
 """
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+
+# Draw without a display: VTK otherwise complains of a missing X server before it does so anyway.
+os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+import pyvista
+from vtkmodules.vtkCommonCore import vtkLogger
 
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -58,6 +66,34 @@ class Canvas:
         self._mesh, self._size = mesh, (round(width * extent.height / extent.width), width)
 
     @cached_property
+    def _surface(self) -> Any:
+        """The triangles, each in the colour of its number."""
+        triangles = self._mesh.triangles
+        faces = np.insert(triangles, 0, 3, axis=1)
+        surface = pyvista.PolyData(np.pad(self._mesh.points, ((0, 0), (0, 1))), faces.ravel())
+        numbers = np.arange(len(triangles), dtype="<u4").view(np.uint8).reshape(-1, 4)
+        surface.cell_data["number"] = numbers[:, :3]
+        return surface
+
+    @cached_property
+    def _plotter(self) -> Any:
+        pyvista.OFF_SCREEN = True
+        extent, (height, width) = self.extent, self._size
+        with _without_warnings():
+            plotter = pyvista.Plotter(off_screen=True, window_size=[2 * width, 2 * height])
+            plotter.disable_anti_aliasing()  # a mean of two numbers is the number of a third triangle
+            plotter.add_mesh(self._surface, scalars="number", rgb=True, lighting=False)
+        camera = plotter.camera
+        middle = ((extent.left + extent.right) / 2, (extent.bottom + extent.top) / 2)
+        camera.parallel_projection = True
+        camera.focal_point = (*middle, 0.0)
+        camera.position = (*middle, 100.0)
+        camera.up = (0.0, 1.0, 0.0)
+        camera.parallel_scale = extent.height / 2
+        camera.clipping_range = (50.0, 150.0)
+        return plotter
+
+    @cached_property
     def _at_rest(self) -> tuple[IntArray, IntArray]:
         return self._cover(self._mesh.points)
 
@@ -86,14 +122,24 @@ class Canvas:
             Numbers of the pixels with any triangle, row by row, shape (k,), and the number of the triangle in
             each of their quarters, shape (4, k): the count of triangles where there is none.
         """
-        (height, width), extent, count = self._size, self.extent, len(self._mesh.triangles)
-        scale = 2 * width / extent.width
-        places = (points - [extent.left, extent.top]) * [scale, -scale] - 0.5  # centres of quarters are whole
-        places = np.clip(np.nan_to_num(places), -1e6, 1e6)  # of a result that went astray
-        numbers = Image.new("I", (2 * width, 2 * height), count)
-        draw = ImageDraw.Draw(numbers)
-        for number, corners in enumerate(places[self._mesh.triangles].reshape(count, 6).tolist()):
-            draw.polygon(corners, fill=number)
-        quarters = np.asarray(numbers).reshape(height, 2, width, 2).transpose(1, 3, 0, 2).reshape(4, -1)
+        self._surface.points = np.pad(points, ((0, 0), (0, 1)))
+        self._plotter.render()
+        with _without_warnings():
+            image = self._plotter.screenshot(None, transparent_background=True, return_img=True)
+        count, (height, width) = self._surface.n_cells, self._size
+        words = np.ascontiguousarray(image, dtype=np.uint8).view("<u4")
+        number = np.where(words >> 24, words & 0xFFFFFF, count)
+        quarters = number.reshape(height, 2, width, 2).transpose(1, 3, 0, 2).reshape(4, -1)
         pixels = np.flatnonzero((quarters < count).any(axis=0))
         return pixels, quarters[:, pixels].astype(np.int64)
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """VTK tries X, then EGL, then OSMesa, and warns at each that is missing; one that works is enough."""
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    try:
+        yield
+    finally:
+        vtkLogger.SetStderrVerbosity(before)

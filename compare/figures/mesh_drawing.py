@@ -8,7 +8,7 @@ from matplotlib.patches import Rectangle
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.canvas import Extent
 from pinnray.comparison.figures.style import HALO, axes_at, write_heading
-from pinnray.geometry.mesh.boundary import edge_paths
+from pinnray.geometry.mesh.boundary import edge_paths, singular_points
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
@@ -37,25 +37,6 @@ def quality(mesh: TriangleMesh) -> FloatArray:
     corners = mesh.points[mesh.triangles]
     a, b, c = (np.linalg.norm(corners[:, i] - corners[:, (i + 1) % 3], axis=1) for i in range(3))
     return np.asarray((b + c - a) * (c + a - b) * (a + b - c) / (a * b * c))
-
-
-def corner_near(mesh: TriangleMesh, point: FloatArray) -> tuple[str, FloatArray]:
-    """Name and place, shape (2,), mm, of the re-entrant corner nearest to a point.
-
-    Re-entrant means that the body fills more than 200 degrees around the node. Where there is none, it is the
-    nearest end of the base, or of one of its parts.
-    """
-    corners = mesh.points[mesh.triangles]
-    angle = np.zeros(len(mesh.points))
-    for i in range(3):
-        ahead, behind = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
-        cross = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
-        np.add.at(angle, mesh.triangles[:, i], np.arctan2(cross, (ahead * behind).sum(axis=1)))
-    boundary = np.unique(mesh.boundary_edges)
-    sharp = mesh.points[boundary[angle[boundary] > np.radians(200)]]
-    name = "inner corner" if len(sharp) else "end of the base"
-    places = sharp if len(sharp) else np.concatenate([line[[0, -1]] for line in body.base_lines(mesh)])
-    return name, np.asarray(places[np.linalg.norm(places - point, axis=1).argmin()])
 
 
 def draw_mesh(mesh: TriangleMesh) -> Figure:
@@ -92,10 +73,11 @@ def _close_ups(mesh: TriangleMesh, ratio: float) -> dict[str, Extent]:
     contact = mesh.points[np.unique(mesh.boundary("contact"))]
     span = max(2.6 * float(np.ptp(contact[:, 0])), 0.055 * float(np.ptp(mesh.points, axis=0).max()))
     middle = contact.mean(axis=0)
-    name, joint = corner_near(mesh, middle + np.array([2 * span, 0]))
+    corners = singular_points(mesh)
+    joint = corners[np.linalg.norm(corners - middle - (2 * span, 0), axis=1).argmin()]
     return {
         "contact": _window(middle - (0, 0.33 * span * ratio), span, ratio),
-        name: _window(_inward(mesh, joint, 1.4 * span, ratio), 1.4 * span, ratio),
+        "corner": _window(_inward(mesh, joint, 1.4 * span, ratio), 1.4 * span, ratio),
     }
 
 

@@ -10,7 +10,7 @@ from matplotlib.patches import Circle
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import SolverScores
+from pinnray.comparison.evaluation.scores import SolverScores
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.body import ColourScale
 from pinnray.comparison.figures.canvas import Canvas, Extent
@@ -103,10 +103,7 @@ def _panel(
     body.show(axes, canvas, scale.paint(_magnitude(mesh, evaluation)), deformed)
     body.draw_outline(axes, canvas.outline, deformed, width=0.4)
     body.clamp(axes, body.base_lines(mesh), size=body.hatch_size(mesh.points))
-    seen = observations.visible
-    # In the finger's frame: what the pictures show besides its displacement is taken off.
-    off = evaluation.shown_displacement - evaluation.marker_displacement
-    observed = (observations.points + observations.displacements - off)[seen]
+    observed = comparison.observed(evaluation)
     computed = observations.points + evaluation.marker_displacement
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec="white", mew=2.0, zorder=4)
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec=MEASURED, mew=1.1, zorder=5)

@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import SolverScores
+from pinnray.comparison.evaluation.scores import SolverScores
 from pinnray.comparison.figures.style import (
     axes_at,
     legend_above,

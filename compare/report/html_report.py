@@ -96,7 +96,7 @@ def _solver(
         },
         "contact": [start.tolist(), end.tolist()],
         "markers": _markers(evaluation, comparison),
-        "observed": _observed(evaluation, comparison),
+        "observed": comparison.observed(evaluation).tolist(),
         "fields": fields,
         "fractions": fractions,
         "states": packed.add_steps(states),
@@ -110,16 +110,6 @@ def _markers(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
     nearest = [int(np.linalg.norm(mesh.points - point, axis=1).argmin()) for point in points]
     moved = evaluation.marker_displacement
     return {"points": points.tolist(), "displacements": moved.tolist(), "nodes": nearest}
-
-
-def _observed(evaluation: Evaluation, comparison: Results) -> list[list[float]]:
-    """Positions of the markers that were seen, mm, in the frame of the finger as the solver found it."""
-    observations = comparison.observations
-    if not observations.known:
-        return []
-    off = evaluation.shown_displacement - evaluation.marker_displacement
-    seen = (observations.points + observations.displacements - off)[observations.visible]
-    return [list(map(float, place)) for place in seen]
 
 
 def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
@@ -201,5 +191,5 @@ def _entry(evaluation: Evaluation, comparison: Results) -> dict[str, object]:
         "reaction": text.without_rounding(own.reaction),
         "seconds": seconds(own),
         "certificate": evaluation.certificate,
-        "certificate_sentences": text.certificate_sentences(evaluation, comparison.load.kind),
+        "certificate_sentence": text.certificate_sentence(evaluation, comparison.load.kind),
     }

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import hypot, isfinite, nan
 from typing import NamedTuple
 
-from pinnray.comparison.evaluation.metrics import FigureScores, Scores, SolverScores
+from pinnray.comparison.evaluation.scores import FigureScores, Scores, SolverScores
 from pinnray.runtime.tables import NONE, TextTable, number, percent
 from pinnray.solvers.finger_figures import break_warning
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from rich.table import Table
 
 from pinnray.comparison.evaluation.comparison import Results
-from pinnray.comparison.evaluation.metrics import MEANS, Means, Scores, SolverScores
+from pinnray.comparison.evaluation.scores import MEANS, Means, Scores, SolverScores
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS

@@ -2,15 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 from markupsafe import Markup
 
-from pinnray.comparison.evaluation.certificate import Certificate
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import Scores
 from pinnray.geometry.finger.finger import Finger
-from pinnray.runtime.tables import distance, number, percent
+from pinnray.runtime.tables import number, percent
 from pinnray.solvers.problem import Load
 
 FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"
@@ -69,15 +66,6 @@ def load_sentence(load: Load, design: Finger) -> str:
     middle = design.contact_abscissa if load.position is None else load.position
     about = f"{'from' if load.kind == 'cylinder' else 'about'} x = {middle:g} mm on the front"
     return f"{where}: {moved}, {about} (load “{load.kind}”)."
-
-
-def headline(design: Finger) -> list[tuple[str, str]]:
-    """The finger in a line: symbols of the paper with values, or else values alone."""
-    if paper := [(symbol, value) for _, symbol, value in design.facts() if symbol]:
-        return paper
-    (width, height), count = np.ptp(design.section.bounds, axis=0), len(design.section.cavities)
-    cavities = "no cavity" if count == 0 else "1 cavity" if count == 1 else f"{count} cavities"
-    return [("", f"{width:.4g} mm by {height:.4g} mm"), ("", f"depth {design.depth:.4g} mm"), ("", cavities)]
 
 
 def support_sentence(design: Finger) -> str:
@@ -171,52 +159,23 @@ def beside(value: float, own: float | None) -> Markup:
     )
 
 
-def own_error_sentence(scores: Scores) -> str:
-    """Sentence on the reference's estimate of its own error."""
-    label, own = scores.label(scores.reference), scores[scores.reference].uncertainty
-    if own is None:
-        return f"{label} gives no estimate of its own error."
-    return (
-        f"The error of {label} itself, by its own estimate: {percent(own.rel_l2_displacement)} in the "
-        f"displacement, {percent(own.rel_l2_von_mises)} in the von Mises stress (relative L²), "
-        f"{percent(own.energy_norm)} in the energy norm, "
-        f"{distance(max(*own.markers_u, *own.markers_v))} mm at most at a marker."
-    )
-
-
-def certificate_sentences(evaluation: Evaluation, load: str = "mean") -> str:
-    """Sentences on the certificate of a result under a kind of load, or the reason why there is none."""
+def certificate_sentence(evaluation: Evaluation, load: str = "mean") -> str:
+    """Why a result under a kind of load has no certificate, or that it misses energy; empty for others."""
     label, certificate = evaluation.label, evaluation.certificate
+    if certificate is not None:
+        missed = percent(certificate.missed / certificate.fem_energy)
+        said = (
+            f"{label} reports {missed} less energy than the least that is possible: its quadrature misses it."
+        )
+        return said if certificate.misses_energy else ""
     if evaluation.law != "linear":
-        return f"{label} has no certificate: there is one for the linear law only."
-    if evaluation.in_sample:
-        return f"{label} has no certificate: it pays energy for the markers that it was given."
-    if evaluation.solid:
-        return f"{label} has no certificate: the least energy of the plane says nothing of three dimensions."
-    if load == "cylinder":
-        return f"{label} has no certificate: the least energy is that of a contact that is given, not found."
-    if certificate is None:
+        reason = "there is one for the linear law only"
+    elif evaluation.in_sample:
+        reason = "it pays energy for the markers that it was given"
+    elif evaluation.solid:
+        reason = "the least energy of the plane says nothing of three dimensions"
+    elif load == "cylinder":
+        reason = "the least energy is that of a contact that is given, not found"
+    else:
         reason = "DOLFINx, which makes it, is not installed" if evaluation.finite else "it is not finite"
-        return f"{label} has no certificate: {reason}."
-    if not certificate.has_excess and not certificate.faults:
-        return f"{label} is the finite-element solution itself: nothing is left out of balance."
-    excess, residual = percent(certificate.rel_excess), percent(certificate.weak_residual)
-    verdict = f"is converged to {excess} of the energy" if evaluation.converged else "is not to be relied on"
-    said = (
-        f"{label} {verdict}: its displacement, taken over to the elements of fem, has {excess} more energy "
-        "than the least with the same values at base and contact, and its own stress is out of balance by "
-        f"{residual} in the energy norm."
-    )
-    return f"{said} {_reported(certificate)}".rstrip()
-
-
-def _reported(certificate: Certificate) -> str:
-    missed = certificate.missed / certificate.fem_energy
-    if missed <= 0 or not certificate.has_excess:
-        return ""
-    reason = (
-        "its quadrature misses energy"
-        if certificate.misses_energy
-        else "it is nearer to the exact solution than fem on this mesh, or its quadrature misses a little"
-    )
-    return f"It reports {percent(missed)} less energy than that least: {reason}."
+    return f"{label} has no certificate: {reason}."

@@ -107,15 +107,9 @@ class _Emulated(Problem):  # type: ignore[misc] # pymoo has no annotations
         if sound.any():
             good = [finger for finger, fine in zip(fingers, sound, strict=True) if fine]
             predicted = self._emulator.predict(good, self._question.names)
-            middle = {name: predicted.column(name) for name in predicted.names}
-            width = (predicted.high - predicted.low) / 2
-            rows_costs, rows_excess = [], []
-            for row in range(len(good)):
-                values = {name: float(column[row]) for name, column in middle.items()}
-                hopes = {name: float(width[row, n]) for n, name in enumerate(predicted.names)}
-                cost = np.array(self._question.costs(values))
-                cost -= HOPE * np.array([hopes[name] for name in self._question.objectives])
-                rows_costs.append(cost)
-                rows_excess.append([0.0, *self._question.excesses(values)])
-            costs[sound], excess[sound] = rows_costs, rows_excess
+            values, widths = predicted.values.T, (predicted.high - predicted.low).T / 2
+            middle, hopes = (dict(zip(predicted.names, each, strict=True)) for each in (values, widths))
+            hoped = HOPE * np.array([hopes[name] for name in self._question.objectives])
+            costs[sound] = (np.array(self._question.costs(middle)) - hoped).T
+            excess[sound] = np.stack([np.zeros(len(good)), *self._question.excesses(middle)], axis=1)
         out["F"], out["G"] = costs, excess

@@ -2,17 +2,20 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, TypeVar, cast
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_toml
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.studies.sweep.study import Study
 
 Sense = Literal["least", "largest"]
+V = TypeVar("V", float, FloatArray)
 
 ENOUGH = 12
 """Smallest number of converged runs to which the emulator is fitted, and of samples to start from."""
@@ -38,11 +41,11 @@ class Limit(CheckedModel):
             raise ValueError("give at_least, at_most or both")
         return self
 
-    def excess(self, value: float) -> float:
-        """How far a value is beyond the limits; negative or zero within them."""
-        over = -float("inf") if self.at_most is None else value - self.at_most
-        under = -float("inf") if self.at_least is None else self.at_least - value
-        return max(over, under)
+    def excess(self, value: V) -> V:
+        """How far a value, or each of an array, is beyond the limits; negative or zero within them."""
+        low = -np.inf if self.at_least is None else self.at_least
+        high = np.inf if self.at_most is None else self.at_most
+        return cast(V, np.maximum(value - high, low - value))
 
 
 class Question(Study):
@@ -72,13 +75,13 @@ class Question(Study):
         """Quantities of the objectives and constraints, each once."""
         return list(dict.fromkeys((*self.objectives, *self.constraints)))
 
-    def costs(self, values: Mapping[str, float]) -> list[float]:
-        """The objectives as numbers of which the least is best."""
+    def costs(self, values: Mapping[str, V]) -> list[V]:
+        """The objectives as numbers, or arrays of them, of which the least is best."""
         return [
             values[name] if sense == "least" else -values[name] for name, sense in self.objectives.items()
         ]
 
-    def excesses(self, values: Mapping[str, float]) -> list[float]:
+    def excesses(self, values: Mapping[str, V]) -> list[V]:
         """How far each constrained quantity is beyond its limits; at most zero if it obeys them."""
         return [limit.excess(values[name]) for name, limit in self.constraints.items()]
 

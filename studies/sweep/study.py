@@ -225,9 +225,7 @@ def _range(name: str, entry: Any) -> Range:
         )
     keys = [field.alias or key for key, field in Range.model_fields.items()]
     if unknown := [key for key in entry if key not in keys]:
-        meant = {"min": "from", "low": "from", "max": "to", "high": "to"}.get(unknown[0])
-        said = f"did you mean {meant}?" if meant else f"there are {', '.join(keys)}"
-        raise ValueError(f"varied.{name}: unknown key {unknown[0]!r}; {said}")
+        raise ValueError(f"varied.{name}: unknown key {unknown[0]!r}; there are {', '.join(keys)}")
     try:
         return Range(**entry)
     except UserError as error:

@@ -12,7 +12,7 @@ from skfem.models.elasticity import linear_elasticity
 from pinnray.comparison.evaluation.certification import Certifier, body_regions, with_certificates
 from pinnray.comparison.evaluation.differences import Differences
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.report.text import certificate_sentences
+from pinnray.comparison.report.text import certificate_sentence
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.mesher import build_mesh
@@ -215,7 +215,7 @@ def test_only_the_linear_law_under_a_given_contact_is_certified(solution, finger
     pressed = replace(solution.problem, load=Load(kind="cylinder", radius=5.0))
     [found] = with_certificates([evaluation], pressed)
     assert found is evaluation
-    assert "a contact that is given, not found" in certificate_sentences(found, "cylinder")
+    assert "a contact that is given, not found" in certificate_sentence(found, "cylinder")
 
 
 def test_the_regions_are_the_whole_body_once(finger, mesh):
@@ -269,4 +269,4 @@ def test_a_result_that_is_not_finite_is_not_converged(finger):
     (lost,) = with_certificates([sampled(problem, nodal)], problem)
     assert not lost.converged
     assert lost.message == "a given displacement; its displacement or stress is not finite everywhere"
-    assert certificate_sentences(lost) == "given (not converged) has no certificate: it is not finite."
+    assert certificate_sentence(lost) == "given (not converged) has no certificate: it is not finite."

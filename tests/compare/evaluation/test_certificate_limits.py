@@ -7,6 +7,7 @@ import pytest
 
 from pinnray.comparison.evaluation.certificate import Certificate, Region
 from pinnray.comparison.evaluation.certification import with_certificate
+from pinnray.comparison.report.text import certificate_sentence
 
 GOOD = Certificate(
     energy=4.04,
@@ -102,3 +103,9 @@ def test_the_solution_of_fem_has_no_excess_but_rounding():
     assert not changed(fem_energy=1.0, excess=1e-8**2).has_excess
     assert changed(fem_energy=1.0, excess=1.01e-16).has_excess
     assert not changed(fem_energy=1.0, excess=0.99e-16).has_excess
+
+
+def test_a_result_that_misses_energy_says_so(pinn):
+    missing = with_certificate(pinn, replace(GOOD, missed=0.1))
+    assert "reports 2.50\xa0% less energy" in certificate_sentence(missing)
+    assert certificate_sentence(with_certificate(pinn, replace(GOOD, missed=0.01))) == ""

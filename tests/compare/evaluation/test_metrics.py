@@ -5,7 +5,8 @@ import pytest
 
 from pinnray.comparison.evaluation.comparison import pick_reference
 from pinnray.comparison.evaluation.differences import Differences, FieldDifference, weighted_percentile
-from pinnray.comparison.evaluation.metrics import MEANS, MarkerErrors, Scores, TruthDifferences, force_error
+from pinnray.comparison.evaluation.metrics import force_error, marker_errors, truth_differences
+from pinnray.comparison.evaluation.scores import MEANS, Scores
 
 
 @pytest.mark.parametrize(
@@ -25,11 +26,11 @@ def test_weighted_percentile_of_three_values(percent, expected):
 
 def test_errors_at_the_markers_by_hand(observe):
     moved = np.array([[1.0, -2.0], [50.0, 50.0], [-5.0, 6.0]])
-    errors = MarkerErrors.of(moved, observe(np.zeros((3, 2)), hidden=(1,)))
+    errors = marker_errors(moved, observe(np.zeros((3, 2)), hidden=(1,)))
     np.testing.assert_array_equal(errors.ae_u, [1, np.nan, 5])
     np.testing.assert_array_equal(errors.ae_v, [2, np.nan, 6])
     assert errors.model_dump(include=set(MEANS)) == {"mae_u": 3, "mae_v": 4, "mae_sum": 7, "mae_rss": 5}
-    unseen = MarkerErrors.of(moved, observe(np.zeros((3, 2)), hidden=(0, 1, 2)))
+    unseen = marker_errors(moved, observe(np.zeros((3, 2)), hidden=(0, 1, 2)))
     assert np.isnan([getattr(unseen, name) for name in MEANS]).all()
 
 
@@ -105,7 +106,7 @@ def test_differences_from_the_truth_are_those_of_whole_tensors(fem):
     strain[:, 0, 0] += 0.3
     strain[:, 1, 1] += 0.4
     other = replace(fem, strain=strain, displacement=2 * fem.displacement)
-    differences = TruthDifferences.between(other, fem)
+    differences = truth_differences(other, fem)
     assert differences.strain.mean == pytest.approx(0.5)
     assert differences.displacement.rel_l2 == pytest.approx(1)
     assert differences.von_mises.rel_l2 == 0

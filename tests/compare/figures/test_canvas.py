@@ -57,9 +57,9 @@ def test_the_body_at_rest_is_where_the_mesh_has_it_after_it_was_elsewhere(canvas
 
 
 def test_pixels_on_an_edge_are_means_of_the_triangles_in_their_quarters(mesh: TriangleMesh) -> None:
-    """Five pixels a mm, of a body moved by part of a pixel: halves and quarters of red, blue and nothing."""
+    """Five pixels a mm, of a body moved by half a pixel: halves and quarters of red, blue and nothing."""
     coarse = Canvas(mesh, Extent(-1, 13, -5, 1), width=70)
-    image = coarse.picture(halves(mesh), mesh.points + 0.16).astype(int)
+    image = coarse.picture(halves(mesh), mesh.points + 0.1).astype(int)
     covered = image[image[:, :, 3] > 0]
     quarters = np.arange(5)[:, None] / 4
     mixtures = quarters * RED + (1 - quarters) * BLUE

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import pyvista
 
-from pinnray.comparison.evaluation.metrics import Scores
+from pinnray.comparison.evaluation.scores import Scores
 from pinnray.comparison.figures.gallery import GALLERY
 from pinnray.comparison.pipeline.job import Job
 from pinnray.geometry.cache import finger_mesh

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pinnray.cli import main
-from pinnray.comparison.evaluation.metrics import Scores
+from pinnray.comparison.evaluation.scores import Scores
 from pinnray.comparison.report.summary import answers
 from pinnray.runtime.atomic import write_json
 from pinnray.solvers.solution import Estimated, IdentifiedForce

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.certification import with_certificates
-from pinnray.comparison.evaluation.metrics import Scores
+from pinnray.comparison.evaluation.scores import Scores
 from pinnray.comparison.report.summary import answers
 from pinnray.solvers.problem import Problem
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pinnray.studies.optimum.question import Question, load_question
@@ -35,3 +36,6 @@ def test_costs_are_least_at_the_best(tmp_path: Path) -> None:
     assert question.allows(values | {"thinnest_wall": 0.8})
     assert not question.allows(values | {"thinnest_wall": 3.1})
     assert question.samples == 13
+    arrays = {name: np.array([value, value]) for name, value in values.items()}
+    np.testing.assert_allclose(question.costs(arrays), [[-20.0] * 2, [3.0] * 2])
+    np.testing.assert_allclose(question.excesses(arrays), [[-0.5] * 2, [0.1] * 2])
