@@ -19,7 +19,6 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tables import DOCS
-from pinnray.comparison.evaluation.differences import Differences
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import force_error
 from pinnray.geometry.cache import finger_mesh
@@ -143,7 +142,7 @@ class Compared:
     def figures(self, solution: Solution) -> tuple[float, ...]:
         """Time, s, and differences from the reference, % and mm, as `HEADER` has them."""
         own = Evaluation.of(solution, self.problem.mesh)
-        to = Differences.between(own, self.reference)
+        to = own.differences_from(self.reference)
         estimated = solution.history.get("estimated_error", [np.nan])[-1]
         energy = own.energy / self.reference.energy - 1
         shares = (force_error(own, self.reference), energy, float(estimated))

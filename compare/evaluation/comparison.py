@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import scores_of
-from pinnray.comparison.evaluation.scores import Scores
+from pinnray.comparison.evaluation.metrics import solver_scores
+from pinnray.comparison.evaluation.scores import Measurements, Scores
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -48,7 +48,24 @@ class Results:
     @cached_property
     def scores(self) -> Scores:
         """Every number of the run, computed once."""
-        return scores_of(self)
+        given = self.observations
+        return Scores(
+            schema=1,
+            design=self.design.definition(),
+            material=self.material.model_dump(),
+            load=self.load.model_dump(),
+            measurements=Measurements(
+                source=given.label, description=given.source, markers=int(given.visible.sum())
+            ),
+            warnings=tuple(self.warnings),
+            left_out=self.unsupported,
+            failed=self.failed,
+            reference=self.reference.solver,
+            solvers={
+                each.solver: solver_scores(each, given, self.reference, self.truth)
+                for each in self.evaluations
+            },
+        )
 
     def __repr__(self) -> str:
         solvers, seen = ", ".join(each.solver for each in self.evaluations), self.observations

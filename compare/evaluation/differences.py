@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import nan
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
@@ -69,25 +69,3 @@ class Differences(Numbers):
     von_mises: FieldDifference  #: MPa.
     stress: Mapping[str, FieldDifference]  #: Of the in-plane Cauchy stress components, by name, MPa.
     strain: Mapping[str, FieldDifference]  #: Of the in-plane strain components, by name.
-
-    @classmethod
-    def between(cls, evaluation: Any, reference: Any) -> Self:
-        """Differences of an `Evaluation` from another one on the same mesh."""
-
-        def differ(name: str, index: tuple[int, ...] = ()) -> FieldDifference:
-            values, other = (getattr(each, name)[:, *index] for each in (evaluation, reference))
-            return FieldDifference.of(values, other, reference.weights)
-
-        markers = np.abs(evaluation.marker_displacement - reference.marker_displacement).sum(axis=1)
-        energy, own = evaluation.energy, reference.energy
-        displacement, von_mises = differ("displacement"), differ("von_mises")
-        return cls(
-            rel_l2_displacement=displacement.rel_l2,
-            rel_l2_von_mises=von_mises.rel_l2,
-            mae_markers=float(markers.mean()),
-            rel_energy=(energy - own) / own if own else nan,
-            displacement=displacement,
-            von_mises=von_mises,
-            stress={name: differ("stress", index) for name, index in COMPONENTS.items()},
-            strain={name: differ("strain", index) for name, index in COMPONENTS.items()},
-        )

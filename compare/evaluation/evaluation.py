@@ -4,6 +4,7 @@ They are kept as an archive of NumPy arrays: a run is resumed, and a result comp
 """
 
 import json
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic import TypeAdapter
 
 from pinnray.comparison.evaluation.certificate import Certificate
-from pinnray.comparison.evaluation.differences import Differences
+from pinnray.comparison.evaluation.differences import COMPONENTS, Differences, FieldDifference
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
@@ -156,6 +157,27 @@ class Evaluation:
         )
         return all(np.isfinite(values).all() for values in fields)
 
+    def differences_from(self, reference: "Evaluation") -> Differences:
+        """Differences from another evaluation on the same mesh."""
+
+        def differ(name: str, index: tuple[int, ...] = ()) -> FieldDifference:
+            values, other = (getattr(each, name)[:, *index] for each in (self, reference))
+            return FieldDifference.of(values, other, reference.weights)
+
+        markers = np.abs(self.marker_displacement - reference.marker_displacement).sum(axis=1)
+        energy, own = self.energy, reference.energy
+        displacement, von_mises = differ("displacement"), differ("von_mises")
+        return Differences(
+            rel_l2_displacement=displacement.rel_l2,
+            rel_l2_von_mises=von_mises.rel_l2,
+            mae_markers=float(markers.mean()),
+            rel_energy=(energy - own) / own if own else math.nan,
+            displacement=displacement,
+            von_mises=von_mises,
+            stress={name: differ("stress", index) for name, index in COMPONENTS.items()},
+            strain={name: differ("strain", index) for name, index in COMPONENTS.items()},
+        )
+
     def per_triangle(self, values: FloatArray) -> FloatArray:
         """Area-weighted mean over each triangle: values at the quadrature points (q, ...) to (t, ...)."""
         weights = self.weights.reshape(-1, 3)
@@ -217,4 +239,4 @@ def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None 
     energy = solution.energy * (1 - error.energy_norm**2)
     better = Evaluation.of(replace(solution, field=error.field, energy=energy, states=()), mesh, markers)
     at_markers = np.abs(better.marker_displacement - own.marker_displacement)
-    return replace(own, uncertainty=Differences.between(better, own), marker_uncertainty=at_markers)
+    return replace(own, uncertainty=better.differences_from(own), marker_uncertainty=at_markers)

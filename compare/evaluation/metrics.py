@@ -5,15 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from pinnray.comparison.evaluation.differences import Differences, FieldDifference
+from pinnray.comparison.evaluation.differences import FieldDifference
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.scores import (
     MEANS,
     FigureScores,
     MarkerErrors,
     Means,
-    Measurements,
-    Scores,
     SolverScores,
     TruthDifferences,
     Uncertainty,
@@ -24,32 +22,12 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.finger_figures import FingerFigures
 
 
-def scores_of(comparison: Any) -> Scores:
-    """Compute every number of finished `Results`."""
-    observations = comparison.observations
-    return Scores(
-        schema=1,
-        design=comparison.design.definition(),
-        material=comparison.material.model_dump(),
-        load=comparison.load.model_dump(),
-        measurements=Measurements(
-            source=observations.label,
-            description=observations.source,
-            markers=int(observations.visible.sum()),
-        ),
-        warnings=tuple(comparison.warnings),
-        left_out=comparison.unsupported,
-        failed=comparison.failed,
-        reference=comparison.reference.solver,
-        solvers={each.solver: _solver_scores(each, comparison) for each in comparison.evaluations},
-    )
-
-
-def _solver_scores(evaluation: Evaluation, comparison: Any) -> SolverScores:
-    observations, reference, truth = comparison.observations, comparison.reference, comparison.truth
+def solver_scores(
+    evaluation: Evaluation, observations: Observations, reference: Evaluation, truth: Evaluation | None
+) -> SolverScores:
+    """Compute every number of a solver."""
     plain = ("family", "twin", "law", "message", "energy", "reaction", "stats", "certificate")
     markers = marker_errors(evaluation.shown_displacement, observations)
-    between = Differences.between(evaluation, reference)
     numbers: dict[str, Any] = {name: getattr(evaluation, name) for name in plain} | {
         "status": "converged" if evaluation.converged else "not converged",
         "seconds": evaluation.stats.get("seconds"),
@@ -59,7 +37,8 @@ def _solver_scores(evaluation: Evaluation, comparison: Any) -> SolverScores:
         "held_out": _held_out(evaluation, observations),
         "rigid_motion_off": _without_rigid_motion(evaluation, observations),
         "uncertainty": _uncertainty(evaluation),
-        "to_reference": dict(between) | {"reference_uncertainty": reference.uncertainty},
+        "to_reference": dict(evaluation.differences_from(reference))
+        | {"reference_uncertainty": reference.uncertainty},
         "to_truth": None if truth is None else truth_differences(evaluation, truth),
         "force_to_truth_rel": None if truth is None else force_error(evaluation, truth),
     }

@@ -10,7 +10,6 @@ from scipy.sparse import csr_matrix
 from skfem.models.elasticity import linear_elasticity
 
 from pinnray.comparison.evaluation.certification import Certifier, body_regions, with_certificates
-from pinnray.comparison.evaluation.differences import Differences
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.report.text import certificate_sentence
 from pinnray.geometry.cache import finger_mesh
@@ -242,7 +241,7 @@ def test_the_regions_are_where_they_are_called(finger):
 def test_the_errors_of_the_regions_add_up_to_that_of_the_body(finger, solution):
     problem = Problem(finger)
     evaluation = sampled(problem, disturbed(problem, 1e-3))
-    differences = Differences.between(evaluation, Evaluation.of(solution, finger))
+    differences = evaluation.differences_from(Evaluation.of(solution, finger))
     regions = Certifier(problem).certificate(evaluation).regions.values()
     for name, whole in (("displacement", differences.displacement), ("von_mises", differences.von_mises)):
         parts = [getattr(region, f"rel_l2_{name}") for region in regions]

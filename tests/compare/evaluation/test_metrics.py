@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.comparison import pick_reference
-from pinnray.comparison.evaluation.differences import Differences, FieldDifference, weighted_percentile
+from pinnray.comparison.evaluation.differences import FieldDifference, weighted_percentile
 from pinnray.comparison.evaluation.metrics import force_error, marker_errors, truth_differences
 from pinnray.comparison.evaluation.scores import MEANS, Scores
 
@@ -79,7 +79,7 @@ def test_a_reference_of_zeros_has_no_relative_difference():
 
 
 def test_a_tenth_more_everywhere(pinn, fem):
-    differences = Differences.between(pinn, fem)
+    differences = pinn.differences_from(fem)
     for difference in (differences.displacement, differences.von_mises, differences.stress["xy"]):
         assert difference.rel_l2 == pytest.approx(0.1)
     assert differences.rel_energy == pytest.approx(0.21)
@@ -89,7 +89,7 @@ def test_a_tenth_more_everywhere(pinn, fem):
 def test_strain_differences_tell_components_apart(fem):
     strain = fem.strain.copy()
     strain[:, 0, 0] += 0.5
-    differences = Differences.between(replace(fem, strain=strain), fem)
+    differences = replace(fem, strain=strain).differences_from(fem)
     assert {name: d.mean for name, d in differences.strain.items()} == pytest.approx(
         {"xx": 0.5, "yy": 0, "xy": 0}
     )
