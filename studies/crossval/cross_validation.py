@@ -225,6 +225,6 @@ def _result(
         study,
         sample_table(rows),
         {truth: seeds[0][0].origin for (truth, _), seeds in observations.items()},
-        {truth: next(iter(each.values()))[0].contact for truth, each in truths.items()},
+        {truth: next(iter(each.values()))[0] for truth, each in truths.items()},
         failed,
     )

@@ -146,15 +146,14 @@ class FoldRunner:
     def _against_truth(self, solution: Solution, sampled: SampledField) -> dict[str, Any]:
         """Force, place of the contact and stated intervals against the truth at the full load."""
         truth, identified = self._truths[0], solution.identified
-        contact = truth.contact
         found: dict[str, Any] = {}
         if np.isfinite(solution.reaction).all():
-            found["force_error"] = float(np.linalg.norm(solution.reaction)) / contact.force - 1
+            found["force_error"] = float(np.linalg.norm(solution.reaction)) / truth.force - 1
         if identified:
-            found["force_within_stated"] = identified.size.low <= contact.force <= identified.size.high
+            found["force_within_stated"] = identified.size.low <= truth.force <= identified.size.high
             if place := identified.position:
-                found["position_error_mm"] = place.value - contact.position
-                found["position_within_stated"] = place.low <= contact.position <= place.high
+                found["position_error_mm"] = place.value - truth.position
+                found["position_within_stated"] = place.low <= truth.position <= place.high
         if solution.uncertainty and (stated := solution.uncertainty.von_mises):
             inside = self.sampler.inside_of(solution, self.problem.mesh)
             errors = sampled.state(solution.problem).von_mises - truth.sampled.state(self._true_law).von_mises

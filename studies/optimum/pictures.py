@@ -1,4 +1,4 @@
-"""Pictures of a search: the front among all runs, its growth, and the fingers on it."""
+"""Pictures of a search: the front among all runs, and the fingers on it."""
 
 from collections.abc import Sequence
 
@@ -50,20 +50,6 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
             )
         axes.set(xlabel=_axis(first), ylabel=_axis(second))
         axes.legend(loc="best")
-    return drawn
-
-
-def draw_growth(optimum: Optimum) -> Figure:
-    """Draw the hypervolume over the number of runs."""
-    start = optimum.study.samples or 0
-    with figure(2.4) as drawn:
-        write_heading(
-            drawn, "Hypervolume over the runs", f"the first {start} runs are samples, then come proposals"
-        )
-        axes = axes_at(drawn, (0.7, 0.5, WIDTH - 0.9, 1.4))
-        axes.plot(np.arange(1, len(optimum.volumes) + 1), optimum.volumes, color=BLUE, lw=1.4)
-        axes.axvline(start, color=MUTED, lw=0.8, ls=":")
-        axes.set(xlabel="runs", ylabel="hypervolume", ylim=(0, None), xlim=(0, None))
     return drawn
 
 

@@ -17,7 +17,7 @@ from pinnray.runtime.output_folder import check_resumable_folder, locked
 from pinnray.runtime.stages import Stages
 from pinnray.studies.emulator.emulator import fitted_emulator
 from pinnray.studies.emulator.inputs import Inputs
-from pinnray.studies.optimum.front import hypervolume, reference_point, unbeaten
+from pinnray.studies.optimum.front import reference_point, unbeaten
 from pinnray.studies.optimum.question import ENOUGH, Question
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement
@@ -43,12 +43,10 @@ class Optimum(Sweep):
     Attributes:
         study: The question.
         front: Numbers of the runs on the Pareto front, ordered by the first objective.
-        volumes: Hypervolume after each run, shape (n,), in the product of the objectives' units.
     """
 
     study: Question
     front: list[int]
-    volumes: FloatArray
 
     __repr__ = brief
 
@@ -137,7 +135,8 @@ def _proposed(
         return more
     inputs = Inputs(question, job.task(0, fingers[0]).definition)
     with threadpool_limits(1):  # the same sums, whatever the number of cores
-        emulator = fitted_emulator(Sweep(question, fingers, measured), inputs, fewest=ENOUGH, quick=True)
+        known = Sweep(question, fingers, measured)
+        emulator = fitted_emulator(known, inputs, names=question.names, fewest=ENOUGH, quick=True)
         costs = _allowed_costs(question, measured)
         every = np.array([question.costs(each.values) for each in measured if each.state == "done"])
         found = proposals(
@@ -175,16 +174,10 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
             "constraint, widen the ranges or take a smaller stroke"
         )
     costs = np.array([question.costs(each.values) for each in allowed])
-    converged = [question.costs(each.values) for each in measured if each.state == "done"]
-    reference = reference_point(np.array(converged))
     on_front = [each.number for each, best in zip(allowed, unbeaten(costs), strict=True) if best]
     first = next(iter(question.objectives))
     on_front.sort(key=lambda number: measured[number].values[first])
-    volumes = [
-        hypervolume(costs[[each.number <= number for each in allowed]], reference)
-        for number in range(len(measured))
-    ]
-    return Optimum(question, fingers, measured, on_front, np.array(volumes))
+    return Optimum(question, fingers, measured, on_front)
 
 
 def _known_fingers(file: Path) -> list[dict[str, Value]]:

@@ -84,11 +84,6 @@ def test_the_known_front_is_found(found: Optimum) -> None:
     assert all(each["von_mises"] <= 3.2 for each in values)
 
 
-def test_the_hypervolume_grows_past_that_of_the_samples(found: Optimum) -> None:
-    assert (np.diff(found.volumes) >= -1e-12).all()
-    assert found.volumes[-1] > 1.05 * found.volumes[13]
-
-
 @pytest.mark.slow
 def test_a_search_that_was_stopped_goes_on_to_the_same_runs(found, tmp_path, monkeypatch):
     def interrupted(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
