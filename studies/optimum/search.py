@@ -14,6 +14,7 @@ from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import brief
 from pinnray.runtime.output_folder import check_resumable_folder, locked
+from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
 from pinnray.studies.emulator.emulator import fitted_emulator
 from pinnray.studies.emulator.inputs import Inputs
@@ -25,7 +26,6 @@ from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import Journal, opened
 from pinnray.studies.sweep.study import Value
 from pinnray.studies.sweep.sweep import JOURNAL, Sweep, finish
-from pinnray.studies.sweep.workers import Workers
 
 QUESTION_FILE, FINGERS_FILE = "question.json", "fingers.json"
 
@@ -77,7 +77,7 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
     with (
         locked(job.out),
         opened(job.out / JOURNAL) as journal,
-        Workers(job.processes, job.scheduler) as workers,
+        Pool(job.processes) as pool,
     ):
         write_json(job.out / QUESTION_FILE, definition)
         journal.forget("failed")
@@ -90,7 +90,7 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
         while True:
             with stages.stage(f"runs {done + 1} to {len(fingers)}") as progress:
                 tasks = {n: job.task(n, finger) for n, finger in enumerate(fingers)}
-                finish(tasks, journal, workers, progress)
+                finish(tasks, journal, pool, progress)
             done = len(fingers)
             if done >= question.runs:
                 return _optimum(question, fingers, journal)

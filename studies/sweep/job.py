@@ -109,8 +109,7 @@ class StudyJob(Generic[S]):
         study: The study.
         folder: Folder from which paths in the study are meant.
         out: Output folder; samples that an earlier start finished there are kept.
-        processes: Worker processes on this machine.
-        scheduler: Address of a Dask scheduler whose workers are used instead.
+        processes: Worker processes.
         finger: The finger from which the samples differ, in place of the study's design.
     """
 
@@ -118,7 +117,6 @@ class StudyJob(Generic[S]):
     folder: Path
     out: Path
     processes: int = 1
-    scheduler: str | None = None
     finger: Finger | None = None
 
     def task(self, number: int, sample: Mapping[str, Value]) -> Task:

@@ -141,8 +141,8 @@ def test_the_command_writes_the_front(tmp_path, capsys, monkeypatch):
     line = ["optimise", str(path), "--out", str(out), "--processes", "1", "--pictures", "svg"]
     assert main(line) == 0
     assert "Fingers on the front" in capsys.readouterr().out
-    assert (out / "front.html").read_text(encoding="utf-8").count("<img alt=") == 3
-    assert {path.name for path in out.glob("*.svg")} == {"front.svg", "fingers.svg", "growth.svg"}
+    assert (out / "front.html").read_text(encoding="utf-8").count("<img alt=") == 2
+    assert {path.name for path in out.glob("*.svg")} == {"front.svg", "fingers.svg"}
     designs = sorted((out / "front").glob("*.toml"))
     assert designs
     for design in map(load_design, designs):

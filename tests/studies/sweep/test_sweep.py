@@ -6,7 +6,6 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pandas as pd
@@ -23,9 +22,8 @@ from pinnray.studies.sweep.quantities import quantities
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import opened
 from pinnray.studies.sweep.study import load_study
-from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep, run_tasks
+from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
 from pinnray.studies.sweep.tables import failure_grid, sample_table
-from pinnray.studies.sweep.workers import Workers
 from tests.conftest import inline
 from tests.studies.sweep.workers import answered, die_at_one, hang_at_one
 
@@ -193,27 +191,6 @@ def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
     path.write_text(STUDY.format(samples=6).replace("mesh_size = 2.0", "mesh_size = 1.9"), encoding="utf-8")
     assert main(["sweep", str(path), "--out", str(swept / "out")]) == 2
     assert "holds a sweep with other settings (study.mesh_size)" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(tmp_path):
-    from distributed import KilledWorker, LocalCluster
-
-    def dying(task: SimpleNamespace, report: object) -> list[Measurement]:
-        if task.number == 1:
-            raise KilledWorker("sample", SimpleNamespace(address="tcp://a"), 0)  # as the scheduler does
-        return answered(task)
-
-    tasks = {number: SimpleNamespace(number=number) for number in range(3)}
-    with (
-        LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
-        Workers(1, cluster.scheduler_address) as workers,
-        opened(tmp_path / "journal.sqlite") as journal,
-    ):
-        for part in ({0: tasks[0]}, {1: tasks[1], 2: tasks[2]}):
-            run_tasks(dying, part, tasks, journal, workers, deaths=8)
-        found = {each.number: each.state for each in journal.measurements()}
-    assert found == {0: "done", 1: "failed", 2: "done"}
 
 
 def test_a_journal_of_others_removes_no_file(tmp_path: Path) -> None:
