@@ -19,7 +19,7 @@ from pinnray.studies.optimum.question import Question
 from pinnray.studies.optimum.search import Optimum
 from pinnray.studies.sweep.job import StudyJob, Task
 from pinnray.studies.sweep.page import write_page
-from pinnray.studies.sweep.study import title, unit_of
+from pinnray.studies.sweep.study import title
 from pinnray.studies.sweep.tables import failure_grid, sample_table
 
 PAGE = "front.html"
@@ -30,12 +30,6 @@ FILES = (
 )
 
 CIRCLE = " Circle: the cylinder where it ends."
-
-AT_AN_END = 0.02
-"""Share of a range within which a value counts as at its end."""
-
-MOST_AT_ENDS = 2 / 3
-"""Share of a front's fingers at ends of a parameter's range from which it is told."""
 
 DRAWN = 6
 """Largest number of fingers that are drawn."""
@@ -116,31 +110,8 @@ def front_sentences(optimum: Optimum, command: str = COMMAND) -> list[str]:
         f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are on the "
         f"front: none of them is beaten in every objective by another run.{itself} "
         "An emulator proposed fingers; all numbers here are the solver's.",
-        *ends_sentence(optimum),
         "front/01.toml is the shape of the first finger of the table, for `pinnray design`. "
         f"`{command.format('problems/01.toml')}` solves it with load, material and solver of this search.",
-    ]
-
-
-def ends_sentence(optimum: Optimum) -> list[str]:
-    """Which parameters of the front's fingers are at ends of their ranges, in a sentence; else nothing."""
-    count, found = len(optimum.front), []
-    for name, values in optimum.study.varied.items():
-        if values.values is not None:
-            continue
-        low, high = values.ends
-        places = [(float(optimum.samples[run][name]) - low) / (high - low) for run in optimum.front]
-        lower = sum(place <= AT_AN_END for place in places)
-        upper = sum(place >= 1 - AT_AN_END for place in places)
-        if lower + upper >= MOST_AT_ENDS * count:
-            unit = f" {unit_of(name)}".rstrip()
-            ends = ((lower, f"{low:g}{unit}"), (upper, f"{high:g}{unit}"))
-            found.append(f"{name} ({', '.join(f'{many} at {end}' for many, end in ends if many)})")
-    if not found:
-        return []
-    return [
-        f"Of the {count} fingers most lie at an end of the range of {', '.join(found)}: wider ranges would "
-        "give other fingers."
     ]
 
 

@@ -1,8 +1,6 @@
 """The search for a Pareto front: rounds of an emulator's proposals, each judged by the solver."""
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -16,6 +14,7 @@ from pinnray.runtime.notebook import brief
 from pinnray.runtime.output_folder import check_resumable_folder, locked
 from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
+from pinnray.runtime.text_files import read_json
 from pinnray.studies.emulator.emulator import fitted_emulator
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.optimum.front import reference_point, unbeaten
@@ -81,16 +80,15 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
     ):
         write_json(job.out / QUESTION_FILE, definition)
         journal.forget("failed")
-        fingers = _known_fingers(job.out / FINGERS_FILE)
-        start = len(samples(question))
-        if not fingers:
-            fingers = starting_fingers(job, start)
-            _keep_fingers(job.out / FINGERS_FILE, fingers)
+        file, start = job.out / FINGERS_FILE, len(samples(question))
+        if not file.exists():
+            write_json(file, {"fingers": starting_fingers(job, start)})
+        fingers: list[dict[str, Value]] = read_json(file, "search")["fingers"]  # also of an earlier start
         done = 0
         while True:
             with stages.stage(f"runs {done + 1} to {len(fingers)}") as progress:
                 tasks = {n: job.task(n, finger) for n, finger in enumerate(fingers)}
-                finish(tasks, journal, pool, progress)
+                finish(tasks, journal, pool, progress, question.time_limit)
             done = len(fingers)
             if done >= question.runs:
                 return _optimum(question, fingers, journal)
@@ -98,7 +96,7 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
             with stages.stage(f"proposals after {done}") as progress:
                 progress(0.0, "the emulator is fitted and searched")
                 fingers = fingers + _proposed(job, fingers, journal, count)
-            _keep_fingers(job.out / FINGERS_FILE, fingers)
+            write_json(file, {"fingers": fingers})
 
 
 def starting_fingers(job: StudyJob[Question], count: int) -> list[dict[str, Value]]:
@@ -178,18 +176,3 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
     first = next(iter(question.objectives))
     on_front.sort(key=lambda number: measured[number].values[first])
     return Optimum(question, fingers, measured, on_front)
-
-
-def _known_fingers(file: Path) -> list[dict[str, Value]]:
-    """The fingers that an earlier start has chosen."""
-    if not file.exists():
-        return []
-    try:
-        found: list[dict[str, Value]] = json.loads(file.read_text(encoding="utf-8"))["fingers"]
-    except (ValueError, KeyError, OSError):
-        raise UserError(f"{file} is damaged; remove its folder to search again") from None
-    return found
-
-
-def _keep_fingers(file: Path, fingers: list[dict[str, Value]]) -> None:
-    write_json(file, {"fingers": fingers})

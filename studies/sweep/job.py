@@ -51,7 +51,6 @@ class Task:
         settings: Its settings.
         density: Of the material, g/cm^3.
         checkpoints: Folder of a training that can be resumed; None for none.
-        time_limit: Time after which it is stopped, s; None for none.
         fields: The field to keep; None for none.
     """
 
@@ -63,7 +62,6 @@ class Task:
     settings: dict[str, Value]
     density: float
     checkpoints: Path | None = None
-    time_limit: float | None = None
     fields: FieldOrder | None = None
 
     def problem(self) -> tuple[Solver, Problem]:
@@ -146,7 +144,6 @@ class StudyJob(Generic[S]):
             {**study.settings, **settings},
             study.density,
             checkpoints,
-            study.time_limit,
             self._field_order(number),
         )
 

@@ -29,39 +29,35 @@ def draw_pairs(sweep: Sweep) -> Figure:
     parameters = list(sweep.study.varied)
     good = sweep.good[:MOST_DOTS]
     size = float(np.clip(30 / np.sqrt(len(good)), 1.0, 3.5))
-    left, head, foot, gap, tall = 1.1, 0.5, 0.95, 0.12, 0.62
-    width = (WIDTH - left - 0.1 - gap * (len(parameters) - 1)) / len(parameters)
-    with figure(head + foot + (tall + gap) * len(names)) as drawn:
+    height = 1.45 + 0.74 * len(names)
+    room = {"left": 1.1 / WIDTH, "right": 1 - 0.1 / WIDTH, "top": 1 - 0.5 / height, "bottom": 0.95 / height}
+    with figure(height) as drawn:
         note = f"{len(good)} of {len(sweep.good)} samples"
         write_heading(drawn, f"Quantities over parameters: {sweep.study.name}", note)
-        for row, name in enumerate(names):
-            values = np.array([each.values[name] for each in good])
-            for column, parameter in enumerate(parameters):
-                place = (left + column * (width + gap), head + row * (tall + gap), width, tall)
-                axes = axes_at(drawn, place)
+        grid = drawn.subplots(
+            len(names), len(parameters), sharex="col", sharey="row", squeeze=False, gridspec_kw=room
+        )
+        for row, name in zip(grid, names, strict=True):
+            row[0].set_ylabel(_label(name), rotation=0, ha="right", va="center")
+            for axes, parameter in zip(row, parameters, strict=True):
                 texts = [sweep.samples[each.number][parameter] for each in good]
                 choices = sweep.study.varied[parameter].values
-                x = np.array([choices.index(text) if choices else text for text in texts], dtype=np.float64)
+                x = [choices.index(text) if choices else text for text in texts]
+                values = [each.values[name] for each in good]
                 axes.plot(x, values, "o", ms=size, color="#0072b2", alpha=0.7, mew=0, clip_on=False, zorder=3)
                 axes.tick_params(length=2, pad=1.5)
                 axes.locator_params(axis="y", nbins=3)
-                ends = _ends(sweep, parameter)
-                ticks = [0.0, len(choices) - 1.0] if choices else [float(end) for end in ends]
-                room = 0.06 * (ticks[1] - ticks[0] or 1.0)
-                axes.set_xlim(ticks[0] - room, ticks[1] + room)  # both ends have their numbers
-                axes.set_xticks(ticks)
                 axes.margins(y=0.1)
-                if column:
-                    axes.set_yticklabels([])
-                else:
-                    axes.set_ylabel(_label(name), rotation=0, ha="right", va="center")
-                if row < len(names) - 1:
-                    axes.set_xticklabels([])
-                else:
-                    labels = axes.set_xticklabels(ends)
-                    labels[0].set_horizontalalignment("left")
-                    labels[-1].set_horizontalalignment("right")
-                    axes.set_xlabel(_wrapped(parameter, narrow=len(parameters) > WIDE), labelpad=2)
+        for axes, parameter in zip(grid[-1], parameters, strict=True):
+            ends = _ends(sweep, parameter)
+            choices = sweep.study.varied[parameter].values
+            low, high = (0.0, len(choices) - 1.0) if choices else map(float, ends)
+            room_beside = 0.06 * (high - low or 1.0)
+            axes.set_xlim(low - room_beside, high + room_beside)  # both ends have their numbers
+            labels = axes.set_xticks([low, high], ends)
+            labels[0].label1.set_horizontalalignment("left")
+            labels[-1].label1.set_horizontalalignment("right")
+            axes.set_xlabel(_wrapped(parameter, narrow=len(parameters) > WIDE), labelpad=2)
     return drawn
 
 

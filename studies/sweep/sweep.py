@@ -20,7 +20,7 @@ from pinnray.runtime.stages import Stages
 from pinnray.runtime.text_files import read_json
 from pinnray.solvers.solver import Progress, silent
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, sampled
+from pinnray.studies.sweep.measurement import Measurement, sampled
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import Journal, opened
 from pinnray.studies.sweep.study import Study, Value
@@ -33,9 +33,10 @@ FEW = 5
 DEATHS = 8
 """Deaths of its worker after which a sample counts as failed, for any process may be killed by chance."""
 
-GRACE, GRACE_S = 1.5, 10.0
-"""A worker whose sample does not stop at its limit of time is ended after so many times the limit and so many
-seconds more, for what it has to load first."""
+OUT_OF_TIME = "stopped at the time limit"
+
+GRACE_S = 10.0
+"""Time that a worker has besides the limit of its sample, for what it has to load first, s."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +100,18 @@ def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
         if before.time_limit != job.study.time_limit:
             journal.forget("not converged", OUT_OF_TIME)
         with stages.stage("samples") as progress, Pool(job.processes) as pool:
-            finish(tasks, journal, pool, progress)
+            finish(tasks, journal, pool, progress, job.study.time_limit)
         found = [each for each in journal.measurements() if each.number in tasks]
         return Sweep(job.study, all_samples, found)
 
 
-def finish(tasks: Mapping[int, Task], journal: Journal, pool: Pool, progress: Progress = silent) -> None:
+def finish(
+    tasks: Mapping[int, Task],
+    journal: Journal,
+    pool: Pool,
+    progress: Progress = silent,
+    time_limit: float | None = None,
+) -> None:
     """Run the tasks that have no result in the journal, by the samples' numbers, and keep each at once.
 
     The first of all runs alone: it compiles the forms of FEniCS, which all would compile at once if its cache
@@ -112,10 +119,9 @@ def finish(tasks: Mapping[int, Task], journal: Journal, pool: Pool, progress: Pr
     """
     known = journal.numbers()
     waiting = {number: task for number, task in tasks.items() if number not in known}
-    limit = next((task.time_limit for task in tasks.values()), None)
     alone = 0 if known else 1
     for part in (dict(islice(waiting.items(), alone)), dict(islice(waiting.items(), alone, None))):
-        run_tasks(sampled, part, tasks, journal, pool, progress, time_limit=limit, deaths=DEATHS)
+        run_tasks(sampled, part, tasks, journal, pool, progress, time_limit=time_limit, deaths=DEATHS)
 
 
 def run_tasks(
@@ -149,7 +155,7 @@ def run_tasks(
         done += 1
         progress(done / len(samples), f"{done} of {len(samples)} samples")
 
-    hard = inf if time_limit is None else GRACE * time_limit + GRACE_S
+    hard = inf if time_limit is None else time_limit + GRACE_S
     if pool is None:
         answers: Iterable[Any] = ((name, work(task, partial(keep, name))) for name, task in tasks.items())
     else:

@@ -147,17 +147,6 @@ def test_another_name_or_marker_does_the_same_study(swept: Path, tmp_path: Path)
     assert after == load_sweep(swept / "out").measurements
 
 
-def test_a_finger_that_takes_too_long_is_stopped_and_told(tmp_path: Path) -> None:
-    study = load_study(study_file(tmp_path, 1))
-    study = study.model_copy(update={"solver": "fem-nonlinear", "time_limit": 1e-3})
-    job = StudyJob(study, tmp_path, tmp_path / "out", 1)
-    sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
-    found = measured(job.task(0, sample))
-    assert (found.state, found.message.partition(":")[0]) == ("not converged", "stopped at the time limit")
-    sweep = Sweep(study, [sample], [found])
-    assert failure_grid(sweep).rows == [("not converged", "1", "stopped at the time limit", "0")]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("ending", "limit", "state", "said"),
