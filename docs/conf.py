@@ -56,7 +56,7 @@ nitpick_ignore_regex = [
         "py:.*",
         r"(numpy|pathlib|annotated_types|collections\.abc|types|pandas|pd|matplotlib|pydantic|pyvista)\..*",
     ),
-    ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|(.*\.)?T|.*Options)"),
+    ("py:.*", r"(Figure|Path|ArrayLike|Array|FloatArray|Value|shapely\..*|(.*\.)?T|.*Options)"),
     ("py:.*", r"pinnray\.comparison\.(figures|evaluation\.truths)\..*"),
     ("py:.*", r"pinnray\.geometry\.(finger\.(rules|parameters)|drawing\.placement)\..*"),
     ("py:.*", r"pinnray\.(film|measurements|robots|runtime|studies|vision)\..*"),

@@ -1,13 +1,15 @@
-"""Lines of JSON about the frames of a live film, for other programs: markers, and the indenter's force."""
+"""Lines about the frames of a live film, shown or published as JSON: markers, and the indenter's force."""
 
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import Literal, Self, TextIO
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
+from rich.live import Live
+from rich.text import Text
 
 from pinnray.film.force_estimate import LiveForce
 from pinnray.runtime.arrays import FloatArray
@@ -62,50 +64,64 @@ class FrameLine(BaseModel):
         )
 
 
+def frame_lines(force: LiveForce | None, *sinks: Callable[[FrameLine], None]) -> Watch:
+    """What to give each frame of a film to: its line, with the newest force, goes to every sink.
+
+    Args:
+        force: Follows the force, if anything does.
+        sinks: Such as a `Publisher` or `shown_line`.
+    """
+    start: FloatArray | None = None
+
+    def watch(frame: Frame, detections: FrameDetections) -> None:
+        nonlocal start
+        start = detections.places if start is None else start
+        if force is not None:
+            force.watch(frame, detections)
+        line = FrameLine.of(frame, detections, start, force.newest_row() if force else None)
+        for sink in sinks:
+            sink(line)
+
+    return watch
+
+
+def shown_line(live: Live, force: LiveForce | None) -> Callable[[FrameLine], None]:
+    """A function that shows the displacements of a frame, mm, and below them the newest force in words."""
+
+    def show(line: FrameLine) -> None:
+        cells = ["–" if moved is None else "{:+.2f},{:+.2f}".format(*moved) for moved in line.moved_mm]
+        lines = [f"{line.time_s:8.2f} s  {'  '.join(cells)}", *([force.line()] if force else [])]
+        live.update(Text("\n".join(lines), no_wrap=True, overflow="ellipsis"))
+
+    return show
+
+
 class Publisher(AbstractContextManager["Publisher"]):
-    """Writes a line for each frame as it is tracked.
+    """Writes a line of JSON for each frame as it is tracked.
 
     Args:
         target: A file, a named pipe, which is opened when its reader does so, or - for the standard output.
-        force: Follows the force, if anything does.
 
     Raises:
         UserError: If the file cannot be written.
     """
 
-    def __init__(self, target: str, force: LiveForce | None = None) -> None:
-        self._target, self._force = target, force
-        self._start: FloatArray | None = None
-        self._file: TextIO | None = None
-
-    def __enter__(self) -> Self:
+    def __init__(self, target: str) -> None:
+        self._target = target
         try:
-            self._file = sys.stdout if self._target == "-" else Path(self._target).open("w", encoding="utf-8")
+            self._file = sys.stdout if target == "-" else Path(target).open("w", encoding="utf-8")  # noqa: SIM115
         except OSError as error:
-            raise UserError(f"{self._target} cannot be written: {error.strerror}") from None
-        return self
+            raise UserError(f"{target} cannot be written: {error.strerror}") from None
 
     def __exit__(self, *error: object) -> None:
-        if self._file is not None and self._file is not sys.stdout:
-            with suppress(BrokenPipeError):  # which `_write` has told of
+        if self._file is not sys.stdout:
+            with suppress(BrokenPipeError):  # which `__call__` has told of
                 self._file.close()
 
-    def after(self, watch: Watch) -> Watch:
-        """What a frame is given to: first to `watch`, then it is published."""
-
-        def see(frame: Frame, detections: FrameDetections) -> None:
-            watch(frame, detections)
-            if self._start is None:
-                self._start = detections.places
-            newest = self._force.newest_row() if self._force else None
-            self._write(FrameLine.of(frame, detections, self._start, newest).model_dump_json())
-
-        return see
-
-    def _write(self, line: str) -> None:
-        assert self._file is not None
+    def __call__(self, line: FrameLine) -> None:
+        """Write a line at once."""
         try:
-            print(line, file=self._file, flush=True)
+            print(line.model_dump_json(), file=self._file, flush=True)
         except BrokenPipeError:
             raise UserError(f"the reader of {self._target} has gone") from None
 

@@ -7,16 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.live import Live
 from rich.table import Table
-from rich.text import Text
 
 from pinnray.comparison.figures import Picture
 from pinnray.film.film import Film
-from pinnray.film.force_estimate import LiveForce
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import NONE, Cell, significant, terminal_table, write_csv
@@ -186,30 +182,6 @@ def track_summary(tracking: Tracking, observations: Observations) -> dict[str, A
         "warnings": list(tracking.warnings),
         "description": observations.source,
     }
-
-
-def displacement_line(live: Live, force: LiveForce | None = None) -> Callable[[Frame, FrameDetections], None]:
-    """A function that shows the displacements, mm, since its first frame; a dash for an invisible marker.
-
-    Args:
-        live: Where they are shown.
-        force: Follows the force, which is shown below them.
-    """
-    start: FloatArray | None = None
-
-    def show(frame: Frame, detections: FrameDetections) -> None:
-        nonlocal start
-        if start is None:
-            start = detections.places
-        if force is not None:
-            force.watch(frame, detections)
-        moved = (detections.places - start).tolist()
-        seen = np.isfinite(detections.markers.radii)
-        cells = [f"{u:+.2f},{v:+.2f}" if known else "–" for (u, v), known in zip(moved, seen, strict=True)]
-        lines = [f"{frame.time:8.2f} s  {'  '.join(cells)}", *([force.line()] if force else [])]
-        live.update(Text("\n".join(lines), no_wrap=True, overflow="ellipsis"))
-
-    return show
 
 
 def track_table(tracking: Tracking, observations: Observations) -> Table:

@@ -20,6 +20,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.processes.worker import Task, run_task
 
 TIMEOUT_S = 300.0
+"""Time limit of a process that meshes, reads or writes."""
 
 CAD_FORMATS = ("step", "stl", "dxf", "svg")
 
@@ -33,7 +34,6 @@ def finger_mesh(
     settings: MeshSettings | None = None,
     across: int | None = None,
     cache_dir: Path | None = None,
-    timeout_s: float = TIMEOUT_S,
     keep: bool = True,
 ) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before.
@@ -44,7 +44,6 @@ def finger_mesh(
             sizes.
         across: Least number of elements through a wall; None means that of the mesher, 3.
         cache_dir: Folder of the cache; by default `cache_folder()`.
-        timeout_s: Time limit, s.
         keep: Whether the cache keeps the mesh.
 
     Raises:
@@ -58,7 +57,7 @@ def finger_mesh(
     sizes = settings.model_dump()
     task = Task(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))
     entry = _entry("mesh", finger.digest, (sizes, across), ".npz", cache_dir)
-    return _made(entry, task, timeout_s, TriangleMesh.load, TriangleMesh.save if keep else None)
+    return _made(entry, task, TriangleMesh.load, TriangleMesh.save if keep else None)
 
 
 def mesh_sizes(
@@ -83,7 +82,6 @@ def drawn_finger(
     description: Description,
     *,
     cache_dir: Path | None = None,
-    timeout_s: float = TIMEOUT_S,
 ) -> DrawnFinger:
     """The finger of a drawing, from the cache if the same file was read before.
 
@@ -91,7 +89,6 @@ def drawn_finger(
         file: STEP, DXF, SVG or MSH.
         description: Clamp, contact and markers; what it leaves out is the drawing's own or proposed.
         cache_dir: Folder of the cache; by default `cache_folder()`.
-        timeout_s: Time limit, s.
 
     Raises:
         UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
@@ -101,7 +98,7 @@ def drawn_finger(
     lines = description.model_dump(mode="json")
     task = Task(f"reading {file.name}", _reader, (file.absolute(), lines))  # the child has its own folder
     entry = _entry("drawing", file_digest(file), (file.name, lines), ".json", cache_dir)
-    return _made(entry, task, timeout_s, DrawnFinger.load, DrawnFinger.save)
+    return _made(entry, task, DrawnFinger.load, DrawnFinger.save)
 
 
 def cad_files(
@@ -110,7 +107,6 @@ def cad_files(
     *,
     formats: Sequence[str] = CAD_FORMATS,
     cache_dir: Path | None = None,
-    timeout_s: float = TIMEOUT_S,
 ) -> list[Path]:
     """Write a finger's CAD files: solid as STEP and STL (body and markers), section as DXF and SVG.
 
@@ -119,7 +115,6 @@ def cad_files(
         folder: Output folder; made if it does not exist.
         formats: Some of `CAD_FORMATS`.
         cache_dir: Folder of the cache; by default `cache_folder()`.
-        timeout_s: Time limit, s.
 
     Returns:
         The files written.
@@ -133,7 +128,7 @@ def cad_files(
     wanted = sorted(set(formats))
     task = Task(f"CAD of design {finger.name!r}", _cad_writer, (finger.definition(), wanted))
     entry = _entry("cad", finger.digest, wanted, ".npz", cache_dir)
-    contents = _made(entry, task, timeout_s, _load_files, _save_files)
+    contents = _made(entry, task, _load_files, _save_files)
     for name, content in contents.items():
         write_bytes(folder / name, content)
     return [folder / name for name in contents]
@@ -153,12 +148,11 @@ def _entry(kind: str, digest: str, asked: object, suffix: str, cache_dir: Path |
 def _made(
     entry: Path,
     task: Task,
-    timeout_s: float,
     load: Callable[[Path], Result],
     save: Callable[[Result, Path], None] | None,
 ) -> Result:
     def make() -> Result:
-        made: Result = run_task(task, timeout_s)
+        made: Result = run_task(task, TIMEOUT_S)
         return made
 
     return cached(entry, task.what, make, load, save)

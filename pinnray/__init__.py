@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from pinnray.designers import optimise as optimise
     from pinnray.designers import predict as predict
     from pinnray.designers import predict_field as predict_field
-    from pinnray.designers import sensitivity as sensitivity
     from pinnray.designers import sweep as sweep
     from pinnray.functions import compare as compare
     from pinnray.functions import crossval as crossval
@@ -41,7 +40,6 @@ if TYPE_CHECKING:
     from pinnray.runtime.errors import UserError as UserError
     from pinnray.simulators import export as export
     from pinnray.solution import Solution as Solution
-    from pinnray.solvers.finger_figures.sensitivity import LocalSensitivity as LocalSensitivity
     from pinnray.solvers.materials.presets import MATERIALS as MATERIALS
     from pinnray.solvers.physics import Load as Load
     from pinnray.solvers.physics import Material as Material

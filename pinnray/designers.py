@@ -1,4 +1,4 @@
-"""Functions of the front door for designers: sensitivity, sweep, predict, predict_field, optimise.
+"""Functions of the front door for designers: sweep, predict, predict_field, optimise.
 
 The worker processes run a calling script once more: in a script, what starts a sweep or a search must stand
 under `if __name__ == "__main__":`.
@@ -11,69 +11,20 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
-from pinnray.arguments import mesh_settings, read_job
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
-from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.runtime.text_files import as_path
-from pinnray.solvers.physics import Load, LoadKind, Material, Physics
+from pinnray.solvers.physics import Physics
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pinnray.solvers.finger_figures.sensitivity import LocalSensitivity
     from pinnray.studies.fields.prediction import PredictedField
     from pinnray.studies.optimum.search import Optimum
     from pinnray.studies.sweep.study import Study
-
-
-def sensitivity(
-    design: str | Path | Finger = "default",
-    *,
-    size: float | MeshSettings | None = None,
-    material: Material | str | None = None,
-    load: Load | LoadKind | None = None,
-    progress: bool | None = None,
-    **given: Any,
-) -> "LocalSensitivity":
-    """How every figure of a finger changes with each parameter: `sensitivity(stroke=8).plot("force")`.
-
-    The derivatives are exact for the elements of `fem`, or of `fem-nonlinear` for a law of finite strain.
-    Warns of numbers that look like another unit, and of a body that goes through itself.
-
-    Args:
-        design: A finger in one of the ways of `mesh`.
-        size: Largest element in walls and ribs, mm.
-        material: See `solve`.
-        load: See `solve`.
-        progress: Whether to show the stages; if None in a notebook only.
-        given: Parameters of finger, material and load.
-
-    Raises:
-        UserError: If the load has friction or the body several materials, or the full load is not reached.
-    """
-    from pinnray.comparison.evaluation.deformed_body import DeformedBody
-    from pinnray.comparison.evaluation.plausibility import problem_remarks
-    from pinnray.geometry.cache import finger_mesh
-    from pinnray.runtime.stages import shown_stages
-    from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
-    from pinnray.solvers.problem import Problem
-
-    words = ("size", "material", "load", "design")
-    finger, elastic, moved = read_job(design, material, load, given, besides=words)
-    with shown_stages(progress) as stages:
-        with stages.stage("mesh"):
-            triangles = finger_mesh(finger, settings=mesh_settings(size))
-        problem = Problem(triangles, elastic, moved, None, finger)
-        with stages.stage("sensitivity") as report:
-            found = sensitivity_of(problem, report)
-    _, faults = DeformedBody(triangles).status(found.solution)
-    for remark in [*problem_remarks(problem), *faults]:
-        warnings.warn(remark, stacklevel=2)
-    return found
 
 
 def sweep(

@@ -14,8 +14,8 @@ from pinnray.robots.springs import Springs
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.physics import Material
 
-CHAIN_STEP, FLEX_STEP = 1e-3, 1e-3
-"""Time steps, s."""
+STEP = 1e-3
+"""Time step, s."""
 HARD = {"solref": "0.002 1", "solimp": "0.99 0.999 0.0001"}
 """Contact that gives way by hundredths of a millimetre, with a time constant of two steps."""
 HARDER = {"solref": "0.002 1", "solimp": "0.999 0.9999 0.0001"}
@@ -42,7 +42,7 @@ def chain_mjcf(name: str, chain: Chain, springs: Springs, wall: float, depth: fl
         depth: Of the finger, mm.
         damping: Its loss factor.
     """
-    root = _model(name, CHAIN_STEP, "implicitfast")
+    root = _model(name, "implicitfast")
     parent = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="finger")
     for link, step in enumerate(np.diff(chain.points, axis=0)):
         if link:
@@ -101,7 +101,7 @@ def flex_mjcf(name: str, body: SolidMesh, material: Material, density: float, da
         density: Of the material, kg/m^3.
         damping: Its loss factor at the first vibration.
     """
-    root = _model(name, FLEX_STEP, "discrete")
+    root = _model(name, "discrete")
     ET.SubElement(root, "size", memory="256M")
     finger = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="finger")
     flex = ET.SubElement(
@@ -134,10 +134,10 @@ def with_header(text: str, lines: Sequence[str]) -> str:
     return f"<!--\n{said}\n-->\n{text}"
 
 
-def _model(name: str, step: float, integrator: str) -> ET.Element:
+def _model(name: str, integrator: str) -> ET.Element:
     root = ET.Element("mujoco", model=name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-    ET.SubElement(root, "option", timestep=_text(step), integrator=integrator, gravity="0 0 0")
+    ET.SubElement(root, "option", timestep=_text(STEP), integrator=integrator, gravity="0 0 0")
     return root
 
 

@@ -76,7 +76,13 @@ def is_plugin(block: Block) -> bool:
 
 ALL_BLOCKS = [block for page in PAGES for block in blocks(page)]
 PYTHON = [block for block in ALL_BLOCKS if block.language == "python" and not is_plugin(block)]
-TO_RUN = [block for block in PYTHON if block.page.name not in ("notebook.md", "explore.md")]
+OF_RESULTS = [block for block in PYTHON if '"out' in block.text]
+"""Those that read what a command of the page has written."""
+TO_RUN = [
+    block
+    for block in PYTHON
+    if block not in OF_RESULTS and block.page.name not in ("notebook.md", "explore.md")
+]
 """Those of the notebook page run, with output, in `tests/pinnray/test_notebook.py`. The explorer's needs
 a sweep of a quarter of an hour; what it calls has tests in `tests/studies/fields`."""
 
@@ -144,15 +150,24 @@ def test_examples_pin_a_number():
     assert [path for path in EXAMPLES if not pinned.search(path.read_text(encoding="utf-8"))] == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("block", TO_RUN, ids=id_of)
-def test_python_in_the_docs_runs(block, tmp_path, monkeypatch, without_pictures, request):
-    if block.page.name == "gallery.md":  # of which no number is kept
-        request.getfixturevalue("few_elements")
+def marked(block: Block):
+    """The code of the gallery's pictures waits for a release: its subjects have tests of their own."""
+    mark = pytest.mark.release if block.page.name == "gallery.md" else pytest.mark.slow
+    return pytest.param(block, marks=mark, id=id_of(block))
+
+
+@pytest.mark.parametrize("block", map(marked, TO_RUN))
+def test_python_in_the_docs_runs(block, tmp_path, monkeypatch, without_pictures):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(JOBS, "", JobDefaults(solvers="fem,gp"))  # all have a test of the benchmark `default`
     padded = "\n" * block.line + block.text  # so that a traceback names the page's own line
     exec(compile(padded, str(block.page), "exec"), {"__name__": "__docs__"})
+
+
+def run_on_results(page: Path) -> None:
+    """Run the blocks of a page that read results, which are in the working folder."""
+    (block,) = (block for block in OF_RESULTS if block.page == page)
+    exec(compile(block.text, str(page), "exec"), {"__name__": "__docs__"})
 
 
 def test_the_plug_in_in_the_docs_is_the_one_that_is_tested():
@@ -300,13 +315,18 @@ FOLDS_LINE = "crossval --solvers fem,fem-asm --schemes one-out --seeds 1"
         (FOLDS_LINE, OWN_TRUTH, "file of a cross-validation", {}),
     ],
 )
-def test_the_docs_have_every_file_of_a_command(line, page, column, words, tmp_path, in_line, few_elements):
-    out = tmp_path / "out"
+def test_the_docs_have_every_file_of_a_command(
+    line, page, column, words, tmp_path, monkeypatch, in_line, few_elements
+):
+    out = tmp_path / "out" / f"{line.split()[0]}-default"
     assert main([*line.split(), "--mesh-size", "2", "--out", str(out)]) == 0
     documented = names(table(page, column))
     for word, meant in words.items():
         documented = [name.replace(word, meant) for name in documented]
     assert_same(documented, [path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()])
+    if page == OWN_TRUTH:
+        monkeypatch.chdir(tmp_path)
+        run_on_results(page)
 
 
 def test_the_docs_have_every_preset_as_it_is():
@@ -499,6 +519,13 @@ def test_observations_of_a_run_are_measurements(run_folder):
     with (run_folder / "observations.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     assert set(rows[0]) == {"marker", *names(table(MEASUREMENTS, "column"))}
+
+
+@pytest.mark.slow
+def test_runs_stand_beside_each_other_in_pandas(run_folder, tmp_path, monkeypatch):
+    (tmp_path / "out").symlink_to(run_folder.parent)
+    monkeypatch.chdir(tmp_path)
+    run_on_results(DOCS / "report.md")
 
 
 def test_the_contract_in_the_docs_is_the_one_that_is_tested():

@@ -33,7 +33,6 @@ class Clicks:
 
     places: FloatArray  # Mean of the clicks at every point, shape (m, 2), pixels or any other unit
     noise: float | None  # Standard deviation of such a mean from repeats, a coordinate; None without repeats
-    lattice: float  # Step of the lattice on which all coordinates lie; 0 if there is none
     numbers: tuple[float, ...] = ()  # Of the points, ascending; empty where none were given
 
 
@@ -76,7 +75,7 @@ def read_clicks(path: Path) -> Clicks:
     table = np.array(values)
     clicks = table[:, :2]
     if table.shape[1] == 2:
-        return Clicks(clicks, None, _lattice(clicks))
+        return Clicks(clicks, None)
     numbers, group = np.unique(table[:, 2], return_inverse=True)
     if len(numbers) < FEWEST:
         raise UserError(f"{path} has {len(numbers)} points; give at least {FEWEST}")
@@ -87,7 +86,7 @@ def read_clicks(path: Path) -> Clicks:
     if freedom:
         squares = float(((clicks - means[group]) ** 2).sum()) / (2 * freedom)
         noise = float(np.sqrt(squares * (1 / counts).mean()))
-    return Clicks(means, noise, _lattice(clicks), tuple(numbers.tolist()))
+    return Clicks(means, noise, tuple(numbers.tolist()))
 
 
 def clicked_points(
@@ -168,15 +167,11 @@ def clicked_points(
 def _noise(rest: Clicks, pressed: Clicks, scales: Sequence[float], misfit: float) -> tuple[float, str]:
     """Standard deviation of a clicked coordinate, mm, and where it comes from.
 
-    Without repeats it is the misfit at rest, which counts how well the finger was marked as well, but at
-    least what the lattice leaves.
+    Without repeats it is the misfit at rest, which counts how well the finger was marked as well.
     """
     repeats = [each.noise * scale for each, scale in zip((rest, pressed), scales, strict=True) if each.noise]
     if repeats:
         return float(np.sqrt(np.mean(np.square(repeats)))), "the repeats"
-    lattice = max(each.lattice * scale for each, scale in zip((rest, pressed), scales, strict=True))
-    if lattice / np.sqrt(12) > misfit:
-        return float(lattice / np.sqrt(12)), f"the lattice of {lattice:.2g} mm"
     return misfit, "the points at rest against the drawing"
 
 
@@ -230,13 +225,3 @@ def _misfit(places: FloatArray, markers: FloatArray) -> float:
 
 def _length(places: FloatArray) -> float:
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-
-
-def _lattice(clicks: FloatArray) -> float:
-    """The largest step of which all coordinates are multiples, to a thousandth of it; 0 if there is none."""
-    gaps = np.diff(np.unique(clicks.round(9)))
-    gaps = gaps[gaps > 1e-6 * np.ptp(clicks)]
-    if not len(gaps):
-        return 0.0
-    step = float(gaps.min())
-    return step if np.allclose(gaps / step, np.round(gaps / step), atol=1e-3) else 0.0

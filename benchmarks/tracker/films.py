@@ -114,6 +114,14 @@ def coverage(scores: Sequence[Score]) -> tuple[float, float]:
     return float((below < 1).mean()), float((below < 1.96).mean())
 
 
+def figures(scores: Sequence[Score], digits: int = 0) -> list[str]:
+    """Mean error and worst marker, mm, median standard deviation, mm, and coverage of one and two, %."""
+    lengths = np.concatenate([score.lengths for score in scores])
+    deviation = np.median(np.concatenate([score.deviations for score in scores]))
+    shares = (f"{100 * share:.{digits}f}" for share in coverage(scores))
+    return [*(f"{value:.4f}" for value in (lengths.mean(), lengths.max(), deviation)), *shares]
+
+
 def film_of(pictures: Sequence[Image]) -> Frames:
     """Images as a film of 30 frames a second."""
     shots = (CapturedImage(each, number / 30.0, f"picture {number}") for number, each in enumerate(pictures))

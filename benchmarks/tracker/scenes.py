@@ -18,7 +18,7 @@ from multiprocessing import get_context
 import numpy as np
 from rich.table import Table
 
-from benchmarks.tracker.films import Finger, Score, coverage, film_of, one_thread
+from benchmarks.tracker.films import Finger, Score, figures, film_of, one_thread
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.tables import terminal_table
 from pinnray.vision.calibration.camera import Camera
@@ -147,15 +147,8 @@ def _seen(finger: Finger, scenes: int, number: int) -> list[Score]:
 
 
 def _row(scores: list[Score]) -> list[str]:
-    lengths = [score.lengths for score in scores]
-    one, two = coverage(scores)
-    return [
-        f"{np.concatenate(lengths).mean():.4f}",
-        f"{max(length.mean() for length in lengths):.4f}",
-        f"{max(length.max() for length in lengths):.4f}",
-        f"{np.median(np.concatenate([score.deviations for score in scores])):.4f}",
-        f"{100 * one:.1f}",
-        f"{100 * two:.1f}",
-        f"{np.concatenate([score.squares for score in scores]).mean() / 2:.2f}",
-        f"{np.mean([score.overall for score in scores]):.2f}",
-    ]
+    error, worst, *others = figures(scores, digits=1)
+    squares = np.concatenate([score.squares for score in scores]).mean() / 2
+    overall = np.mean([score.overall for score in scores])
+    worst_scene = max(score.lengths.mean() for score in scores)
+    return [error, f"{worst_scene:.4f}", worst, *others, f"{squares:.2f}", f"{overall:.2f}"]

@@ -22,7 +22,7 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tables import DOCS, cells_of, fill, markdown
-from benchmarks.tracker.films import HIDDEN, Finger, Score, coverage, film_of, one_thread
+from benchmarks.tracker.films import HIDDEN, Finger, Score, figures, film_of, one_thread
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import terminal_table
@@ -274,16 +274,7 @@ def _summary(outcomes: Sequence[Outcome], method: DetectionMethod) -> list[str]:
     refused = sum(outcome.count for outcome in outcomes if isinstance(outcome.scores[method], str))
     if not known:
         return ["refused", "", str(refused), *5 * [""]]
-    lengths = np.concatenate([score.lengths for score in known])
-    one, two = coverage(known)
-    deviations = np.concatenate([score.deviations for score in known])
-    return [
-        f"{lengths.mean():.4f}",
-        f"{lengths.max():.4f}",
-        str(refused + sum(int((~score.seen).sum()) for score in known)),
-        str(sum(score.swapped for score in known)),
-        str(sum(score.invented for score in known)),
-        f"{np.median(deviations):.4f}",
-        f"{100 * one:.0f}",
-        f"{100 * two:.0f}",
-    ]
+    error, worst, *others = figures(known)
+    missed = refused + sum(int((~score.seen).sum()) for score in known)
+    swapped, invented = (sum(getattr(score, name) for score in known) for name in ("swapped", "invented"))
+    return [error, worst, str(missed), str(swapped), str(invented), *others]

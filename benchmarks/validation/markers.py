@@ -1,10 +1,10 @@
 """Motion capture of the beam: measured markers in the beam's frame, and the model's markers."""
 
-import csv
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from benchmarks.validation.half_beam import Deformation
@@ -60,16 +60,12 @@ class Frame(NamedTuple):
 
 def read_runs(path: Path = FILE) -> list[Run]:
     """The runs of a file as `markers.csv`, in its order."""
-    with path.open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    table = pd.read_csv(path, comment="#", index_col="marker")
     runs = []
-    for key in dict.fromkeys((row["case"], row["repeat"]) for row in rows):
-        found = {row["marker"]: row for row in rows if (row["case"], row["repeat"]) == key}
-        held, rest = (
-            np.array([[float(found[name][f"{axis}{when}_mm"]) for axis in "xyz"] for name in NAMES])
-            for when in (0, 1)
-        )
-        runs.append(Run(*key, held, rest))
+    for (case, repeat), rows in table.groupby(["case", "repeat"], sort=False):
+        named = rows.loc[list(NAMES)]
+        held, rest = (named[[f"{axis}{when}_mm" for axis in "xyz"]].to_numpy() for when in (0, 1))
+        runs.append(Run(str(case), str(repeat), held, rest))
     return runs
 
 

@@ -48,8 +48,8 @@ class Row:
     quantity: str
     measured: float
     expected: Expectation
-    degree: int
-    plane: str
+    degree: int = 2
+    plane: str = "strain"
     error: float | None = None
 
     @property

@@ -2,15 +2,12 @@
 
 from collections.abc import Mapping
 from math import nan
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from pinnray.runtime.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from pinnray.comparison.evaluation.evaluation import Evaluation
 
 COMPONENTS: dict[str, tuple[int, int]] = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}
 """Components of a symmetric tensor in the plane."""
@@ -74,8 +71,8 @@ class Differences(Numbers):
     strain: Mapping[str, FieldDifference]  #: Of the in-plane strain components, by name.
 
     @classmethod
-    def between(cls, evaluation: "Evaluation", reference: "Evaluation") -> Self:
-        """Differences of an evaluation from another one on the same mesh."""
+    def between(cls, evaluation: Any, reference: Any) -> Self:
+        """Differences of an `Evaluation` from another one on the same mesh."""
 
         def differ(name: str, index: tuple[int, ...] = ()) -> FieldDifference:
             values, other = (getattr(each, name)[:, *index] for each in (evaluation, reference))

@@ -1,7 +1,7 @@
 """Computes the scores of a run, once, after its solvers."""
 
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +23,9 @@ from pinnray.geometry.registration import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.finger_figures import FingerFigures
 
-if TYPE_CHECKING:
-    from pinnray.comparison.evaluation.comparison import Results
 
-
-def scores_of(comparison: "Results") -> Scores:
-    """Compute every number of a finished comparison."""
+def scores_of(comparison: Any) -> Scores:
+    """Compute every number of finished `Results`."""
     observations = comparison.observations
     return Scores(
         schema=1,
@@ -48,7 +45,7 @@ def scores_of(comparison: "Results") -> Scores:
     )
 
 
-def _solver_scores(evaluation: Evaluation, comparison: "Results") -> SolverScores:
+def _solver_scores(evaluation: Evaluation, comparison: Any) -> SolverScores:
     observations, reference, truth = comparison.observations, comparison.reference, comparison.truth
     plain = ("family", "twin", "law", "message", "energy", "reaction", "stats", "certificate")
     markers = marker_errors(evaluation.shown_displacement, observations)

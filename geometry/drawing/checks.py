@@ -25,7 +25,7 @@ LEAST_AREA = 1e-4
 def body(loops: Sequence[Loop]) -> Section:
     """The section between closed curves, mm: the largest is the outline, the others are cavities."""
     ordered = sorted(loops, key=lambda loop: -abs(loop.area))
-    _check_sound([shapely.LinearRing(loop.flattened(DEVIATION)[0]) for loop in ordered])
+    _check_sound([shapely.LinearRing(loop.flattened(DEVIATION)) for loop in ordered])
     if abs(ordered[-1].area) < LEAST_AREA:
         raise UserError(f"the closed curve at {place(ordered[-1].points[0])} encloses no area; delete it")
     outline, *cavities = [

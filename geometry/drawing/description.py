@@ -16,9 +16,9 @@ Coordinates = tuple[Number, Number]
 Points = Annotated[tuple[Coordinates, ...], Field(min_length=1)]
 
 EXPECTED = {
-    "clamp": "write clamp = [[0, 0], [0, -30]], several such pairs, or a label",
-    "contact": "write contact = [35, 0] or a label of the file",
-    "markers": "write markers = [[10, -1], [20, -1]], their number, 1 to 200, or a label of the file",
+    "clamp": "write clamp = [[0, 0], [0, -30]], or several such pairs",
+    "contact": "write contact = [35, 0]",
+    "markers": "write markers = [[10, -1], [20, -1]], or their number, 1 to 200",
 }
 """Values of the description that may be of several types."""
 
@@ -48,19 +48,19 @@ class Description(CheckedModel):
         None, 1e-6, 0.5, "", "mm", "Largest gap between two ends of curves that is closed; none means 0.001"
     )
     plane: str | None = Field(default=None, description="Plane in which a solid is cut, such as z = 6")
-    clamp: Annotated[tuple[tuple[Coordinates, Coordinates], ...], Field(min_length=1)] | str | None = Field(
+    clamp: Annotated[tuple[tuple[Coordinates, Coordinates], ...], Field(min_length=1)] | None = Field(
         default=None,
         description="Two points of the outline, or several such pairs: the boundary between them, the "
-        "shorter way, is clamped; or a label of the file",
+        "shorter way, is clamped",
     )
-    contact: Coordinates | str | None = Field(
-        default=None, description="A point of the outline, where the indenter touches; or a label of the file"
+    contact: Coordinates | None = Field(
+        default=None, description="A point of the outline, where the indenter touches"
     )
     contact_width: float | None = bounded(
         None, 1e-6, 2000, "", "", "Length of front face that the indenter touches, in the file's unit"
     )
-    markers: Points | Annotated[int, Field(strict=True, ge=1, le=200)] | str | None = Field(
-        default=None, description="Centres of the markers, or their number, or a label of the file"
+    markers: Points | Annotated[int, Field(strict=True, ge=1, le=200)] | None = Field(
+        default=None, description="Centres of the markers, or their number"
     )
     marker_diameter: float | None = bounded(
         None, 1e-6, 2000, "", "", "Diameter of a marker, in the file's unit"
@@ -112,9 +112,7 @@ def load_description(path: Path | None, lines: Sequence[str] = ()) -> Descriptio
         try:
             values |= parse_toml(text)
         except ValueError:
-            raise UserError(
-                f'cannot read {text!r}; write TOML, such as contact = [35, 0] or clamp = "base"'
-            ) from None
+            raise UserError(f"cannot read {text!r}; write TOML, such as contact = [35, 0]") from None
     try:
         return Description(**values)
     except UserError as error:

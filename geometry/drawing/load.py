@@ -13,7 +13,7 @@ from pinnray.geometry.drawing.checks import body, check_contact, check_markers
 from pinnray.geometry.drawing.description import Description, description_beside, load_description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.drawing.formats.closed_loops import straightened
-from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, label_of, place
+from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, place
 from pinnray.geometry.drawing.placement import placed, with_part
 from pinnray.geometry.drawing.ready_mesh import ready_mesh
 from pinnray.geometry.section.loop import Loop
@@ -121,7 +121,9 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
             "materials belong to the physical surfaces of a plane Gmsh mesh of triangles whose curves have "
             "groups base and contact; mesh the section with them and give that .msh"
         )
-    mesh = ready_mesh(drawing.mesh, placement, section, markers, x, materials) if drawing.mesh else None
+    mesh = None
+    if drawing.mesh:
+        mesh = ready_mesh(drawing.mesh, placement, section, markers, (x, width), materials)
     return DrawnFinger(
         name=description.name or _name(drawing.file),
         section=section,
@@ -154,22 +156,14 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
 
 def _clamped(outline: Loop, description: Description, unit: float) -> tuple[Loop, str]:
     """The outline with its clamp as the pieces `base` and no other name, and the clamp's source."""
-    given = description.clamp
-    if isinstance(given, tuple):
-        outline = straightened(outline.renamed([""] * len(outline.points)))
-        for pair in given:
-            outline = with_part(outline, [unit * np.array(point) for point in pair], "base")
-        source = "given"
+    if description.clamp is not None:
+        outline, source = straightened(outline.renamed([""] * len(outline.points))), "given"
+        for pair in description.clamp:
+            outline = with_part(outline, unit * np.array(pair), "base")
     else:
-        label = label_of(given) if given else "base"
-        held = [name == label or LABELS.get(name) == label for name in outline.names]
-        outline = straightened(outline.renamed("base" if each else "" for each in held))
-        source = "given" if given else "drawn"
-        if not any(held) and given:
-            raise UserError(
-                f"nothing is clamped: no piece of the outline is called {given!r}; give two points of it"
-            )
-        if not any(held):
+        bases = ("base" if LABELS.get(name) == "base" else "" for name in outline.names)
+        outline, source = straightened(outline.renamed(bases)), "drawn"
+        if "base" not in outline.names:
             outline, source = straightened(proposal.with_clamp(outline)), "proposed"
     if all(name == "base" for name in outline.names):
         raise UserError("the whole outline is clamped; leave a part free")
@@ -177,20 +171,12 @@ def _clamped(outline: Loop, description: Description, unit: float) -> tuple[Loop
 
 
 def _contact(drawing: Drawing, labelled: Loop, section: Section, description: Description) -> ContactPlace:
-    given = description.contact
-    if isinstance(given, tuple):
-        return ContactPlace(drawing.unit * np.array(given), None, "given")
-    label = label_of(given) if given else "contact"
-    pieces = list(labelled.pieces(label))
-    if pieces:
-        middle, ends = _run(labelled, pieces)
-        return ContactPlace(middle, ends, "given" if given else "drawn")
-    if drawing.contact is not None and label == "contact":
-        return ContactPlace(drawing.contact, None, "given" if given else "drawn")
-    if given:
-        raise UserError(
-            f"no contact: no piece of the outline is called {given!r}; give contact as a point of it"
-        )
+    if description.contact is not None:
+        return ContactPlace(drawing.unit * np.array(description.contact), None, "given")
+    if pieces := list(labelled.pieces("contact")):
+        return ContactPlace(*_run(labelled, pieces), "drawn")
+    if drawing.contact is not None:
+        return ContactPlace(drawing.contact, None, "drawn")
     return ContactPlace(proposal.contact_point(section), None, "proposed")
 
 
@@ -208,8 +194,6 @@ def _markers(
 ) -> tuple[FloatArray, float, Mapping[str, str]]:
     """Centres (m, 2) and diameter of the markers, mm, and the sources of both."""
     given = description.markers
-    if isinstance(given, str) and (label_of(given) != "markers" or not len(drawing.markers)):
-        raise UserError(f"the file has no markers called {given!r}; give their centres or their number")
     if isinstance(given, tuple):
         points, source = drawing.unit * np.array(given), "given"
     elif isinstance(given, int):

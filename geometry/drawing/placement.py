@@ -1,12 +1,11 @@
 """Rotation, reflection and shift of a drawing into the finger's frame; names of the parts of its outline."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.drawing.formats.closed_loops import corner_at, cut_at, run_between
+from pinnray.geometry.drawing.formats.closed_loops import between
 from pinnray.geometry.drawing.formats.drawing import place
 from pinnray.geometry.section.loop import STRAIGHT, Loop
 from pinnray.geometry.section.section import Section
@@ -97,18 +96,16 @@ def _rounded(loop: Loop) -> Loop:
     return Loop(np.round(loop.points, ROUND) + 0.0, loop.bulges, loop.names)
 
 
-def with_part(loop: Loop, ends: Sequence[FloatArray], name: str) -> Loop:
-    """The curve with a name for its part between two points, the shorter way, mm."""
+def with_part(loop: Loop, ends: FloatArray, name: str) -> Loop:
+    """The curve with a name for its part between two points, (2, 2), the shorter way, mm."""
     for point in ends:
-        which, fraction = on_curve(loop, point, name)
-        loop = cut_at(loop, which, fraction)
-    first, last = (corner_at(loop, point) for point in ends)
-    if first == last:
+        on_curve(loop, point, name)
+    loop, ways = between(loop, ends)
+    shorter = min(ways, key=lambda way: float(loop.lengths[way].sum()))
+    if not shorter:
         raise UserError(
             f"the {name} at {place(ends[0])} has no length; give two different points of the outline"
         )
-    ways = [run_between(first, last, len(loop.points)), run_between(last, first, len(loop.points))]
-    shorter = min(ways, key=lambda way: float(loop.lengths[way].sum()))
     return loop.renamed((name if which in shorter else own for which, own in enumerate(loop.names)))
 
 

@@ -142,7 +142,7 @@ def contact_width(outline: Loop, middle: float) -> float:
 
 
 def _principal_axis(outline: Loop) -> FloatArray:
-    ring = shapely.LinearRing(outline.flattened()[0])
+    ring = shapely.LinearRing(outline.flattened())
     points = shapely.get_coordinates(shapely.segmentize(ring, ring.length / 1000))
     values, vectors = np.linalg.eigh(np.cov(points.T))
     return np.array([1.0, 0.0]) if values[0] > 0.9 * values[1] else np.asarray(vectors[:, 1])
@@ -150,7 +150,7 @@ def _principal_axis(outline: Loop) -> FloatArray:
 
 def _flat_sides(outline: Loop) -> Iterator[FlatSide]:
     """Sides of the convex hull on which straight pieces lie."""
-    corners, _ = outline.flattened(1e-4)
+    corners = outline.flattened(1e-4)
     normals = {which: -inner_normals(outline, which, 0.5)[0] for which in outline.straight.tolist()}
     left = {
         which: normal
@@ -186,6 +186,6 @@ def _mid_span(section: Section, which: int, clamp: FloatArray) -> FloatArray:
     near, far = sorted(section.outline.ends[which], key=lambda end: float(np.linalg.norm(end - clamp)))
     length = float(np.linalg.norm(far - near))
     along = (far - near) / length
-    reach = [float(((cavity.flattened()[0] - near) @ along).max()) for cavity in section.cavities]
+    reach = [float(((cavity.flattened() - near) @ along).max()) for cavity in section.cavities]
     reach = [min(each, length) for each in reach if each > 0]
     return np.asarray(near + along * 0.5 * max(reach, default=length))

@@ -8,7 +8,7 @@ import shapely
 from pinnray.geometry.drawing.description import PartMaterial
 from pinnray.geometry.drawing.formats.drawing import MeshInFile, label_of
 from pinnray.geometry.drawing.placement import Placement
-from pinnray.geometry.mesh.boundary import are_among, counter_clockwise
+from pinnray.geometry.mesh.boundary import counter_clockwise
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import BoolArray, FloatArray
@@ -20,33 +20,28 @@ def ready_mesh(
     placement: Placement,
     section: Section,
     markers: FloatArray,
-    contact: float,
+    contact: tuple[float, float],
     materials: Mapping[str, PartMaterial],
 ) -> TriangleMesh:
-    """The mesh of a file as it is.
+    """The mesh of a file as it is; edges on pieces of the section have their names.
 
     Args:
         found: The mesh in the drawing's frame.
         placement: Into the finger's frame.
         section: Its section in the finger's frame, with named pieces.
         markers: Places of the markers in the finger's frame, shape (m, 2), mm; each goes to the nearest node.
-        contact: X of the contact's middle, mm; the contact's node is the one nearest to it.
+        contact: X of the contact's middle and its width, mm; it has the edges of the front whose middles it
+            covers or, if there is none, the nearest one.
         materials: Of parts by the names of their physical surfaces.
     """
     points = placement(found.points)
     triangles = counter_clockwise(points, found.triangles)
     rim = boundary_edges(triangles)
-    boundaries = {}
-    for name in ("base", "front", "back", "contact"):
-        if name not in found.edges:
-            boundaries[name] = rim[_on_pieces(points[rim].mean(axis=1), section, name)]
-        elif not are_among(found.edges[name], rim).all():
-            raise UserError(f"an edge of the physical group {name!r} is not on the boundary of the mesh")
-        else:
-            boundaries[name] = rim[are_among(rim, found.edges[name])]
-    if "front" not in found.edges:
-        inside = are_among(boundaries["contact"], boundaries["front"])
-        boundaries["front"] = np.concatenate([boundaries["front"], boundaries["contact"][~inside]])
+    boundaries = {
+        name: rim[_on_pieces(points[rim].mean(axis=1), section, name)] for name in ("base", "front", "back")
+    }
+    off = np.abs(points[boundaries["front"]].mean(axis=1)[:, 0] - contact[0])
+    boundaries["contact"] = boundaries["front"][off <= max(contact[1] / 2, off.min())]
     nodes = np.linalg.norm(points[:, None] - markers, axis=2).argmin(axis=0)
     if len(np.unique(nodes)) < len(nodes):
         raise UserError("two markers are nearest to one node of the mesh; give markers further apart")
@@ -56,7 +51,7 @@ def ready_mesh(
         triangles=triangles,
         boundaries={name: edges for name, edges in boundaries.items() if len(edges)},
         marker_nodes=nodes,
-        contact_node=int(touched[np.abs(points[touched, 0] - contact).argmin()]),
+        contact_node=int(touched[np.abs(points[touched, 0] - contact[0]).argmin()]),
         moduli=_moduli(found, materials) if materials else None,
     )
 

@@ -52,7 +52,7 @@ def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], 
 
 def draw_section(axes: Axes, shape: Section) -> None:
     """Draw the section, in mm, with an edge; cavities are empty."""
-    rings = [loop.flattened()[0] for loop in shape.loops]
+    rings = [loop.flattened() for loop in shape.loops]
     paths = [Outline(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings]
     whole = Outline.make_compound_path(*paths)
     axes.add_patch(PathPatch(whole, fc=BODY, ec=INK, lw=0.9, zorder=1))

@@ -51,9 +51,8 @@ def cavity_length(p: Parameters) -> RuleResult:
     start, end = cavity_ends(p)
     return RuleResult(
         end - start - MIN_CAVITY,
-        f"no room for a cavity: height {p.height:g} mm less tip_length {p.tip_length:g} mm and "
-        f"base_thickness {p.base_thickness:g} mm leaves {end - start:.3g} mm, at least {MIN_CAVITY} mm is "
-        "needed",
+        f"no room for a cavity: tip_length {p.tip_length:g} mm and base_thickness {p.base_thickness:g} mm "
+        f"leave {end - start:.3g} mm of height {p.height:g} mm, at least {MIN_CAVITY} mm is needed",
     )
 
 
@@ -63,9 +62,8 @@ def cavity_open(p: Parameters) -> RuleResult:
     opening = float(front[1] - back[1])
     return RuleResult(
         opening - MIN_CAVITY,
-        f"walls close the cavity: front_thickness {p.front_thickness:g} mm and back_thickness "
-        f"{p.back_thickness:g} mm leave {opening:.3g} mm between them at the tip block, at least "
-        f"{MIN_CAVITY} mm is needed",
+        f"front_thickness {p.front_thickness:g} mm and back_thickness {p.back_thickness:g} mm leave "
+        f"{opening:.3g} mm between the walls at the tip block, at least {MIN_CAVITY} mm is needed",
     )
 
 
@@ -76,8 +74,7 @@ def base_wall(p: Parameters) -> RuleResult:
     return RuleResult(
         wall - MIN_WALL,
         f"the base is open: base_thickness {p.base_thickness:g} mm and foot_height {p.foot_height:g} mm "
-        f"leave a wall of {wall:.3g} mm between cavity and {'slot' if slot else 'base'}, at least "
-        f"{MIN_WALL} mm is needed",
+        f"leave a wall of {wall:.3g} mm, at least {MIN_WALL} mm is needed",
     )
 
 
@@ -138,8 +135,8 @@ def contact_on_front(p: Parameters) -> RuleResult:
     end = p.height - tip_tangent(p) - MIN_CONTACT_MARGIN
     return RuleResult(
         min(low - MIN_CONTACT_MARGIN, end - high),
-        f"contact outside the front face: it reaches from x = {low:.6g} to {high:.6g} mm, the face allows "
-        f"{MIN_CONTACT_MARGIN:g} to {end:.6g} mm",
+        f"contact outside the front face: at contact_position {p.contact_abscissa:.6g} mm it reaches from "
+        f"x = {low:.6g} to {high:.6g} mm, the face allows {MIN_CONTACT_MARGIN:g} to {end:.6g} mm",
     )
 
 
@@ -206,7 +203,7 @@ def _marker_words(p: Parameters) -> str:
 def _marker_room(p: Parameters) -> tuple[int, float]:
     """The marker that has the least room around it, and the largest diameter that fits there, mm."""
     centres = marker_positions(p)
-    body = shapely.Polygon(finger_outline(p).flattened()[0], list(cells(p)))
+    body = shapely.Polygon(finger_outline(p).flattened(), list(cells(p)))
     away = shapely.distance(body.boundary, shapely.points(centres))
     margins = np.where(shapely.contains_xy(body, *centres.T), away, -away)
     worst = int(margins.argmin())

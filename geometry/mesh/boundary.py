@@ -2,7 +2,7 @@
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components, depth_first_order
+from scipy.sparse.csgraph import connected_components, depth_first_order, dijkstra
 from scipy.spatial import cKDTree
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
@@ -170,23 +170,18 @@ def elements_through_thickness(mesh: TriangleMesh) -> int:
 
     It is the least number of element edges on a path from one closed boundary to another.
     """
-    loop_of = np.full(len(mesh.points), -1)
-    for number, loop in enumerate(boundary_loops(mesh)):
+    loops = boundary_loops(mesh)
+    loop_of = np.empty(len(mesh.points), dtype=np.int64)
+    for number, loop in enumerate(loops):
         loop_of[loop] = number
-    steps = np.where(loop_of >= 0, 0, -1)
-    ends = np.concatenate([mesh.edges, mesh.edges[:, ::-1]])
-    level = 0
-    while True:
-        start, stop = loop_of[ends[:, 0]], loop_of[ends[:, 1]]
-        met = (start >= 0) & (stop >= 0) & (start != stop)
-        if met.any():
-            return int((steps[ends[met, 0]] + steps[ends[met, 1]]).min()) + 1
-        fresh = ends[(start >= 0) & (stop < 0)]
-        if not len(fresh):
-            return level
-        level += 1
-        loop_of[fresh[:, 1]] = loop_of[fresh[:, 0]]
-        steps[fresh[:, 1]] = level
+    one, other = mesh.edges.T
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(len(loop_of), len(loop_of))).tocsr()
+    options = {"unweighted": True, "min_only": True, "return_predecessors": True}
+    steps, _, nearest = dijkstra(graph, directed=False, indices=np.concatenate(loops), **options)
+    met = loop_of[nearest[one]] != loop_of[nearest[other]]
+    if not met.any():
+        return int(steps.max())
+    return int((steps[one] + steps[other])[met].min()) + 1
 
 
 def _distance(mesh: TriangleMesh, face: str, points: FloatArray) -> FloatArray:

@@ -66,21 +66,17 @@ class Locator:
                 where[todo][:, None] - self._origin[candidates],
             )
             all_three = np.concatenate([1 - local.sum(axis=2, keepdims=True), local], axis=2)
-            best = all_three.min(axis=2).argmax(axis=1)
-            rows = np.arange(len(todo))
+            rows, best = np.arange(len(todo)), all_three.min(axis=2).argmax(axis=1)
             found = all_three[rows, best].min(axis=1) >= -1e-9  # rounding on edges
-            cells[todo[found]] = candidates[rows, best][found]
-            barycentric[todo[found]] = all_three[rows, best][found]
             # A triangle reaches at most _radius from its centroid: beyond it no candidate is left.
             exhausted = ~found & ((distance[:, -1] > self._radius + slack) | (count == self._centroids.n))
-            if slack > 0 and exhausted.any():
-                beyond = (-all_three[exhausted] * self._heights[candidates[exhausted]]).max(axis=2)
-                nearest, late = beyond.argmin(axis=1), np.flatnonzero(exhausted)
-                close = beyond[np.arange(len(late)), nearest] <= slack
-                late, nearest = late[close], nearest[close]
-                cells[todo[late]] = candidates[late, nearest]
-                barycentric[todo[late]] = all_three[late, nearest]
-                found[late], exhausted[late] = True, False
+            if slack > 0:
+                beyond = (-all_three * self._heights[candidates]).max(axis=2)
+                close = exhausted & (beyond.min(axis=1) <= slack)
+                best[close] = beyond[close].argmin(axis=1)
+                found, exhausted = found | close, exhausted & ~close
+            cells[todo[found]] = candidates[rows, best][found]
+            barycentric[todo[found]] = all_three[rows, best][found]
             if exhausted.any():
                 x, y = where[todo[exhausted][0]]
                 raise OutsideBodyError(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_matrix, diags
 
 from pinnray.geometry.mesh.boundary import (
@@ -186,11 +187,8 @@ def _thickness(mesh: TriangleMesh, name: str, mask: BoolArray, loops: list[IntAr
             steps = np.linalg.norm(mesh.points[np.roll(loop, -1)] - mesh.points[loop], axis=1)
             length += float(steps @ _beside(mesh, loop, mask))
         return float(2 * mesh.areas[mask].sum() / length)
-    start, end = mesh.points[mesh.boundary(name)].transpose(1, 0, 2)
-    along = end - start
-    offset = cavities[:, None] - start
-    share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
-    return float(np.linalg.norm(offset - share[..., None] * along, axis=2).min())
+    wall = shapely.MultiLineString(list(mesh.points[mesh.boundary(name)]))
+    return float(wall.distance(shapely.MultiPoint(cavities)))
 
 
 def harmonic(mesh: TriangleMesh, boundary: FloatArray) -> FloatArray:

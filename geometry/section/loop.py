@@ -141,13 +141,9 @@ class Loop:
                 values[nearer] = better[nearer]
         return found
 
-    def flattened(self, deviation: float = 1e-3) -> tuple[FloatArray, IntArray]:
-        """A polygon within `deviation`, mm, of the curve, whose corners lie on it.
-
-        Returns:
-            Its corners, shape (k, 2), mm, and for each of its sides the number of the piece, shape (k,).
-        """
-        points, pieces = [], []
+    def flattened(self, deviation: float = 1e-3) -> FloatArray:
+        """Corners, shape (k, 2), mm, of a polygon within `deviation`, mm, of the curve, on which they lie."""
+        points = []
         for which in range(len(self.points)):
             count = 1
             if abs(self.bulges[which]) > STRAIGHT:
@@ -155,8 +151,7 @@ class Loop:
                 step = 2 * np.arccos(max(1 - deviation / radius, 0.5))
                 count = max(int(np.ceil(abs(4 * np.arctan(self.bulges[which])) / step)), 2)
             points.append(self.along(which, np.arange(count) / count))
-            pieces.append(np.full(count, which))
-        return np.concatenate(points), np.concatenate(pieces)
+        return np.concatenate(points)
 
     def reversed(self) -> Self:
         """The same curve in the other direction."""

@@ -63,7 +63,7 @@ class Section:
     @cached_property
     def polygon(self) -> shapely.Polygon:
         """The body as a polygon, within `DEVIATION` of the arcs."""
-        rings = [loop.flattened(DEVIATION)[0] for loop in self.loops]
+        rings = [loop.flattened(DEVIATION) for loop in self.loops]
         return shapely.Polygon(rings[0], rings[1:])
 
     def contains(self, points: ArrayLike) -> BoolArray:

@@ -126,14 +126,11 @@ def _through(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
 
 
 def _first(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
-    curved = np.flatnonzero(np.abs(pieces.bulges) > STRAIGHT)
-    if len(curved):
-        lengths = np.full((len(start), len(pieces.bulges)), np.inf)
-        straight = np.setdiff1d(np.arange(len(pieces.bulges)), curved)
-        lengths[:, straight] = _to_lines(pieces.start[straight], pieces.end[straight], start, ahead)
-        lengths[:, curved] = _to_arcs(pieces, curved, start, ahead)
-    else:
-        lengths = _to_lines(pieces.start, pieces.end, start, ahead)
+    is_curved = np.abs(pieces.bulges) > STRAIGHT
+    straight, curved = np.flatnonzero(~is_curved), np.flatnonzero(is_curved)
+    lengths = np.empty((len(start), len(pieces.bulges)))
+    lengths[:, straight] = _to_lines(pieces.start[straight], pieces.end[straight], start, ahead)
+    lengths[:, curved] = _to_arcs(pieces, curved, start, ahead)
     nearest = lengths.argmin(axis=1)
     return Crossing(lengths[np.arange(len(start)), nearest], nearest)
 

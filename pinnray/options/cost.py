@@ -1,7 +1,7 @@
 """Time and memory that a fine mesh takes, told before it is made."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.finger import Finger
@@ -22,9 +22,6 @@ MAX_SECONDS = 300.0
 
 USABLE = 0.8
 """Share of the free memory that needs no consent."""
-
-COARSER = 1.25
-"""Ratio of the element sizes that are tried for the advice."""
 
 
 @dataclass(frozen=True)
@@ -73,20 +70,15 @@ def check_mesh_cost(
         simulated: Whether it is for a virtual experiment as well.
 
     Raises:
-        UserError: With the price and a size that costs less.
+        UserError: With the price.
     """
     if (settings := mesh_sizes(finger, settings)) is None:
         return
-    free, size = free_memory_gb(), settings.size
-    cost = coarser = MeshCost(estimated_triangles(finger, settings), solvers, simulated)
-    if cost.fits(free):
-        return
-    while not coarser.fits(free) and coarser.triangles > 1000:
-        size = float(f"{COARSER * size:.2g}")
-        triangles = estimated_triangles(finger, settings.model_copy(update={"size": size}))
-        coarser = replace(cost, triangles=triangles)
-    raise UserError(
-        f"--mesh-size {settings.size:g} gives about {cost.triangles:,} triangles, which take about "
-        f"{cost.seconds / 60:.0f} min and {cost.memory_gb:.1f} GB ({free:.1f} GB are free); "
-        f"go on with --yes, or take a coarser mesh, such as --mesh-size {size:g}"
-    )
+    free = free_memory_gb()
+    cost = MeshCost(estimated_triangles(finger, settings), solvers, simulated)
+    if not cost.fits(free):
+        raise UserError(
+            f"--mesh-size {settings.size:g} gives about {cost.triangles:,} triangles, which take about "
+            f"{cost.seconds / 60:.0f} min and {cost.memory_gb:.1f} GB ({free:.1f} GB are free); "
+            "go on with --yes, or take a coarser mesh"
+        )

@@ -48,14 +48,8 @@ class FingerOptions(CheckedModel):
         design: Preset (default, csiro, slender, ...) or .toml file.
         section: A drawing instead of a design: a .step, .dxf or .svg file, or a .msh mesh. A .toml file of
             the same name beside it may say where it is clamped, touched and marked.
-        clamp: Clamped part of the drawing's outline, such as "[[0, 0], [0, -30]]" or a label of the file;
-            default: the file's own, else proposed.
-        contact: Point of the outline where the indenter touches, such as "[35, 0]", or a label; default as
-            for --clamp.
-        markers: Centres of the markers, such as "[[10, -1], [20, -1]]", their number, or a label; default as
-            for --clamp.
-        set: Change a parameter, such as rib_count=6 or N=6, or a line on the drawing, such as depth=12; may
-            be repeated.
+        set: Change a parameter, such as rib_count=6 or N=6; on a drawing a line of its description, such as
+            depth=12, clamp=[[0,0],[0,-30]], contact=[35,0] or markers=5; may be repeated.
         mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip. A .msh
             file that is a mesh of the section is taken as it is unless a size is given.
         yes: Go on although the mesh is so fine that a run takes more than five minutes or much memory.
@@ -63,9 +57,6 @@ class FingerOptions(CheckedModel):
 
     design: str = "default"
     section: Path | None = None
-    clamp: str | None = None
-    contact: str | None = None
-    markers: str | None = None
     set: Repeated = ()
     mesh_size: float | None = None
     yes: Flag = False
@@ -114,9 +105,6 @@ class FingerOptions(CheckedModel):
     def _designed(self) -> "Design":
         from pinnray.geometry.finger.presets import load_design, parse_overrides
 
-        for option in ("clamp", "contact", "markers"):
-            if getattr(self, option) is not None:
-                raise UserError(f"--{option} belongs to a drawing; give it by --section FILE")
         changes = parse_overrides(self.set)
         design = load_design(self.design, changes)
         if changes and "name" not in changes:  # so that it has its own output folder
@@ -131,17 +119,11 @@ class FingerOptions(CheckedModel):
 
         if self.design != "default":
             raise UserError(f"--section {file} and --design {self.design}: give one of them")
-        lines = [
-            f"{option} = {toml_value(text)}"
-            for option in ("clamp", "contact", "markers")
-            if (text := getattr(self, option)) is not None
-        ]
-        keys = [line.partition("=")[0].strip() for line in (*lines, *self.set)]
+        settings = [setting.partition("=") for setting in self.set]
+        keys = [key.strip() for key, _, _ in settings]
         if twice := [key for key in keys if keys.count(key) > 1]:
             raise UserError(f"{twice[0]} is set twice; give it once")
-        for setting in self.set:
-            key, _, value = setting.partition("=")
-            lines.append(f"{key.strip()} = {toml_value(value.strip())}" if value else setting)
+        lines = [f"{key} {equals} {value and toml_value(value.strip())}" for key, equals, value in settings]
         return drawn_finger(file, load_description(description_beside(file), lines))
 
 

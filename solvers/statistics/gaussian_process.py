@@ -9,7 +9,6 @@ Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learn
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy.linalg import cho_solve
@@ -21,9 +20,8 @@ from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.misfit import standard_deviations
 from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
-from pinnray.solvers.energy_and_force import energy_and_force
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.solution import Solution, Status, Uncertainty
+from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import (
     Cost,
     FieldSettings,
@@ -43,7 +41,9 @@ from pinnray.solvers.statistics.statistical_posterior import (
     Posterior,
     StatFemData,
     StatFemField,
+    framed_posterior,
     log_root_determinant,
+    posterior_solution,
     predicted,
 )
 
@@ -111,33 +111,16 @@ class GaussianProcessSolver(FieldSettings):
             )
             return _fit(data)
 
-        posterior = conditioned(pictures.about(pictures.found(lambda framed: conditioned(framed).frames[0])))
-        field = StatFemField(posterior, [])
-        energy, reaction = energy_and_force(problem, field, 4)
-        u, v = posterior.constants.lengths
-        solution = Solution(
-            solver=self.name,
-            problem=problem,
-            field=field,
-            energy=energy,
-            reaction=reaction,
-            status=Status(
-                True,
-                f"an interpolation of the markers without mechanics, over lengths of {u:.3g} mm in u and "
-                f"{v:.3g} mm in v; its energy and force mean little",
-            ),
-            stats={
-                "seconds": time.perf_counter() - started,
-                "length_u": float(u),
-                "length_v": float(v),
-                "log_evidence": posterior.log_evidence,
-                **pictures.numbers(*posterior.frames),
-            },
-            uncertainty=Uncertainty(
-                field.standard_deviation,
-                shown=partial(field.shown_deviation, pictures) if pictures.parameters else None,
-            ),
-            pictures=pictures.at(posterior.frames[0]) if pictures.parameters else None,
+        posterior = framed_posterior(pictures, conditioned)
+        u, v = map(float, posterior.constants.lengths)
+        solution = posterior_solution(
+            self.name,
+            problem,
+            StatFemField(posterior, []),
+            pictures,
+            f"an interpolation of the markers without mechanics, over lengths of {u:.3g} mm in u and "
+            f"{v:.3g} mm in v; its energy and force mean little",
+            {"seconds": time.perf_counter() - started, "length_u": u, "length_v": v},
         )
         return solution, posterior, pictures
 

@@ -23,7 +23,6 @@ displacement of the contact.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import cast
 
 import numpy as np
@@ -32,15 +31,21 @@ from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import standard_deviations
 from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
-from pinnray.solvers.energy_and_force import energy_and_force
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.lagrange import LagrangeField
 from pinnray.solvers.problem import Load, Problem
-from pinnray.solvers.solution import Solution, Status, Uncertainty
+from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import Cost, ElementSettings, NoSolutionError, Progress, check_problem, silent
 from pinnray.solvers.statistics.kernel_field import MarkerPrediction, with_markers_left_out
-from pinnray.solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField, predicted
+from pinnray.solvers.statistics.statistical_posterior import (
+    Posterior,
+    StatFemData,
+    StatFemField,
+    framed_posterior,
+    posterior_solution,
+    predicted,
+)
 
 TANGENT_STEP = 0.1
 """Change of a prescribed displacement for its tangent at finite strain, mm."""
@@ -168,40 +173,27 @@ class StatFemSolver(ElementSettings):
         def conditioned(framed: FramedData) -> Posterior:
             return Posterior.of(self._data(problem, observations, framed, shapes))
 
-        z = pictures.found(lambda framed: conditioned(framed).frames[0])
-        posterior = conditioned(pictures.about(z))
-        field, data = StatFemField(posterior, shapes), posterior.data
-        energy, reaction = energy_and_force(problem, field, 4)
+        posterior = framed_posterior(pictures, conditioned)
+        data = posterior.data
         factor, (u, v), (length, _) = posterior.constants
         _, variances = posterior.at(data.points, data.shapes)
         loads = zip(problem.load.prescribed, posterior.load, strict=True)
-        solution = Solution(
-            solver=self.name,
-            problem=problem,
-            field=field,
-            energy=energy,
-            reaction=reaction,
-            status=Status(
-                True,
-                f"{self._fem(problem).name} times {factor:.3g} plus a discrepancy of {u:.2g} mm in u and "
-                f"{v:.2g} mm in v over {length:.3g} mm; its energy and force include the discrepancy's",
-            ),
-            stats={
+        solution = posterior_solution(
+            self.name,
+            problem,
+            StatFemField(posterior, shapes),
+            pictures,
+            f"{self._fem(problem).name} times {factor:.3g} plus a discrepancy of {u:.2g} mm in u and "
+            f"{v:.2g} mm in v over {length:.3g} mm; its energy and force include the discrepancy's",
+            {
                 "seconds": time.perf_counter() - started,
                 "unknowns": shapes[0].values.size,
                 "factor": factor,
                 "discrepancy_u": float(u),
                 "discrepancy_v": float(v),
                 "length": float(length),
-                "log_evidence": posterior.log_evidence,
                 "deviation_at_markers": float(np.sqrt(variances.max())),
                 **{f"load_{'uv'[axis]}": float(value) for axis, value in loads},
-                **pictures.numbers(*posterior.frames),
             },
-            uncertainty=Uncertainty(
-                field.standard_deviation,
-                shown=partial(field.shown_deviation, pictures) if pictures.parameters else None,
-            ),
-            pictures=pictures.at(posterior.frames[0]) if pictures.parameters else None,
         )
         return solution, posterior, pictures

@@ -1,10 +1,10 @@
-"""Posterior of `statfem`: the model d = ρ B u + δ + e of the observations, conditioned on markers.
+"""Posterior of `statfem` and `gp`: the model d = ρ B u + δ + e of the observations, conditioned on markers.
 
 See `pinnray.solvers.statistics.statistical_fem` for the random variables and the source.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -16,8 +16,10 @@ from threadpoolctl import threadpool_limits
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.pictures import FreePictures
-from pinnray.solvers.solution import DisplacementField
+from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
+from pinnray.solvers.energy_and_force import energy_and_force
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import DisplacementField, Solution, Status, Uncertainty
 from pinnray.solvers.statistics.kernel_field import (
     KernelField,
     MarkerPrediction,
@@ -186,6 +188,46 @@ class StatFemField:
 
     def _by_load(self, own: FloatArray) -> FloatArray:
         return np.asarray(np.tensordot(self.posterior.constants.factor * self.posterior.load, own, axes=1))
+
+
+def framed_posterior(pictures: FreePictures, conditioned: Callable[[FramedData], Posterior]) -> Posterior:
+    """The posterior with the pictures' frames found, by one for linearised observations."""
+    return conditioned(pictures.about(pictures.found(lambda framed: conditioned(framed).frames[0])))
+
+
+def posterior_solution(
+    solver: str,
+    problem: Problem,
+    field: StatFemField,
+    pictures: FreePictures,
+    said: str,
+    stats: Mapping[str, float | int | str],
+) -> Solution:
+    """A posterior as a solution, with its deviations.
+
+    Args:
+        solver: Its name.
+        problem: What is solved.
+        field: The posterior.
+        pictures: Of the markers.
+        said: The status in words.
+        stats: `seconds` and other columns of the solver.
+    """
+    energy, reaction = energy_and_force(problem, field, 4)
+    frames, free = field.posterior.frames, bool(pictures.parameters)
+    return Solution(
+        solver=solver,
+        problem=problem,
+        field=field,
+        energy=energy,
+        reaction=reaction,
+        status=Status(True, said),
+        stats={**stats, "log_evidence": field.posterior.log_evidence, **pictures.numbers(*frames)},
+        uncertainty=Uncertainty(
+            field.standard_deviation, shown=partial(field.shown_deviation, pictures) if free else None
+        ),
+        pictures=pictures.at(frames[0]) if free else None,
+    )
 
 
 def _exponentials(parameters: FloatArray) -> Hyperparameters:

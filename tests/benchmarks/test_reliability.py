@@ -10,6 +10,7 @@ import pytest
 from benchmarks.reliability.faults import JOBS, faults, filled, plain, trials
 from benchmarks.reliability.folders import CUT, numbers
 from benchmarks.reliability.supervision import KINDS, Fault, Point, supervised
+from pinnray.commands.app import pinnray
 from pinnray.runtime.atomic import write_text
 from pinnray.runtime.errors import UserError
 
@@ -109,11 +110,18 @@ def test_half_a_file_is_seen_and_times_are_not_compared(tmp_path: Path) -> None:
     assert set(numbers(tmp_path).values()) == {CUT}
 
 
+@pytest.mark.parametrize("line", sorted({line for lines in JOBS.values() for line in lines}))
+def test_every_job_is_a_command_of_the_program(line: str) -> None:
+    command, bound, _ = pinnray.parse_args(line.split(), exit_on_error=False, print_error=False)
+    assert command is not None
+    assert bound.arguments
+
+
 @pytest.mark.release
 def test_commands_go_on_after_some_of_the_faults(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What a forked process says is read from its own standard error."""
     with supervisable(), capsys.disabled(), filled(tmp_path) as cache:
         for name in ("compare over an older result", "sweep"):
-            tried = trials(JOBS[name], tmp_path / "job", cache, every=53)
+            tried = trials(JOBS[name], tmp_path / "job", cache, every=71)
             assert len(tried) > 2
             assert not any(tried.values())

@@ -11,7 +11,7 @@ import pytest
 
 from pinnray.cli import main
 from pinnray.film.force_estimate import FrameForce, LiveForce, force_row
-from pinnray.film.publication import FrameLine, Publisher
+from pinnray.film.publication import FrameLine, Publisher, frame_lines
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.identification.tracker import ForceReading
 from pinnray.vision.frames.frame import Frame
@@ -118,8 +118,8 @@ def test_live_displacements_are_from_the_mean_of_the_frames_at_rest_that_show_th
 
 def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(capsys):
     recorder = Recorder()
-    with LiveForce(recorder, DEPTH) as force, Publisher("-", force) as publisher:
-        see = publisher.after(force.watch)
+    with LiveForce(recorder, DEPTH) as force, Publisher("-") as publisher:
+        see = frame_lines(force, publisher)
         see(Frame(0, 0.0, np.zeros((2, 2), dtype=np.uint8)), seen(REST))
         while not force.forces:
             pass
@@ -144,7 +144,7 @@ def test_a_reader_that_has_gone_is_told_in_one_line():
     os.close(reading_end)
     frame = Frame(0, 0.0, np.zeros((2, 2), dtype=np.uint8))
     with Publisher(f"/dev/fd/{writing_end}") as publisher:
-        see = publisher.after(lambda *_: None)
+        see = frame_lines(None, publisher)
         with pytest.raises(UserError, match=r"the reader of \S+ has gone"):
             see(frame, seen(REST))
     os.close(writing_end)

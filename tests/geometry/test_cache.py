@@ -85,9 +85,10 @@ def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.slow
-def test_time_limit_ends_the_worker_with_advice(tmp_path: Path) -> None:
+def test_time_limit_ends_the_worker_with_advice(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("pinnray.geometry.cache.TIMEOUT_S", 0.5)
     with pytest.raises(UserError, match=r"meshing design 'default' was ended after 0\.5 s; use larger"):
-        finger_mesh(Design(), settings=MeshSettings(size=0.02), cache_dir=tmp_path, timeout_s=0.5)
+        finger_mesh(Design(), settings=MeshSettings(size=0.02), cache_dir=tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -107,7 +107,7 @@ def _of_command(line: str) -> str:
     (said,) = error.getvalue().splitlines()
     assert said.startswith("error: ")
     said = said.removeprefix("error: ")
-    parts = [part.removesuffix("s") for word in words for part in re.split(r"[-=,.;/\s]", word) if part]
+    parts = [part.removesuffix("s") for word in words for part in re.split(r"[-=,.;/_\s]", word) if part]
     assert any(part.lower() in said.lower() for part in [*words, *parts]), (
         f"it names no option, value or file: {said}"
     )

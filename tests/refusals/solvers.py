@@ -25,7 +25,6 @@ from pinnray.solvers.elasticity import (
 from pinnray.solvers.fem.adaptive_refinement import adapted
 from pinnray.solvers.fem.solid import affordable
 from pinnray.solvers.finger_figures import figures_of
-from pinnray.solvers.finger_figures.sensitivity import sensitivity_of
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.materials import TensileTest, fitted, preset, read_tensile_test
 from pinnray.solvers.physics import Physics

@@ -20,7 +20,7 @@ def picture(places, scale, *, turn=25.0, order=slice(None), flip=True):
     angle = np.radians(turn)
     rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     pixels = (places @ rotation.T / scale + [800, 300]) * [1, -1 if flip else 1]
-    return Clicks(pixels[order], None, 0.0)
+    return Clicks(pixels[order], None)
 
 
 def found(rest, pressed, **settings):
@@ -70,7 +70,7 @@ def test_noise_is_the_misfit_at_rest():
     assert np.sqrt(np.mean(np.square(noises))) == pytest.approx(0.3, abs=0.03)
 
 
-def test_noise_of_repeats_and_of_a_lattice(tmp_path):
+def test_noise_of_repeats(tmp_path):
     rng = np.random.default_rng(6)
     places = picture(MARKERS, 0.2).places
     lines = ["# ImageJ", "x,y,point"]
@@ -84,12 +84,6 @@ def test_noise_of_repeats_and_of_a_lattice(tmp_path):
     assert len(clicks.places) == len(MARKERS)
     assert clicks.noise == pytest.approx(1.5 / 2, rel=0.25)  # a mean of four
     assert found(clicks, clicks).reason == "the repeats"
-    coarse = Clicks(places, None, 5.0)
-    result = found(coarse, coarse)
-    assert result.noise == pytest.approx(1.0 / np.sqrt(12))
-    assert "lattice of 1 mm" in result.reason
-    path.write_text("x,y\n0,0.5\n1.5,2\n3,0\n")
-    assert read_clicks(path).lattice == pytest.approx(0.5)
 
 
 def test_numbered_points_are_those_of_their_number(tmp_path):

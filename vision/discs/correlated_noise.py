@@ -64,7 +64,7 @@ def correlated_noise(
     variance = np.divide(seen, expected, out=np.full(seen.shape, np.nan), where=expected > 0)
     # Discs of one size take up about the same share of the noise: as that of which most is seen.
     one = weights.sum(axis=1).argmax()
-    scale = fitted.variance[one] * float(expected[one, 0])
+    scale = max(float(fitted.variance[one] * expected[one, 0]), 1e-30)
     absorbed = _absorbed(window, derivatives[one], weights[one], influence[one], inverse[one]) / scale
     return np.asarray(variance / (1 - absorbed), dtype=np.float64)
 

@@ -27,6 +27,8 @@ LARGEST_DEVIATION = 0.5
 """Standard deviation of the centre, pixels, above which a disc counts as not found."""
 LARGEST_RESIDUAL = 0.25
 """Root mean square residual, over the contrast, above which a disc counts as not found."""
+LARGEST_CONTRAST = 400.0
+"""Contrast, grey levels, above which a disc counts as not found: of light that is clipped."""
 RADII = (0.6, 1.6)
 """Accepted ratios of fitted to guessed radius."""
 
@@ -38,11 +40,9 @@ class FittedDiscs:
     Attributes:
         centres: x, y, shape (n, 2), pixels.
         covariances: Of the centres, shape (n, 2, 2), pixels², with correlated noise, such as a codec's,
-            by its median over the discs of about one size.
+            at least its median over the discs of about one size.
         radii: Square root of the product of the semi-axes, shape (n,), pixels.
-        shapes: Stretch and slant as in `vision.discs.disc_image_model`, shape (n, 2); zero for circles.
         contrast: Level around the disc less level within, shape (n,), grey levels; negative for light discs.
-        blur: Width of the edge, with the pixels' own width, shape (n,), pixels.
         seen: Share of the edge that supports the fit, shape (n,).
         found: Shape (n,).
     """
@@ -50,9 +50,7 @@ class FittedDiscs:
     centres: FloatArray
     covariances: FloatArray
     radii: FloatArray
-    shapes: FloatArray
     contrast: FloatArray
-    blur: FloatArray
     seen: FloatArray
     found: BoolArray
 
@@ -126,6 +124,7 @@ def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDis
         & (deviations <= LARGEST_DEVIATION)
         & (np.sqrt(fit.variance) <= LARGEST_RESIDUAL * np.abs(contrast))
         & (np.hypot(*(centres - guesses[:, :2]).T) <= np.maximum(guesses[:, 2], 3))
+        & (np.abs(contrast) <= LARGEST_CONTRAST)
         & (ratio >= RADII[0])
         & (ratio <= RADII[1])
     )
@@ -134,9 +133,7 @@ def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDis
         centres=centres * kept[:, None],
         covariances=fit.covariances * kept[:, None, None],
         radii=radii * kept,
-        shapes=parameters[:, [model.STRETCH, model.SLANT]] * kept[:, None],
         contrast=contrast * kept,
-        blur=blur * kept,
         seen=fit.seen,
         found=found,
     )

@@ -28,15 +28,11 @@ COUNT = 10
 """Parameters of a disc."""
 LOBES = range(3, 10)
 """Waves of an irregular outline; those with one and two lobes are the place and the ellipse."""
-GLARES = ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-"""Powers of x and y, pixels, of the light that a glossy dot and its ground reflect alike."""
-OUTLINE = 2 * len(LOBES) + 1 + len(GLARES)
-"""Parameters of a printed dot: heights of cosine and sine of every wave over the radius, the halo of a
-sharpened edge, over the contrast, and the terms of a glare, grey levels."""
+OUTLINE = 2 * len(LOBES) + 1
+"""Parameters of a printed dot: heights of cosine and sine of every wave over the radius, and the halo
+of a sharpened edge, over the contrast."""
 HALO = COUNT + 2 * len(LOBES)
 """Column of the halo: Φ(z) becomes Φ(z) + κ (Φ(z) - Φ(z / `WIDER`)), as by an unsharp mask."""
-GLARE = range(HALO + 1, COUNT + OUTLINE)
-"""Columns of the glare."""
 WIDER = 1.6
 """Width of the halo over that of the edge; 1.5 for an edge of 0.85 pixels and a mask of 1 pixel."""
 EDGE = 4
@@ -127,22 +123,12 @@ def disc_image(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
         derivatives[:, BLUR] -= z * by_edge
     derivatives[:, SHADE_X] = reflectance * x
     derivatives[:, SHADE_Y] = reflectance * y
-    levels = shade * reflectance
-    if len(waves) == OUTLINE:
-        for column, (power, other) in zip(GLARE, GLARES, strict=True):
-            derivatives[:, column] = term = x**power * y**other
-            levels = levels + columns[column] * term
-    return levels, derivatives
+    return shade * reflectance, derivatives
 
 
 def irregular_columns(width: int) -> tuple[range, int]:
-    """Columns of an irregular outline among those of `width` parameters, and the first of edges beside discs.
-
-    Those of the glare may be left out.
-    """
-    end = COUNT
-    if width >= GLARE.start:
-        end = GLARE.stop if (width - GLARE.stop) % EDGE == 0 else GLARE.start
+    """Columns of an irregular outline among those of `width` parameters, and the first of an edge."""
+    end = COUNT + OUTLINE if width >= COUNT + OUTLINE else COUNT
     return range(COUNT, end), end
 
 

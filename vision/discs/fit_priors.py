@@ -10,10 +10,8 @@ from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     EDGES,
-    GLARE,
     HALO,
     LIGHT,
-    OUTLINE,
     RADIUS,
     SHADE_X,
     SHADE_Y,
@@ -37,8 +35,6 @@ OUTLINE_DEVIATION, OUTLINE_STEP = 0.05, 0.05
 """The same for the waves of an irregular outline, over the radius."""
 HALO_DEVIATION, HALO_STEP = 1.0, 0.3
 """The same for the halo of a sharpened edge, over the contrast."""
-GLARE_DEVIATIONS = (2.0, 2.0, 0.2, 0.2, 0.2)
-"""The same for the terms of a glare, grey levels."""
 BRIGHTER = 3.0
 """Largest light at a disc over the median, and the median over the least; beyond, a level is no measure."""
 CLIPPED = 100.0
@@ -117,8 +113,6 @@ def prior_and_limits(
     mean[:, waves], deviations[:, waves], limits[:, waves] = 0, OUTLINE_DEVIATION, OUTLINE_STEP
     if len(waves):
         deviations[:, HALO], limits[:, HALO] = HALO_DEVIATION, HALO_STEP
-    if len(waves) == OUTLINE:
-        deviations[:, GLARE], limits[:, GLARE] = GLARE_DEVIATIONS, 1e3
     clipped = start[:, LIGHT] >= LIGHTEST
     deviations[clipped, LIGHT] = CLIPPED
     for column, shade, deviation in zip(

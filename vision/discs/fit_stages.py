@@ -47,11 +47,7 @@ def fit_discs_of_one_size(grey: GreyImage, guesses: FloatArray, radii: FloatArra
     reach = max(radii.max(), LEAST_REACH)
     votes = vote_for_centres(grey, guesses, radii, reach, known=known.tolerance < np.inf)
     inner, outer = votes.radii.min() - MARGIN, votes.radii.max() + MARGIN
-    return _fit_windows(PixelWindows.of(grey, votes.centres, inner, outer), votes, known)
-
-
-def _fit_windows(window: PixelWindows, votes: HoughVotes, known: Known) -> DiscFit:
-    """Fit discs to the pixels around them, from their votes."""
+    window = PixelWindows.of(grey, votes.centres, inner, outer)
     trusted = _trusted(window, votes)
     first, residuals = _first_fit(window, votes, trusted, known)
     chosen = coherent_pixels(window, first, residuals)
@@ -75,7 +71,8 @@ def _fit_windows(window: PixelWindows, votes: HoughVotes, known: Known) -> DiscF
             noise[again] = own
     if np.isfinite(noise).any():
         # What a robust fit leaves out shifts a disc as well, so none has less noise than is usual.
-        inflation = np.fmax(noise, np.nanmedian(noise, axis=0)).max(axis=1)
+        usual = np.maximum(np.nanmedian(noise, axis=0), 1e-3)  # pictures without any noise have none
+        inflation = np.fmax(noise, usual).max(axis=1)
         first.covariances *= inflation[:, None, None]
         first.shade_precision /= inflation[:, None]
     return first

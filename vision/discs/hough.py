@@ -146,13 +146,4 @@ def _densest(x: Floats, y: Floats, strength: Floats, most: int) -> tuple[FloatAr
     inner = density[:, MARGIN:-MARGIN, MARGIN:-MARGIN].reshape(count, -1)
     best, each = inner.argmax(axis=1), np.arange(count)
     row, column = np.array(np.divmod(best, side - 2 * MARGIN)) + MARGIN
-    peak = inner[each, best]
-
-    def vertex(before: FloatArray, after: FloatArray) -> FloatArray:
-        """Vertex of the parabola through the peak and its neighbours."""
-        curvature = np.maximum(2 * peak - before - after, 1e-9 + 0.1 * peak)
-        return np.asarray(0.5 * (after - before) / curvature)
-
-    shift_x = vertex(density[each, row, column - 1], density[each, row, column + 1])
-    shift_y = vertex(density[each, row - 1, column], density[each, row + 1, column])
-    return np.stack([column + shift_x, row + shift_y], axis=1) - (most + MARGIN), peak
+    return np.stack([column, row], axis=1).astype(np.float64) - (most + MARGIN), inner[each, best]

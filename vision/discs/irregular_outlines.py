@@ -16,10 +16,7 @@ from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     COUNT,
-    GLARE,
-    GLARES,
     HALO,
-    LIGHT,
     LOBES,
     OUTLINE,
     RADIUS,
@@ -34,15 +31,12 @@ from pinnray.vision.discs.disc_image_model import (
 )
 from pinnray.vision.discs.fit_priors import MISSING, Known, prior_and_limits
 from pinnray.vision.discs.least_squares import (
-    NONE,
     DiscFit,
-    DiscPrior,
     fit_disc_model,
     misfit,
-    normal_matrices,
     refined_fit,
 )
-from pinnray.vision.discs.pixel_windows import DARKEST, LIGHTEST, PixelWindows
+from pinnray.vision.discs.pixel_windows import PixelWindows
 from pinnray.vision.discs.straight_edges import with_edges
 
 PENALTY = 40.0
@@ -55,13 +49,12 @@ EXCURSION = 0.3
 """Largest deviation of a printed dot's outline, over the radius."""
 ROUGH = 0.06
 """Largest residual of a printed dot, root mean square over the contrast, without the noise."""
+TAKEN_UP = 4.0
+"""Noise of specks that outlines take up, over the excess that they leave; as on the virtual rig."""
 LEAST_SEEN = 0.7
 """Share of an irregular outline that must support its fit."""
 OTHER_SIZE = 5.0
 """Deviation of a known radius, in standard deviations, from which on a disc counts as partly hidden."""
-GLOSSY, LEAST_GLOSSY = 0.02, 0.45
-"""Largest residual, as above, and least share of the outline, of a dot before a glare is sought on it: half a
-dot and a glare could fit as well."""
 
 
 def better_outlines(
@@ -93,13 +86,14 @@ def better_outlines(
         good[tried] = _whole(window.at(tried), lenient, radii[tried], known.tolerance)
     (better,) = np.nonzero(good)
     outlines, own = outlines.at(better), window.at(better)
-    counted = correlated_noise(own, outlines, residuals[better], own.within, radii[better], known.at(better))
+    noise = correlated_noise(own, outlines, residuals[better], own.within, radii[better], known.at(better))
+    noise += TAKEN_UP * np.maximum(noise - 1, 0)
+    if np.isfinite(noise).any():
+        noise = np.fmax(noise, np.nanmedian(noise, axis=0))
     parameters = outlines.parameters.copy()
     parameters[:, [X, Y]] += outline_centroid(parameters)
-    curved = parameters[:, GLARE][:, [power + other == 2 and power != 1 for power, other in GLARES]]
-    parameters[:, LIGHT] += curved.sum(axis=1) * parameters[:, RADIUS] ** 2 / 2  # its mean along the edge
     columns = [*range(COUNT), *range(COUNT + OUTLINE, parameters.shape[1])]
-    return better, replace(outlines, parameters=parameters[:, columns]), counted
+    return better, replace(outlines, parameters=parameters[:, columns]), noise
 
 
 def _whole(window: PixelWindows, outlines: DiscFit, radii: FloatArray, tolerance: float) -> BoolArray:
@@ -121,45 +115,17 @@ def _outlined(
     start = start[:, :COUNT].copy()
     start[:, [STRETCH, SLANT]] = 0
     start[:, RADIUS] = radii
-    matte = GLARE.start if lenient else GLARE.stop  # beside the glare an occluder's edge is not seen
-    start = np.concatenate([start, np.zeros((len(start), matte - COUNT))], axis=1)
+    start = np.concatenate([start, np.zeros((len(start), OUTLINE))], axis=1)
     for _ in range(2):
         start = _by_moments(window, start)
     start, present = with_edges(window, start, window.within)
-    start = np.insert(start, [GLARE.start] * (GLARE.stop - matte), 0.0, axis=1)
     prior, limits = prior_and_limits(start, present, radii, known)
-    matt, plain = (prior._replace(precision=prior.precision.copy()) for _ in range(2))
-    matt.precision[:, GLARE] = MISSING**-2.0
-    plain.precision[:, [HALO, *GLARE]] = MISSING**-2.0  # a halo is sought after the outline
+    plain = prior._replace(precision=prior.precision.copy())
+    plain.precision[:, HALO] = MISSING**-2.0  # a halo is sought after the outline
     if lenient:
         return fit_disc_model(window, start, plain, limits, window.within, lenient=True)
-    priors = [plain, *[matt] * (REFINEMENTS - 1)]
-    fit, residuals = refined_fit(window, priors, start, limits, window.within)
-    rough = np.sqrt(np.maximum(fit.variance - window.noise**2, 0)) / np.abs(fit.parameters[:, CONTRAST])
-    likely = fit.settled & (rough < GLOSSY) & (fit.seen > LEAST_GLOSSY)
-    (glossy,) = np.nonzero(likely & (_gain_of_glare(window, fit, residuals, prior) > PENALTY))
-    if len(glossy):
-        some, start, own = window.at(glossy), fit.parameters[glossy], prior.at(glossy)
-        part, left = refined_fit(some, [own] * (REFINEMENTS - 1), start, limits[glossy], some.within)
-        fit.put(glossy, part)
-        residuals[glossy] = left
-    return fit, residuals
-
-
-def _gain_of_glare(window: PixelWindows, fit: DiscFit, residuals: Array, prior: DiscPrior) -> FloatArray:
-    """Gain in logarithmic likelihood by a glare, to first order, beside the other parameters, shape (n,)."""
-    _, derivatives = disc_image(fit.parameters.astype(np.float32), window.x, window.y)
-    noise = np.sqrt(fit.variance)[:, None]
-    counted = window.within & (np.abs(residuals) < NONE * noise)
-    counted &= (window.values > DARKEST) & (window.values < LIGHTEST)
-    inverse = np.linalg.inv(
-        normal_matrices(derivatives, counted.astype(np.float32), fit.variance, prior.precision)
-    )
-    pull = (derivatives @ (counted * residuals)[:, :, None])[:, :, 0] / noise**2
-    pull += prior.precision * (prior.mean - fit.parameters)
-    steps = (inverse @ pull[:, :, None])[:, GLARE]
-    own = inverse[:, GLARE][:, :, GLARE]
-    return np.asarray((steps.transpose(0, 2, 1) @ np.linalg.solve(own, steps))[:, 0, 0] / 2)
+    priors = [plain, *[prior] * (REFINEMENTS - 1)]
+    return refined_fit(window, priors, start, limits, window.within)
 
 
 def _by_moments(window: PixelWindows, start: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ Robust Statistics, Wiley 1981, chapter 7 (regression, scale by the median absolu
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +19,6 @@ from pinnray.vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     EDGE,
-    GLARE,
-    OUTLINE,
     RADIUS,
     SHADE_X,
     SHADE_Y,
@@ -61,8 +59,6 @@ SHARPEST = 0.3
 """Width of an edge without any blur, pixels: that of the pixels themselves."""
 MOST_BENT = 0.08
 """Largest curvature of an edge beside a disc, over that of the disc: walls bend less."""
-ABSENT = 1e5
-"""Precision of a parameter from which on it is held at its mean, zero."""
 FAINT = 1e-5
 """Precision, relative and absolute, that is added for every parameter; it decides where few pixels do."""
 
@@ -141,14 +137,6 @@ def fit_disc_model(
     Returns:
         The fit and the residuals of the pixels, shape (n, p).
     """
-    if len(kept := _columns(start, prior)) < start.shape[1]:
-        fewer = DiscPrior(prior.mean[:, kept], prior.precision[:, kept])
-        fit, residuals = fit_disc_model(
-            window, start[:, kept], fewer, limits[:, kept], chosen, lenient=lenient
-        )
-        parameters = np.zeros_like(start)
-        parameters[:, kept] = fit.parameters
-        return replace(fit, parameters=parameters), residuals
     count, width = start.shape
     result = DiscFit.start(start.copy(), window.origins)
     information = np.tile(np.eye(width), (count, 1, 1))
@@ -165,7 +153,7 @@ def fit_disc_model(
             most = most + 1e3
         noise = np.minimum(SCALE * median_where(np.abs(residuals), counted), most)
         noise = np.maximum(noise, QUANTISATION**0.5)
-        agreement = robust_weights(residuals / noise[:, None].astype(np.float32), allowed)
+        agreement = robust_weights(residuals / noise[:, None], allowed)
         weights = agreement * counted
         squares = (weights * residuals**2).sum(axis=1)
         variance = np.maximum(squares / np.maximum(weights.sum(axis=1) - width, 1), QUANTISATION)
@@ -196,7 +184,7 @@ def fit_disc_model(
     return result, all_residuals
 
 
-def robust_weights(ratios: Array, allowed: BoolArray) -> Array:
+def robust_weights(ratios: Array | FloatArray, allowed: BoolArray) -> Array:
     """Weights of residuals over their noise, shape (n, p); zero where a pixel is not allowed."""
     return np.asarray(np.clip((NONE - np.abs(ratios)) / (NONE - FULL), 0, 1) * allowed, dtype=np.float32)
 
@@ -223,15 +211,6 @@ def beyond_limits(values: Array, levels: Array) -> BoolArray:
     """Pixels that the model clips and the image shows as clipped, so that they say no more, shape (n, p)."""
     light = (levels >= LIGHTEST) & (values >= LIGHTEST - DOUBT)
     return np.asarray(light | (levels <= DARKEST) & (values <= DARKEST + DOUBT))
-
-
-def _columns(start: FloatArray, prior: DiscPrior) -> list[int]:
-    """Columns of the parameters without a glare and edges that no disc has."""
-    waves, first = irregular_columns(start.shape[1])
-    edges = [range(edge, edge + EDGE) for edge in range(first, start.shape[1], EDGE)]
-    present = [column for edge in edges if start[:, edge].any() for column in edge]
-    matt = len(waves) == OUTLINE and (prior.precision[:, GLARE] >= ABSENT).all()
-    return [*range(GLARE.start if matt else first), *present]
 
 
 def refined_fit(

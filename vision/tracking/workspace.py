@@ -115,7 +115,7 @@ def workspace_svg(workspace: Workspace, finger: Finger) -> str:
     discs = "\n".join(
         f'    <circle cx="{x:.6g}" cy="{y:.6g}" r="{radius:.6g}"/>' for x, y in workspace.points
     )
-    outline = " ".join(f"{x:.6f},{y:.6f}" for x, y in finger.section.outline.flattened()[0])
+    outline = " ".join(f"{x:.6f},{y:.6f}" for x, y in finger.section.outline.flattened())
     middle = (left + right) / 2
     start, end, base = middle - RULER / 2, middle + RULER / 2, bottom + 4
     return f"""<?xml version="1.0" encoding="UTF-8"?>

@@ -43,11 +43,13 @@ def cook() -> tuple[Row, ...]:
         problem = membrane(Material(young=70.0, poisson=poisson), total_force=100.0)
         corner = problem.solve(2).displacement(problem.mesh.locate([CORNER]))[0, 1]
         name = f"deflection of the upper corner, mm, ν = {poisson}"
-        rows.append(published(name, corner, value, 0.005, 2, "strain"))
+        rows.append(published(name, corner, value, 0.005))
     return tuple(rows)
 
 
-def published(quantity: str, measured: float, value: float, part: float, degree: int, plane: str) -> Row:
+def published(
+    quantity: str, measured: float, value: float, part: float, degree: int = 2, plane: str = "strain"
+) -> Row:
     """A row with a relative tolerance about a published number."""
     return Row(quantity, float(measured), about(value, part * value), degree, plane)
 

@@ -29,22 +29,11 @@ SHIFT = 0.007
 def friction() -> tuple[Row, ...]:
     """Forces on the layer over those of the closed forms; partial slip of the block."""
     sticking, slipping = pressed_layer(20.0), pressed_layer(60.0)
-    stiffness = 0.5 * np.tan(np.radians(20.0))
+    elastic = middle_ratio(sticking) / (0.5 * np.tan(np.radians(20.0)))
+    coulomb = middle_ratio(slipping) / COEFFICIENT
     return (
-        Row(
-            "layer that sticks, friction / pressure / elastic",
-            middle_ratio(sticking) / stiffness,
-            about(1, 0.03),
-            2,
-            "strain",
-        ),
-        Row(
-            "layer that slips, friction / pressure / μ",
-            middle_ratio(slipping) / COEFFICIENT,
-            about(1, 1e-6),
-            2,
-            "strain",
-        ),
+        Row("layer that sticks, friction / pressure / elastic", elastic, about(1, 0.03)),
+        Row("layer that slips, friction / pressure / μ", coulomb, about(1, 1e-6)),
         *partial_slip(),
     )
 
@@ -80,21 +69,11 @@ def partial_slip() -> tuple[Row, ...]:
     law = ellipse(x / half) - sticking / half * ellipse(x / sticking)
     away = np.sqrt(np.mean((np.abs(points.friction) / peak - law) ** 2))
     return (
+        Row("friction / limit of friction", abs(shear) / (COEFFICIENT * pressing), about(0.4, 0.1)),
         Row(
-            "friction / limit of friction",
-            abs(shear) / (COEFFICIENT * pressing),
-            about(0.4, 0.1),
-            2,
-            "strain",
+            "width that sticks / that of Mindlin", region.sticking / 2 / sticking, about(1, FINEST / sticking)
         ),
-        Row(
-            "width that sticks / that of Mindlin",
-            region.sticking / 2 / sticking,
-            about(1, FINEST / sticking),
-            2,
-            "strain",
-        ),
-        Row("friction less Mindlin's / μ peak pressure, rms", float(away), at_most(0.06), 2, "strain"),
+        Row("friction less Mindlin's / μ peak pressure, rms", float(away), at_most(0.06)),
     )
 
 

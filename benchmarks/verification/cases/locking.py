@@ -31,16 +31,10 @@ def locking() -> tuple[Row, ...]:
     problems = [cantilever_problem(material, cells) for cells in (16, 32)]
     errors = [problem.errors(problem.solve(2), exact) for problem in problems]
     rows += slope_rows(errors, 2, "strain", about(3, 0.3), about(2, 0.3), ", ν = 0.4999")
-    rows += [
-        Row(
-            f"energy with 0.5 mm / with 0.25 mm elements, default finger, ν = {poisson}",
-            finger_energy(poisson, 2, 0.5) / finger_energy(poisson, 2, 0.25),
-            between(1.0, 1.01),
-            2,
-            "strain",
-        )
-        for poisson in (0.3, 0.4999)
-    ]
+    for poisson in (0.3, 0.4999):
+        ratio = finger_energy(poisson, 2, 0.5) / finger_energy(poisson, 2, 0.25)
+        name = f"energy with 0.5 mm / with 0.25 mm elements, default finger, ν = {poisson}"
+        rows.append(Row(name, ratio, between(1.0, 1.01)))
     usual = finger_excess(0.3)
     for poisson in (0.45, 0.48, 0.49):
         measured = finger_excess(poisson) / usual

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Mark, Scale, place
-from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, check_twice, joined
+from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, joined
 from pinnray.geometry.drawing.formats.pieces import Piece
 from pinnray.geometry.section.loop import STRAIGHT, Loop
 from pinnray.runtime.arrays import FloatArray
@@ -46,6 +46,7 @@ def assembled(
     Raises:
         UserError: If a curve does not close, the markers differ in diameter, or one is no circle.
     """
+    check_extent(pieces, scale)  # in a wrong unit no marker would be a circle
     discs = _discs([piece for piece in pieces if piece.label == "markers"])
     diameters = [diameter for _, diameter in discs]
     if diameters and np.ptp(diameters) > 0.01 * max(diameters):
@@ -145,7 +146,6 @@ def straightened(loop: Loop, deviation: float = 1e-7) -> Loop:
 def _chained(loose: Sequence[Piece], reach: float) -> Closed:
     """Closed curves of pieces that are all part of one."""
     found = joined(loose, reach)
-    check_twice(found)
     check_ends(found, reach)
     pieces, nodes, places, gaps = found
     at: dict[int, list[int]] = {}
@@ -179,37 +179,26 @@ def _marked(loops: tuple[Loop, ...], mark: Piece) -> tuple[Loop, ...]:
     arc = Loop(np.array([mark.start, mark.end]), np.array([mark.bulge, 0.0]), (mark.label, ""))
     middle = arc.along(0, 0.5)
     number = int(np.argmin([loop.places(middle).distances[0] for loop in loops]))
-    loop = loops[number]
-    off = [loop.places(middle).distances[0]]
-    for point in (mark.start, mark.end):
-        (which,), (fraction,), (distance,) = loop.places(point[None])
-        off.append(distance)
-        loop = cut_at(loop, which, fraction)
-    if max(off) > 0.01:
+    ends = np.stack([mark.start, mark.end])
+    off = loops[number].places(np.concatenate([middle, ends])).distances.max()
+    if off > 0.01:
         raise UserError(
-            f"the line {mark.label!r} from {place(mark.start)} to {place(mark.end)} is {max(off):.3g} mm off "
+            f"the line {mark.label!r} from {place(mark.start)} to {place(mark.end)} is {off:.3g} mm off "
             "every boundary; draw it on the boundary"
         )
-    first, last = (corner_at(loop, point) for point in (mark.start, mark.end))
-    under = loop.places(middle).pieces[0]
-    names = list(loop.names)
-    way = run_between(first, last, len(names))
-    for which in way if under in way else run_between(last, first, len(names)):
-        names[which] = mark.label
+    loop, ways = between(loops[number], ends)
+    under = next(way for way in ways if loop.places(middle).pieces[0] in way)
+    names = (mark.label if which in under else name for which, name in enumerate(loop.names))
     return (*loops[:number], loop.renamed(names), *loops[number + 1 :])
 
 
-def cut_at(loop: Loop, which: int, fraction: float) -> Loop:
-    """The curve with a corner at a place, unless there is one within `JOIN`."""
-    along = loop.lengths[which] * np.array([fraction, 1 - fraction])
-    return loop if along.min() <= JOIN else loop.split(which, [fraction])
-
-
-def corner_at(loop: Loop, point: FloatArray) -> int:
-    """Number of the corner nearest to a point."""
-    return int(np.linalg.norm(loop.points - point, axis=1).argmin())
-
-
-def run_between(first: int, last: int, count: int) -> list[int]:
-    """Numbers of the pieces from corner `first` to corner `last`, along the curve."""
-    return [(first + step) % count for step in range((last - first) % count)]
+def between(loop: Loop, ends: FloatArray) -> tuple[Loop, list[list[int]]]:
+    """The curve with corners at two points on it, (2, 2), mm, and the pieces of both ways between them."""
+    for point in ends:
+        (which,), (share,), _ = loop.places(point[None])
+        if loop.lengths[which] * min(share, 1 - share) > JOIN:
+            loop = loop.split(int(which), [share])
+    first, last = np.linalg.norm(loop.points - ends[:, None], axis=2).argmin(axis=1).tolist()
+    count = len(loop.points)
+    ways = ((first, last), (last, first))
+    return loop, [[(start + step) % count for step in range((end - start) % count)] for start, end in ways]

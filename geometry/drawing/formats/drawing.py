@@ -41,11 +41,10 @@ class Mark(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MeshInFile:
-    """A plane triangle mesh of a file: nodes (n, 2), mm, triangles (t, 3), and its physical groups."""
+    """A plane triangle mesh of a file: nodes (n, 2), mm, triangles (t, 3), and its physical surfaces."""
 
     points: FloatArray
     triangles: IntArray
-    edges: Mapping[str, IntArray]  # of each group of curves, (k, 2)
     parts: Mapping[str, IntArray] = field(default_factory=dict)  # numbers of each surface group's triangles
 
 

@@ -109,28 +109,13 @@ def check_extent(pieces: Sequence[Piece], scale: Scale) -> None:
         )
 
 
-def check_twice(found: Joined) -> None:
-    """Raise a `UserError` if a piece is drawn twice."""
-    seen: dict[tuple[int, int, float], int] = {}
-    for number, (piece, (start, end)) in enumerate(zip(found.pieces, found.nodes.tolist(), strict=True)):
-        forward = start < end
-        key = (min(start, end), max(start, end), round(piece.bulge if forward else -piece.bulge, 6) + 0.0)
-        if key in seen:
-            raise UserError(
-                f"the curve from {place(found.places[start])} to {place(found.places[end])} is drawn twice; "
-                "delete one"
-            )
-        seen[key] = number
-
-
 def check_ends(found: Joined, tolerance: float) -> None:
     """Raise a `UserError` if a boundary forks or is open, with the tolerance that closes small gaps."""
     numbers, times = np.unique(found.nodes, return_counts=True)
     if (times > 2).any():
         where = found.places[numbers[times > 2][0]]
         raise UserError(
-            f"{times.max()} curves meet at {place(where)}; a boundary has two at every corner and does not "
-            "touch itself"
+            f"{times.max()} curves meet at {place(where)}; a boundary has two at every corner, and none twice"
         )
     loose = found.places[numbers[times == 1]]
     if not len(loose):

@@ -78,14 +78,7 @@ def _plane_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
     contact = raw.nodes.get("contact")
     ready = None
     if {"base", "contact"} <= set(raw.edges):
-        number = np.full(len(points), -1)
-        number[used] = np.arange(len(used))
-        ready = MeshInFile(
-            points=points[used],
-            triangles=triangles,
-            edges={name: number[edges] for name, edges in raw.edges.items()},
-            parts=raw.parts,
-        )
+        ready = MeshInFile(points[used], triangles, raw.parts)
     return Drawing(
         loops=tuple(straightened(loop, FLAT) for loop in loops),
         unit=unit,

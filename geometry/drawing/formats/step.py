@@ -26,12 +26,12 @@ PARALLEL = 1e-6
 
 
 class Cut(NamedTuple):
-    """A plane section of a solid."""
+    """A section of a solid, turned so that it lies across z."""
 
     faces: Sequence[cq.Face]
-    normal: FloatArray  # of the plane, unit vector (3,)
-    offset: float  # of the plane from the origin along the normal, mm
-    depth: float  # of the solid along the normal, mm
+    frame: cq.Location  # from the turned solid's frame into the file's
+    offset: float  # of the section along z, mm
+    depth: float  # of the solid along z, mm
     is_extruded: bool = True
 
 
@@ -59,25 +59,25 @@ def read_step(
     scale = Scale(UNITS[units], units, "given") if units else Scale(origin="of the file")
     unit = scale.length
     cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
-    axes = axes_across(cut.normal)
     pieces = [
         piece
         for face in _united(cut.faces)
         for wire in face.Wires()
         for edge in wire.Edges()
-        for piece in _pieces(edge, axes, unit)
+        for piece in _pieces(edge, unit)
     ]
-    centres, diameters, heights = _discs(markers, axes, cut.normal)
+    discs = np.array([_disc(marker.moved(cut.frame.inverse)) for marker in markers]).reshape(-1, 4) * unit
     depth = f"{cut.depth * unit:.6g} mm"
     how = f"extruded by {depth}" if cut.is_extruded else f"cut, {depth} across"
     closed = closed_loops(pieces, scale=scale, tolerance=tolerance)
+    normal = _array(cq.Plane(cut.frame).zDir)
     return Drawing(
         loops=closed.loops,
         unit=unit,
-        note=f"STEP, {how}, at {plane_text(cut.normal, cut.offset)}{closed.note}",
-        markers=centres * unit,
-        marker_diameter=float(np.mean(diameters)) * unit if markers else None,
-        marker_height=float(np.mean(heights)) * unit if markers else None,
+        note=f"STEP, {how}, at {plane_text(normal, cut.offset)}{closed.note}",
+        markers=discs[:, :2],
+        marker_diameter=float(discs[:, 2].mean()) if markers else None,
+        marker_height=float(discs[:, 3].mean()) if markers else None,
         depth=cut.depth * unit,
     )
 
@@ -102,24 +102,19 @@ def _across(solid: cq.Solid) -> Cut:
 
     Pockets that do not reach half the depth, as for markers, are left out.
     """
-    normals = _directions(solid)
-    fitting = [normal for normal in normals if _is_extruded(solid, normal)]
-    for normal in sorted(fitting, key=lambda normal: -abs(normal[2])):
-        low, high = _extent(solid, normal)
-        middle = _cut_at(solid, normal, 0.5 * (low + high))
-        area = sum(face.Area() for face in middle.faces)
+    for normal in sorted(_directions(solid), key=lambda normal: -abs(normal[2])):
+        frame, turned = _turned(solid, normal)
+        if not _is_extruded(turned):
+            continue
+        low, high = _extent(turned)
+        middle = _section(turned, 0.5 * (low + high))
+        area = sum(face.Area() for face in middle)
         for offset in (low, high):  # a cap has the edges of the file
-            cap = [
-                face
-                for face in solid.Faces()
-                if face.geomType() == "PLANE"
-                and np.linalg.norm(np.cross(_array(face.normalAt()), normal)) < PARALLEL
-                and abs(float(_array(face.Center()) @ normal) - offset) < 1e-6
-            ]
+            cap = [face for face in turned.Faces() if np.abs(np.subtract(_extent(face), offset)).max() < 1e-6]
             if abs(sum(face.Area() for face in cap) - area) < 1e-7 * area:
-                return Cut(cap, normal, offset, high - low)
+                return Cut(cap, frame, offset, high - low)
         if area * (high - low) > 0.5 * solid.Volume():
-            return Cut(middle.faces, normal, 0.5 * (low + high), high - low)
+            return Cut(middle, frame, 0.5 * (low + high), high - low)
     raise UserError('the solid is not extruded; give the plane of the section, such as plane = "z = 6"')
 
 
@@ -135,10 +130,10 @@ def _directions(solid: cq.Solid) -> list[FloatArray]:
     return found
 
 
-def _is_extruded(solid: cq.Solid, normal: FloatArray) -> bool:
-    """Whether every face is parallel to the direction `normal`, or plane and across it."""
-    for face in solid.Faces():
-        slopes = [abs(float(each @ normal)) for each in _normals(face)]
+def _is_extruded(turned: cq.Shape) -> bool:
+    """Whether every face is parallel to z, or plane and across it."""
+    for face in turned.Faces():
+        slopes = [abs(float(normal[2])) for normal in _normals(face)]
         if slopes and not (max(slopes) < PARALLEL or min(slopes) > 1 - PARALLEL):
             return False
     return True
@@ -157,38 +152,52 @@ def _normals(face: cq.Face) -> Iterator[FloatArray]:
 
 def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
     """The cut of a solid with a plane; its depth is the solid's extent across the plane."""
-    low, high = _extent(solid, normal)
-    if not low - 1e-6 <= offset <= high + 1e-6:  # an end face is in a plane that may be meant
+    frame, turned = _turned(solid, normal)
+    sign = float(np.sign(_array(cq.Plane(frame).zDir) @ normal))
+    height = sign * offset
+    low, high = _extent(turned)
+    if not low - 1e-6 <= height <= high + 1e-6:  # an end face is in a plane that may be meant
+        ends = sorted((sign * low, sign * high))
         raise UserError(
-            f"the plane {plane_text(normal, offset)} misses the solid, which reaches from {low:.6g} to "
-            f"{high:.6g} mm along that direction"
+            f"the plane {plane_text(normal, offset)} misses the solid, which reaches from {ends[0]:.6g} to "
+            f"{ends[1]:.6g} mm along that direction"
         )
-    size = 4 * solid.BoundingBox().DiagonalLength + abs(offset)
-    plane = cq.Face.makePlane(size, size, cq.Vector(*(normal * offset)), cq.Vector(*normal))
-    middle = _array(solid.BoundingBox().center)
-    shift = middle - normal * (middle @ normal)
-    faces = plane.moved(cq.Location(cq.Vector(*shift))).intersect(solid).Faces()
+    faces = _section(turned, height)
     if not faces:
         raise UserError(
             f"the plane {plane_text(normal, offset)} only touches the solid; move it into the solid"
         )
-    return Cut(faces, normal, offset, high - low, _is_extruded(solid, normal))
+    return Cut(faces, frame, height, high - low, _is_extruded(turned))
 
 
-def _extent(solid: cq.Solid, normal: FloatArray) -> tuple[float, float]:
-    """Where the solid begins and ends along a direction, mm."""
-    plane = cq.Plane(origin=(0, 0, 0), xDir=tuple(axes_across(normal)[0]), normal=tuple(normal))
-    box = solid.moved(cq.Location(plane).inverse).BoundingBox()
+def _turned(solid: cq.Solid, normal: FloatArray) -> tuple[cq.Location, cq.Shape]:
+    """A frame whose z axis is along a direction, either way, and the solid as it is seen there."""
+    axes = axes_across(normal)
+    plane = cq.Plane(origin=(0, 0, 0), xDir=tuple(axes[0]), normal=tuple(np.cross(*axes)))
+    return cq.Location(plane), solid.moved(cq.Location(plane).inverse)
+
+
+def _extent(shape: cq.Shape) -> tuple[float, float]:
+    """Where a shape begins and ends along z, mm."""
+    box = shape.BoundingBox()
     return float(box.zmin), float(box.zmax)
 
 
-def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
-    """An edge in the plane spanned by two axes (2, 3), mm of the file."""
+def _section(shape: cq.Shape, height: float) -> list[cq.Face]:
+    """The faces in which a shape is cut across z at a height, mm."""
+    box = shape.BoundingBox()
+    size = 4 * box.DiagonalLength
+    plane = cq.Face.makePlane(size, size, cq.Vector(box.center.x, box.center.y, height))
+    return plane.intersect(shape).Faces()
+
+
+def _pieces(edge: cq.Edge, unit: float) -> Iterator[Piece]:
+    """An edge in a plane across z, mm of the file."""
     first, last = edge._bounds()
 
     def on_edge(parameters: FloatArray) -> FloatArray:
         points = [_array(edge.positionAt(float(t), mode="parameter")) for t in parameters]
-        return unit * (np.array(points) @ axes.T)
+        return unit * np.array(points)[:, :2]
 
     if edge.geomType() == "LINE":
         start, end = on_edge(np.array([first, last]))
@@ -197,17 +206,11 @@ def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
         yield from arcs_along(on_edge, first, last, "")
 
 
-def _discs(
-    markers: Sequence[cq.Solid], axes: FloatArray, normal: FloatArray
-) -> tuple[FloatArray, list[float], list[float]]:
-    """Centres (m, 2), diameters and heights of markers; each is taken for a cylinder of its volume."""
-    centres = [axes @ _array(marker.Center()) for marker in markers]
-    heights = [high - low for low, high in (_extent(marker, normal) for marker in markers)]
-    diameters = [
-        float(np.sqrt(4 * marker.Volume() / (np.pi * height)))
-        for marker, height in zip(markers, heights, strict=True)
-    ]
-    return np.array(centres).reshape(-1, 2), diameters, heights
+def _disc(marker: cq.Shape) -> tuple[float, float, float, float]:
+    """Centre, diameter and height of a marker, which is taken for a cylinder of its volume along z, mm."""
+    low, high = _extent(marker)
+    centre = marker.Center()
+    return centre.x, centre.y, float(np.sqrt(4 * marker.Volume() / (np.pi * (high - low)))), high - low
 
 
 def _array(vector: cq.Vector) -> FloatArray:

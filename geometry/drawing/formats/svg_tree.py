@@ -73,10 +73,10 @@ def view_box(element: ET.Element) -> ViewBox | None:
 
 
 def svg_scale(root: ET.Element, units: str | None) -> Scale:
-    """Length of a user unit by `width`, `height` and `viewBox`, or the given one.
+    """Length of a user unit by `width`, `height` and `viewBox`, or the given one; the smaller if both differ.
 
     Raises:
-        UserError: If width and height give two different ones, or one of them is no length of paper.
+        UserError: If one of them is no length of paper.
     """
     if units:
         return Scale(UNITS[units], units, "given")
@@ -94,13 +94,8 @@ def svg_scale(root: ET.Element, units: str | None) -> Scale:
             raise UserError(f"{text!r} is no width or height; write for instance 60mm")
         guessed &= parts[2].lower() in ("", "px")
         found.append(length / getattr(box, name) if box else LENGTHS[""])
-    if found and max(found) > min(found) * 1.001:
-        raise UserError(
-            f"width and height give {found[0]:.6g} and {found[1]:.6g} mm in a user unit; "
-            "make them agree with the viewBox"
-        )
     return Scale(
-        found[0] if found else LENGTHS[""], "user units", "assumed" if guessed or not box else "of the file"
+        min(found) if found else LENGTHS[""], "user units", "assumed" if guessed or not box else "of the file"
     )
 
 

@@ -63,8 +63,8 @@ def command(
         forces_of,
         write_forces,
     )
-    from pinnray.film.publication import Publisher
-    from pinnray.film.track_film import displacement_line, track_film, track_table
+    from pinnray.film.publication import Publisher, frame_lines, shown_line
+    from pinnray.film.track_film import track_film, track_table
     from pinnray.runtime.machine import machine, package_versions
     from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
     from pinnray.runtime.stages import Stages
@@ -88,10 +88,11 @@ def command(
             if mesh is not None and material and live:
                 tracker = force_tracker(mesh, material, design.markers, design.marker_radius)
                 following = stack.enter_context(LiveForce(tracker, design.depth))
-            line = stack.enter_context(Live(console=console, refresh_per_second=10)) if live else None
-            watch = displacement_line(line, following) if line else None
-            if watch is not None and publish is not None:
-                watch = stack.enter_context(Publisher(publish, following)).after(watch)
+            watch = None
+            if live:
+                line = stack.enter_context(Live(console=console, refresh_per_second=10))
+                published = [] if publish is None else [stack.enter_context(Publisher(publish))]
+                watch = frame_lines(following, shown_line(line, following), *published)
             report = stack.enter_context(stages.stage("track"))
             tracking, observations = track_film(
                 film, design, folder, report, video=not without_video, record=record, watch=watch

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
+from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
 from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
 from pinnray.options.shared import (
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from pinnray.film.measured_film import MeasuredFilm
 
 
+@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
@@ -44,7 +46,6 @@ def command(
     out: OptionalOutputPath = None,
     pictures: Annotated[str, Parameter(group=OUTPUT)] = "",
     resume: OutputFlag = False,
-    quiet: OutputFlag = False,
     json_: Annotated[bool, Parameter(name="--json", group=OUTPUT)] = False,
 ) -> int:
     """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
@@ -74,7 +75,6 @@ def command(
         out: Output folder; default out/DESIGN.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         resume: Reuse solutions that an earlier run finished.
-        quiet: Show no progress and no table.
         json_: Print metrics.json and nothing else.
     """
     from pinnray.comparison.pipeline.job import Job
@@ -120,7 +120,7 @@ def command(
             ),
         )
         try:
-            with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
+            with Stages(Console(stderr=True), quiet=json_) as stages:
                 comparison = run(job, stages, pool)
         except KeyboardInterrupt:
             kept = job.out.with_name(f"{job.out.name}.partial").exists()
@@ -134,7 +134,7 @@ def command(
         say(f"warning: {remark}")
     if json_:
         print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
-    elif not quiet:
+    else:
         console = Console()
         if comparison.observations.known:
             console.print(marker_table(comparison))

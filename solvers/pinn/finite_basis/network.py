@@ -206,23 +206,11 @@ class FiniteBasisField:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        return self.basis.evaluated(location.points, self.displacement_of_patch)
+        return self.displacement_and_gradient(location)[0]
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         return self.displacement_and_gradient(location)[1]
-
-    def displacement_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
-        """Displacement at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2), mm."""
-        window = self.basis.windows.values(points, near).mul_(self.basis.constraint.at(points)[0])
-        constant, output = self.output[near].split([1, self.output.shape[2] - 1], dim=2)
-        weights, bias = self.basis.neurons[:, :, near].flatten(1).split([2, 1])
-        # c tanh(t) = 2 c σ(2 t) - c, see `FiniteBasis`; the constant takes the -c.
-        logistic = torch.addmm(2 * bias, points, 2 * weights).sigmoid_().view(len(points), -1, len(near))
-        found: torch.Tensor = window @ (constant[:, :, 0] - output.sum(dim=2))
-        flat = output.permute(2, 0, 1).flatten(0, 1)
-        found.addmm_(logistic.mul_(window[:, None]).flatten(1), flat, alpha=2)
-        return found
 
     def displacement_and_gradient(self, location: LocatedPoints) -> tuple[FloatArray, FloatArray]:
         """Both, with the windows and neurons at a point computed once."""

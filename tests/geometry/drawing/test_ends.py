@@ -15,7 +15,7 @@ from pinnray.geometry.drawing.formats.pieces import line
 from pinnray.geometry.drawing.load import finger_from_file, read_drawing
 from tests.geometry.drawing.files import BEAM, write_dxf
 
-ROUND = 0.4
+ROUND = 0.1
 """Radius of the fine corners, mm."""
 
 
@@ -33,7 +33,6 @@ def shoelace(corners: np.ndarray) -> float:
     return float(0.5 * abs((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("step", [1e-2, 1.1e-3, 9e-4, 3e-4])
 def test_lines_shorter_than_the_tolerance_stay(tmp_path, step):
     corners = fine_beam(step)

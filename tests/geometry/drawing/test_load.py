@@ -1,5 +1,6 @@
 """Fingers from drawings: proposals, placement, description, and meshes of them."""
 
+import functools
 import json
 import pickle
 
@@ -20,13 +21,18 @@ FILES = [*sorted(FINRAY.glob("*.stp")), CSIRO]
 IDS = [path.stem for path in FILES]
 
 
+@functools.cache
+def finger_in(path):
+    return finger_from_file(path)
+
+
 def clamped_length(finger):
     return sum(loop.lengths[which] for loop, which in finger.section.named("base"))
 
 
 @pytest.mark.parametrize("path", FILES, ids=IDS)
 def test_frame(path):
-    finger = finger_from_file(path)
+    finger = finger_in(path)
     outline = finger.section.outline
     assert finger.section.front_point(finger.contact_abscissa)[1] == pytest.approx(0, abs=1e-9)
     base = np.concatenate([outline.ends[which] for which in outline.pieces("base")])
@@ -49,7 +55,7 @@ def test_frame(path):
     ids=IDS,
 )
 def test_proposals(path, clamp, contact, diameter):
-    finger = finger_from_file(path)
+    finger = finger_in(path)
     assert set(finger.sources.values()) == {"proposed", "drawn"}
     assert clamped_length(finger) == pytest.approx(clamp, abs=1e-3)
     placed = finger.placement.inverse([[finger.contact_abscissa, 0]])[0]
@@ -212,7 +218,7 @@ def test_the_mesh_of_the_file_is_left_when_sizes_are_given_even_the_default_ones
 
 @pytest.mark.parametrize("path", FILES, ids=IDS)
 def test_definition_is_read_back(path):
-    finger = finger_from_file(path)
+    finger = finger_in(path)
     again = DrawnFinger.from_definition(json.loads(json.dumps(finger.definition())))
     assert again.definition() == finger.definition()
     assert again.digest == finger.digest
@@ -222,7 +228,7 @@ def test_definition_is_read_back(path):
 
 @pytest.mark.parametrize("path", [FILES[0], CSIRO], ids=["Finray_8", "csiro"])
 def test_drawn_fingers_are_meshed(path):
-    finger = finger_from_file(path)
+    finger = finger_in(path)
     mesh = build_mesh(finger, MeshSettings(size=1.5, coarsening=2))
     assert mesh.areas.sum() == pytest.approx(finger.section.area, rel=1e-3)
     assert mesh.boundary_length("base") == pytest.approx(clamped_length(finger), rel=1e-6)

@@ -13,7 +13,6 @@ from pinnray.vision.discs.disc_image_model import (
     CONTRAST,
     COUNT,
     EDGE,
-    GLARE,
     HALO,
     LIGHT,
     OUTLINE,
@@ -92,7 +91,7 @@ def test_no_plain_centroid_is_more_accurate(radius, changes):
 @pytest.mark.parametrize(
     ("radius", "changes"),
     [
-        (4.0, {"mottle": 0.1}),  # 0.85 by the residuals alone, of which the outline takes up half
+        (4.0, {"mottle": 0.1}),  # 0.73 by the residuals alone, of which the outline takes up most
         (4.0, {"exposure": exposure(white=400.0, gradient=0.3), "irregular": 0.03}),
         (12.0, {"exposure": exposure(white=400.0)}),  # 0.99 if light is uneven by assumption
     ],
@@ -101,21 +100,20 @@ def test_no_plain_centroid_is_more_accurate(radius, changes):
 def test_the_intervals_of_dots_hold(radius, changes):
     dots = PrintedDots(radius, count=96, seed=5, **changes)
     discs, errors, _ = measured(dots)
-    assert 0.89 < covered(discs, errors) < 0.99  # 192 coordinates, each deviation of 0.95 is 0.016
+    assert 0.86 < covered(discs, errors) < 0.99  # 192 coordinates, each deviation of 0.95 is 0.016
 
 
 def test_derivatives_of_an_irregular_disc_are_differences():
     rng = np.random.default_rng(0)
     start = np.zeros((1, COUNT + OUTLINE + EDGE))
     start[:, [RADIUS, BLUR, LIGHT, CONTRAST, HALO]] = 8.0, 1.0, 180.0, 120.0, 0.4
-    start[:, GLARE] = 0.5, -0.3, 0.02, 0.01, -0.03
     start[:, COUNT:HALO] = 0.002 * rng.standard_normal(HALO - COUNT)
     start[:, COUNT + OUTLINE :] = 0.4, 9.0, 60.0, 0.005
     line = np.arange(-12, 13, dtype=np.float32)
     x, y = (part.ravel() for part in np.meshgrid(line, line))
     away = np.hypot(x, y) > 3  # the waves have no direction in the middle
     _, derivatives = disc_image(start.astype(np.float32), x, y)
-    columns = [0, 1, RADIUS, COUNT, COUNT + 5, HALO - 1, HALO, *GLARE]
+    columns = [0, 1, RADIUS, COUNT, COUNT + 5, HALO - 1, HALO]
     for column in (*columns, *range(COUNT + OUTLINE, start.shape[1])):
         step = 1e-2 if column in (0, 1, RADIUS) else 1e-3
         ends = []

@@ -50,7 +50,7 @@ def squeezed(finger: Finger, points: FloatArray) -> FloatArray:
     """A smooth displacement, zero at the base: a ring is flattened and bulges, others bend; shape (n, 2)."""
     share = (
         distance_from_base(finger.section, points)
-        / distance_from_base(finger.section, finger.section.outline.flattened()[0]).max()
+        / distance_from_base(finger.section, finger.section.outline.flattened()).max()
     )
     middle = finger.section.bounds.mean(axis=0)[0]
     bulge = 0.5 * np.sin(np.pi * share) * np.tanh((points[:, 0] - middle) / 8) * (finger.name == "ring")

@@ -53,15 +53,6 @@ def test_consent_goes_on(tmp_path, monkeypatch):
         main(["compare", "--mesh-size", "0.02", "--yes", "--quiet", "--out", str(tmp_path / "out")])
 
 
-def test_the_size_that_is_advised_needs_no_consent():
-    finger, solvers = load_design("default"), [make_solver("fem-nonlinear")]
-    with pytest.raises(UserError) as refused:
-        check_mesh_cost(finger, MeshSettings(size=0.02), solvers, simulated=True)
-    advised = float(str(refused.value).rpartition(" ")[2])
-    assert 0.02 < advised < 0.25
-    check_mesh_cost(finger, MeshSettings(size=advised), solvers, simulated=True)
-
-
 def test_the_mesh_of_a_file_needs_no_consent_unless_a_size_is_asked_for(tmp_path, monkeypatch):
     finger = drawn_finger(write_beam_mesh(tmp_path / "beam.msh"), Description())
     monkeypatch.setattr("pinnray.options.cost.free_memory_gb", lambda: 0.1)

@@ -28,13 +28,8 @@ def drawing(folder: Path, path: str = BEAM, *, name: str = "beam.svg", size: str
 
 
 def test_lines_on_the_command_line_are_those_of_a_description(tmp_path: Path) -> None:
-    options = FingerOptions(
-        section=drawing(tmp_path),
-        clamp="[[0, 0], [0, -10]]",
-        contact="[40, 0]",
-        markers="5",
-        set=("depth=12",),
-    )
+    lines = "clamp=[[0, 0], [0, -10]]", "contact=[40, 0]", "markers=5", "depth=12"
+    options = FingerOptions(section=drawing(tmp_path), set=lines)
     finger, _ = options.read()
     assert isinstance(finger, DrawnFinger)
     assert (finger.contact_abscissa, finger.depth, len(finger.markers)) == (40.0, 12.0, 5)
@@ -44,7 +39,7 @@ def test_lines_on_the_command_line_are_those_of_a_description(tmp_path: Path) ->
 def test_a_description_beside_the_drawing_counts_and_the_command_line_wins(tmp_path: Path) -> None:
     file = drawing(tmp_path)
     file.with_suffix(".toml").write_text("depth = 7\ncontact = [30, 0]\n")
-    finger, _ = FingerOptions(section=file, contact="[45, 0]").read()
+    finger, _ = FingerOptions(section=file, set=("contact=[45, 0]",)).read()
     assert (finger.depth, finger.contact_abscissa) == (7.0, 45.0)
 
 
