@@ -91,23 +91,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
             axes.set_axis_off()
             values = optimum.measurements[run].values
             text = ", ".join(f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.objectives)
-            number = axes.annotate(
-                str(optimum.place(run)),
-                (0, 1.03),
-                xycoords="axes fraction",
-                size=9,
-                weight="bold",
-                color=CONTACT,
-            )
-            axes.annotate(
-                text,
-                (1, 0),
-                xycoords=number,
-                xytext=(7, 0),
-                textcoords="offset points",
-                size=SMALL,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},  # over a cylinder
-            )
+            axes.set_title(f"{optimum.place(run)}:  {text}", size=SMALL, loc="left")
     return drawn
 
 
