@@ -114,7 +114,7 @@ class FieldEmulator:
     def predict(self, finger: Mapping[str, Value], stroke: float) -> PredictedField:
         """The field of a finger at a stroke, mm; see `fault`, which is not asked again."""
         at, share = places(self.inputs, [finger])[0], stroke / self.stroke
-        weights = self.weights(share)
+        weights = self.spline(share)
         path = self.field.vector(at).reshape(len(weights), -1)
         factors = (share * (weights @ path)).astype(np.float32)
         nodal = (factors @ self.vectors).reshape(-1, 2).astype(np.float64)
@@ -161,10 +161,6 @@ class FieldEmulator:
             points = mesh.points if self.motion is None else self.motion.vector(at).reshape(-1, 2)
             mesh = replace(mesh, points=points, depth=shape.depth)
         return Problem(mesh, material.model_copy(update={"law": self.law}), load, finger=shape)
-
-    def weights(self, share: float) -> FloatArray:
-        """Weights of the strokes in the cubic spline at a share of the full one, shape (k,)."""
-        return np.asarray(self.spline(share))
 
     def indicator(self, deviations: FloatArray, weights: FloatArray) -> float:
         """Expected root mean square of the displacement's error over the stroke, from modes' deviations."""
