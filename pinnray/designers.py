@@ -34,7 +34,7 @@ def sweep(
     solver: str = "fem",
     size: float = 0.5,
     samples: int | None = None,
-    sampling: Literal["grid", "latin", "sobol"] | None = None,
+    sampling: Literal["grid", "sobol"] | None = None,
     seed: int = 0,
     out: str | Path | None = None,
     processes: int | None = None,
@@ -50,7 +50,7 @@ def sweep(
         solver: Name of the solver.
         size: Largest element in walls and ribs, mm.
         samples: Number of samples between the ends of the ranges.
-        sampling: `grid` (every combination), `sobol` or `latin`; if None a grid of lists, else `sobol`.
+        sampling: `grid` (every combination) or `sobol`; if None a grid of lists, else `sobol`.
         seed: Of the samples.
         out: Folder that keeps each result; the same call goes on where it was stopped. None keeps nothing.
         processes: Worker processes; None means one per core.

@@ -64,7 +64,7 @@ def interruptible() -> Iterator[None]:
 def errors_of_interruption() -> Iterator[None]:
     """Raise KeyboardInterrupt for any error of the block after a signal that asks the program to end.
 
-    A library that waits may turn it into an error of its own, as Dask into `release unlocked lock`.
+    A library that waits may turn it into an error of its own, such as `release unlocked lock`.
     """
     try:
         yield

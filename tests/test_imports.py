@@ -15,7 +15,7 @@ from tests.pinnray.commands.programs import run_python
 from tests.program import ROOT, SOURCES
 
 HEAVY = {
-    *("cadquery", "cv2", "dask", "distributed", "dolfinx", "gmsh", "matplotlib", "mpi4py", "mujoco", "OCP"),
+    *("cadquery", "cv2", "dolfinx", "gmsh", "matplotlib", "mpi4py", "mujoco", "OCP"),
     *("pandas", "petsc4py", "pyvista", "scipy", "shapely", "sklearn", "torch", "ufl", "vtk", "vtkmodules"),
 }
 """Libraries that take a tenth of a second of processor to import, most of them a second."""

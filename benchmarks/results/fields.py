@@ -49,7 +49,7 @@ def _judged(name: str, paths: int) -> Table:
 def _compared(emulator: FieldEmulator, true: Snapshots) -> tuple[FloatArray, FloatArray]:
     """Relative errors of `MEASURES`, and one where the interval holds, NaN without one, (n, m) each."""
     errors, within = [], []
-    for sample, path, numbers in zip(true.samples, true.nodal, true.numbers, strict=True):
+    for sample, path, numbers in zip(true.known.samples, true.nodal, true.numbers, strict=True):
         if emulator.fault(sample, emulator.stroke):
             continue
         for share, nodal, (force_u, force_v, _, _, width) in zip(true.shares, path, numbers, strict=True):

@@ -13,7 +13,7 @@ from pinnray.runtime.machine import program_version
 COMMANDS = (
     *("comparison.compare", "comparison.report"),
     *("finger.design", "finger.mesh", "finger.material", "finger.solve"),
-    *("finger.export", "studies.sweep", "studies.predict", "studies.explore", "studies.app"),
+    *("finger.export", "studies.sweep", "studies.predict", "studies.explore"),
     *("studies.optimise", "studies.crossval", "comparison.solvers"),
     *("camera.fiducials", "camera.calibrate", "camera.pick", "camera.points", "camera.rig", "camera.track"),
 )

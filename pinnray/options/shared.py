@@ -245,14 +245,12 @@ class StudyOptions(CheckedModel):
     """Workers, pictures and folder of a study.
 
     Attributes:
-        processes: Worker processes on this machine; default: one per core.
-        scheduler: Address of a Dask scheduler whose workers are used, such as tcp://host:8786; default: none.
+        processes: Worker processes; default: one per core.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default: named after the command and the study, in out.
     """
 
     processes: int | None = None
-    scheduler: str | None = None
     pictures: str = ""
     out: OptionalOutputPath = None
 
@@ -261,7 +259,7 @@ class StudyOptions(CheckedModel):
         from pinnray.studies.sweep.job import StudyJob
 
         out = self.out or Path("out") / f"{kind}-{study.name}"
-        return StudyJob(study, file.parent, out, read_processes(self.processes), self.scheduler)
+        return StudyJob(study, file.parent, out, read_processes(self.processes))
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.runtime.output_folder import check_resumable_folder, locked
 from pinnray.runtime.processes.child import ProcessFailed
-from pinnray.runtime.processes.pool import known_to_children
+from pinnray.runtime.processes.pool import Pool, known_to_children
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Traits
@@ -37,7 +37,6 @@ from pinnray.studies.crossval.true_fields import TrueField, TruthTask, simulate_
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.store import opened
 from pinnray.studies.sweep.sweep import JOURNAL, run_tasks
-from pinnray.studies.sweep.workers import Workers
 
 DEFINITION = "definition.json"
 Case = tuple[str, str]
@@ -78,12 +77,12 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
     with locked(study.out), ExitStack() as stack:
         write_json(study.out / DEFINITION, definition)  # first: a folder without it is taken for someone's
         journal = stack.enter_context(opened(study.out / JOURNAL))
-        workers = stack.enter_context(Workers(study.processes, threads=threads, warm=True))
+        pool = stack.enter_context(Pool(study.processes, threads=threads))
         truths: dict[str, dict[str, list[TrueField]]] = {}
         if given:
             observations = {(given.label, given.label): [[given]] * study.seeds}
         else:
-            truths = _true_fields(study, mesh, load_cases, workers, stages)
+            truths = _true_fields(study, mesh, load_cases, pool, stages)
             observations = _noisy(study, truths, problem)
         wanted = dict(_samples(study, observations, load_cases))
         journal.forget("failed")
@@ -109,8 +108,8 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
             run = partial(run_tasks, run_folds, samples=wanted, journal=journal, progress=progress, deaths=1)
             # Slow solvers are usually named last: started first, they leave no processor idle at the end.
             pooled = [task for task in reversed(tasks) if known_to_children(task.variant.solver)]
-            run({task.name: task for task in pooled}, workers=workers)
-            run({task.name: task for task in tasks if task not in pooled}, workers=None)
+            run({task.name: task for task in pooled}, pool=pool)
+            run({task.name: task for task in tasks if task not in pooled}, pool=None)
         found = _result(study, wanted, journal.measurements(), observations, truths)
         with stages.stage("report"):
             write_results(found, {**definition, "problem_sha256": problem.digest, **stages.record()})
@@ -120,7 +119,7 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
 
 
 def _true_fields(
-    study: CrossvalStudy, mesh: TriangleMesh, load_cases: Sequence[LoadCase], workers: Workers, stages: Stages
+    study: CrossvalStudy, mesh: TriangleMesh, load_cases: Sequence[LoadCase], pool: Pool, stages: Stages
 ) -> dict[str, dict[str, list[TrueField]]]:
     """The true fields at every load by truth and layout, each simulated in a process."""
     own = replace(study, variants=())  # other processes may not know the classes of all solvers
@@ -131,7 +130,7 @@ def _true_fields(
     }
     found: dict[tuple[str, str], dict[str, TrueField]] = {}
     with stages.stage("truths") as progress:
-        for (truth, load), answer in workers.answers(simulate_truth, tasks, deaths=1):
+        for (truth, load), answer in pool.answers(simulate_truth, tasks, deaths=1):
             if isinstance(answer, ProcessFailed):
                 raise UserError(
                     f"truth {truth}, {load}: the virtual experiment did not come to its end; press less, "
@@ -225,6 +224,6 @@ def _result(
         study,
         sample_table(rows),
         {truth: seeds[0][0].origin for (truth, _), seeds in observations.items()},
-        {truth: next(iter(each.values()))[0].contact for truth, each in truths.items()},
+        {truth: next(iter(each.values()))[0] for truth, each in truths.items()},
         failed,
     )

@@ -122,9 +122,11 @@ class FoldRunner:
         if not np.isfinite(errors).all():
             raise UserError(f"{self._solver.name}: its displacement is not finite at every marker")
         values: dict[str, Any] = {"errors_mm": errors.tolist(), "deviations_mm": deviations}
-        values |= self.distances(sampled, fold.load_case, own)
-        if fold.scheme == ALL and self._truths:
-            values |= self._against_truth(solution, sampled)
+        if self._truths:
+            true = self._truths[fold.load_case].sampled
+            values |= sampled.distances(true, own, self._true_law, self.sampler.weights)
+            if fold.scheme == ALL:
+                values |= self._against_truth(solution, sampled)
         return Measurement(
             name,
             "done" if status.converged else "not converged",
@@ -133,28 +135,17 @@ class FoldRunner:
             values,
         )
 
-    def distances(self, sampled: SampledField, case: int, own: Problem | None = None) -> dict[str, float]:
-        """Relative L2 distances of a field from the truth at a load case; none without a truth.
-
-        `own` is the problem with the material that the solver found, if it found one.
-        """
-        if not self._truths:
-            return {}
-        true, weights = self._truths[case].sampled, self.sampler.weights
-        return sampled.distances(true, own or self.problem, self._true_law, weights)
-
     def _against_truth(self, solution: Solution, sampled: SampledField) -> dict[str, Any]:
         """Force, place of the contact and stated intervals against the truth at the full load."""
         truth, identified = self._truths[0], solution.identified
-        contact = truth.contact
         found: dict[str, Any] = {}
         if np.isfinite(solution.reaction).all():
-            found["force_error"] = float(np.linalg.norm(solution.reaction)) / contact.force - 1
+            found["force_error"] = float(np.linalg.norm(solution.reaction)) / truth.force - 1
         if identified:
-            found["force_within_stated"] = identified.size.low <= contact.force <= identified.size.high
+            found["force_within_stated"] = identified.size.low <= truth.force <= identified.size.high
             if place := identified.position:
-                found["position_error_mm"] = place.value - contact.position
-                found["position_within_stated"] = place.low <= contact.position <= place.high
+                found["position_error_mm"] = place.value - truth.position
+                found["position_within_stated"] = place.low <= truth.position <= place.high
         if solution.uncertainty and (stated := solution.uncertainty.von_mises):
             inside = self.sampler.inside_of(solution, self.problem.mesh)
             errors = sampled.state(solution.problem).von_mises - truth.sampled.state(self._true_law).von_mises

@@ -10,7 +10,7 @@ from pinnray.runtime.notebook import brief
 from pinnray.studies.crossval.folds import ALL, SCHEMES
 from pinnray.studies.crossval.scores import CASE, SCORED, score_table
 from pinnray.studies.crossval.study import CrossvalStudy
-from pinnray.studies.crossval.true_fields import TrueContact
+from pinnray.studies.crossval.true_fields import TrueField
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,14 +21,14 @@ class CrossvalResult:
         study: Its settings.
         samples: A row for each marker of each fold, seed, solver, layout and truth; see `sample_table`.
         sources: By truth one sentence on the source of the markers' displacements.
-        contacts: Force and place of the contact of each truth at the full load.
+        truths: The true field of each truth at the full load; none with measurements.
         failed: Error messages of the solvers without a score, by solver (and truth and layout, if several).
     """
 
     study: CrossvalStudy
     samples: pd.DataFrame
     sources: Mapping[str, str]
-    contacts: Mapping[str, TrueContact]
+    truths: Mapping[str, TrueField]
     failed: Mapping[str, str]
 
     __repr__ = brief

@@ -1,7 +1,6 @@
 """Samples of a cross-validation as a table, and scores of its solvers as groups of it."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -109,35 +108,26 @@ def score_table(samples: pd.DataFrame) -> pd.DataFrame:
     return table.join(difference_table(samples))
 
 
-@dataclass(frozen=True)
-class Difference:
-    """A solver's score minus a baseline's in the same folds and seeds, with its bootstrap interval."""
+def bootstrap(differences: FloatArray) -> tuple[float, float, float, str]:
+    """Mean, both ends of the interval and verdict of a solver's scores minus a baseline's.
 
-    mean: float
-    low: float
-    high: float
+    Seeds and folds are resampled with replacement, independently of each other, since a fold is equally hard
+    for every seed.
 
-    @classmethod
-    def bootstrap(cls, differences: FloatArray) -> "Difference":
-        """The interval from one difference for each seed and fold, shape (s, f).
+    Args:
+        differences: One for each seed and fold, shape (s, f).
 
-        Seeds and folds are resampled with replacement, independently of each other, since a fold is equally
-        hard for every seed.
-        """
-        seeds, folds = differences.shape
-        draws = np.random.default_rng(0)
-        rows = draws.integers(seeds, size=(2000, seeds, 1))
-        columns = draws.integers(folds, size=(2000, 1, folds))
-        means = differences[rows, columns].mean(axis=(1, 2))
-        low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-        return cls(float(differences.mean()), float(low), float(high))
-
-    @property
-    def verdict(self) -> str:
-        """`better`, `worse` or `not told apart`."""
-        if self.high < 0:
-            return "better"
-        return "worse" if self.low > 0 else "not told apart"
+    Returns:
+        The verdict is `better`, `worse` or `not told apart`.
+    """
+    seeds, folds = differences.shape
+    draws = np.random.default_rng(0)
+    rows = draws.integers(seeds, size=(2000, seeds, 1))
+    columns = draws.integers(folds, size=(2000, 1, folds))
+    means = differences[rows, columns].mean(axis=(1, 2))
+    low, high = map(float, np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
+    verdict = "better" if high < 0 else "worse" if low > 0 else "not told apart"
+    return float(differences.mean()), low, high, verdict
 
 
 def difference_table(samples: pd.DataFrame) -> pd.DataFrame:
@@ -156,8 +146,8 @@ def difference_table(samples: pd.DataFrame) -> pd.DataFrame:
             for solver, grid in grids.items():
                 row = rows.setdefault((truth, layout, solver, scheme, score), {})
                 for baseline in (name for name in BASELINES if name in grids and name != solver):
-                    found = Difference.bootstrap(grid - grids[baseline])
-                    row |= {f"from_{baseline}": found.mean, f"from_{baseline}_low": found.low}
-                    row |= {f"from_{baseline}_high": found.high, f"against_{baseline}": found.verdict}
+                    columns = [f"from_{baseline}{part}" for part in ("", "_low", "_high")]
+                    found = bootstrap(grid - grids[baseline])
+                    row |= zip([*columns, f"against_{baseline}"], found, strict=True)
     index = pd.MultiIndex.from_tuples(list(rows), names=[*SCORED, "score"])
     return pd.DataFrame(list(rows.values()), index=index)

@@ -1,15 +1,14 @@
-"""A cross-validation as tables of texts, and its verdicts in sentences."""
+"""A cross-validation as tables of texts."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isnan, nan
 
 import pandas as pd
 
 from pinnray.runtime.tables import NONE, TextTable, distance, percent, significant
-from pinnray.solvers.solver import Traits
 from pinnray.studies.crossval.folds import ALL, SCHEMES
 from pinnray.studies.crossval.result import CrossvalResult
-from pinnray.studies.crossval.scores import BASELINES, CASE, HELD_OUT, LEVEL, SCORED
+from pinnray.studies.crossval.scores import BASELINES, CASE, HELD_OUT, LEVEL
 
 VERDICTS = {"better": "better", "worse": "worse", "not told apart": "≈"}
 Format = Callable[[pd.Series], str]
@@ -82,7 +81,7 @@ def all_tables(result: CrossvalResult) -> list[TextTable]:
 
 def truth_tables(result: CrossvalResult) -> list[TextTable]:
     """The tables of a result that need a truth; the last one is short."""
-    if not result.contacts:
+    if not result.truths:
         return []
     simulations = dict.fromkeys(truth.simulation for truth in result.study.chosen_truths.values())
     return [
@@ -144,31 +143,3 @@ def _grid(
     headings = ["solver", *([named] if named else []), *(["held\nout"] if held_out else []), *columns]
     used = [place for place in range(len(headings)) if {row[place] for row in rows} - {NONE, ""}]
     return [headings[place].rstrip(" ") for place in used], [[row[place] for place in used] for row in rows]
-
-
-def verdict_sentences(result: CrossvalResult) -> Iterator[str]:
-    """For each solver that takes markers where it is better or worse than each baseline.
-
-    With several truths or layouts that is said of the main scheme alone, else of every scheme; a verdict
-    without a place holds in all of them.
-    """
-    takes = [each.label for each in result.study.variants if Traits.of(each.solver).assimilates]
-    several = len(result.scores.groupby(CASE)) > 1
-    compared = {HELD_OUT: "held-out error", "von_mises": "von Mises stress", "force_error": "force"}
-    for solver in takes:
-        for baseline in BASELINES:
-            clauses = []
-            for score, words in compared.items():
-                verdicts: dict[str, list[str]] = {}
-                for index, verdict in result.scores.get(f"against_{baseline}", pd.Series()).dropna().items():
-                    at = dict(zip([*SCORED, "score"], index, strict=True))
-                    meant = ALL if score != HELD_OUT else result.main_scheme if several else at["scheme"]
-                    if (at["solver"], at["score"], at["scheme"]) == (solver, score, meant):
-                        where = result.said(at["truth"], at["layout"]) if several else at["scheme"]
-                        verdicts.setdefault(verdict, []).append(where.replace(", ", " "))
-                said = (f"{verdict} in {', '.join(where)}" for verdict, where in verdicts.items())
-                clauses += (
-                    [f"{words} {', '.join(said if len(verdicts) > 1 else verdicts)}"] if verdicts else []
-                )
-            if clauses:
-                yield f"{solver} against {baseline}: {'; '.join(clauses)}."

@@ -20,7 +20,6 @@ from pinnray.runtime.cache import cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
-from pinnray.runtime.tables import Cell
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import SolidField, Solution, State
@@ -141,50 +140,25 @@ def _shifts(mesh: TriangleMesh, location: LocatedPoints, changes: Mapping[str, f
     return motion.shifts(location, np.array([changes.get(name, 0.0) for name in motion.names]))
 
 
-@dataclass(frozen=True)
-class TrueContact:
-    """Force and place of a truth's contact; abscissas are those before the load, mm."""
-
-    reaction: tuple[float, float]  # of the indenter on the finger, N/mm
-    position: float  # where the force acts
-    middle: float
-    width: float
-
-    @property
-    def force(self) -> float:
-        """Magnitude of the reaction, N/mm."""
-        return float(np.linalg.norm(self.reaction))
-
-    @property
-    def cells(self) -> dict[str, Cell]:
-        """Columns of a CSV file, and an entry of `crossval.json`."""
-        return {
-            "true_force_N_mm": self.force,
-            "true_position_mm": self.position,
-            "true_contact_middle_mm": self.middle,
-            "true_contact_width_mm": self.width,
-        }
-
-
 @dataclass(frozen=True, eq=False)
 class TrueField:
-    """A true field at the points of the shared mesh, moved with the walls, and its contact."""
+    """A true field at the points of the shared mesh, moved with the walls, and the force on the finger."""
 
     sampled: SampledField
-    contact: TrueContact
+    force: float  # magnitude, N/mm
+    position: float  # abscissa where it acts, before the load, mm
 
     @classmethod
     def load(cls, path: Path) -> "TrueField":
         """Read the file that `save` wrote."""
         with np.load(path) as archive:
             content = dict(archive)
-        u, v = content.pop("reaction")
-        places = {name: float(content.pop(name)) for name in ("position", "middle", "width")}
-        return cls(SampledField(**content), TrueContact((float(u), float(v)), **places))
+        force, position = (float(content.pop(name)) for name in ("force", "position"))
+        return cls(SampledField(**content), force, position)
 
     def save(self, path: Path) -> None:
         """Write atomically."""
-        write_arrays(path, {**vars(self.sampled), **vars(self.contact)})
+        write_arrays(path, {**vars(self.sampled), "force": self.force, "position": self.position})
 
 
 @dataclass(frozen=True)
@@ -229,9 +203,11 @@ def simulate_truth(task: TruthTask, _: object = None) -> dict[str, TrueField]:
         return simulate(Problem(mesh, study.material, Load(displacement=(0.0, -stroke))), truth=truth)
 
     def sampled(points: FloatArray) -> TrueField:
-        sampler = FieldSampler.of(shared, points, design.marker_radius)
-        found = sampler.of_solution(solution(), shared, truth.changes(drawn))
-        return TrueField(found, _contact(solution()))
+        sampler, found = FieldSampler.of(shared, points, design.marker_radius), solution()
+        if found.contact is None:  # the cylinder has slipped off
+            raise UserError(f"the virtual experiment: {found.status.message}")
+        field = sampler.of_solution(found, shared, truth.changes(drawn))
+        return TrueField(field, float(np.linalg.norm(found.reaction)), found.contact[0])
 
     return {
         layout: cached(
@@ -243,12 +219,3 @@ def simulate_truth(task: TruthTask, _: object = None) -> dict[str, TrueField]:
         )
         for layout, points in study.markers.items()
     }
-
-
-def _contact(solution: Solution) -> TrueContact:
-    """Force and place of the contact in a simulation."""
-    if solution.contact is None:  # the cylinder has slipped off
-        raise UserError(f"the virtual experiment: {solution.status.message}")
-    position, start, end, _ = solution.contact
-    u, v = solution.reaction.tolist()
-    return TrueContact((u, v), position, 0.5 * (start + end), end - start)

@@ -1,6 +1,6 @@
 """The emulator of a sweep: fitted to its samples, kept in its folder, asked for any finger in its range."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +24,6 @@ FEWEST = 20
 
 MOST = 4000
 """Largest number of samples that a process is fitted to: time grows with their cube."""
-
-PROPORTIONAL = 1e-9
-"""Largest relative change of a ratio of two quantities that counts as none."""
 
 EXACT: Mapping[str, Callable[[Section, Parameters, Study], float]] = {
     "area": lambda section, _, __: section.area,
@@ -78,13 +75,11 @@ class Emulator:
     Attributes:
         inputs: Makes the numbers of fingers.
         learnt: The processes by quantity.
-        ratios: Quantities that are another one times a number.
         count: Number of samples that it was fitted to.
     """
 
     inputs: Inputs
     learnt: Mapping[str, Learnt]
-    ratios: Mapping[str, tuple[str, float]]
     count: int
 
     @property
@@ -95,7 +90,7 @@ class Emulator:
     @property
     def names(self) -> tuple[str, ...]:
         """The quantities that it predicts."""
-        return tuple(name for name in QUANTITIES if name in {*self.learnt, *self.ratios, *EXACT})
+        return tuple(name for name in QUANTITIES if name in {*self.learnt, *EXACT})
 
     def predict(
         self, fingers: Sequence[Mapping[str, Value]], names: Sequence[str] | None = None
@@ -109,9 +104,8 @@ class Emulator:
         """
         chosen = tuple(name for name in self.names if names is None or name in names)
         shapes = [self.inputs.parameters(finger) for finger in fingers]
-        learnt = {self.ratios.get(name, (name, 1.0))[0] for name in chosen} & self.learnt.keys()
         found: dict[str, FloatArray] = {}
-        if learnt and fingers:
+        if (learnt := [name for name in chosen if name in self.learnt]) and fingers:
             numbers = self.inputs.numbers(fingers, shapes)
             found = {name: _predicted(self.learnt[name], name, numbers) for name in learnt}
         if exact := [name for name in chosen if name in EXACT]:
@@ -120,9 +114,6 @@ class Emulator:
                 pairs = zip(sections, shapes, strict=True)
                 values = np.array([EXACT[name](section, shape, self.study) for section, shape in pairs])
                 found[name] = np.stack([values] * 3)
-        for name, (other, ratio) in self.ratios.items():
-            if name in chosen and other in found:
-                found[name] = ratio * found[other]
         whole = np.array([found[name] for name in chosen]).reshape(len(chosen), 3, len(fingers))
         return Predictions(chosen, *whole.transpose(1, 2, 0))
 
@@ -132,10 +123,11 @@ def fitted_emulator(
     inputs: Inputs,
     stages: Stages | None = None,
     *,
+    names: Collection[str] = QUANTITIES,
     fewest: int = FEWEST,
     quick: bool = False,
 ) -> Emulator:
-    """The emulator of a sweep's converged samples, of which it needs `fewest`.
+    """The emulator of quantities of a sweep's converged samples, of which it needs `fewest`.
 
     With `quick` the intervals of few samples may be too narrow; see `GaussianProcess.fitted`.
 
@@ -152,20 +144,18 @@ def fitted_emulator(
     fingers = [sweep.samples[good[place].number] for place in order]
     table = {
         name: np.array([good[place].values.get(name, np.nan) for place in order], dtype=np.float64)
-        for name in QUANTITIES
+        for name in names
         if name not in EXACT
     }
     known = {name: column for name, column in table.items() if np.isfinite(column).sum() >= fewest}
-    ratios = _proportional(known)
     numbers = inputs.numbers(fingers, [inputs.parameters(finger) for finger in fingers])
     learnt: dict[str, Learnt] = {}
-    left = [name for name in known if name not in ratios]
     with (stages or Stages(quiet=True)).stage("emulator") as progress:
-        for place, name in enumerate(left):
-            progress(place / len(left), name)
-            learnt[name] = _learnt(known[name], name, numbers, quick=quick)
+        for place, (name, values) in enumerate(known.items()):
+            progress(place / len(known), name)
+            learnt[name] = _learnt(values, name, numbers, quick=quick)
         progress(1.0, f"{len(order)} samples")
-    return Emulator(inputs, learnt, ratios, len(order))
+    return Emulator(inputs, learnt, len(order))
 
 
 def prediction_table(
@@ -201,21 +191,3 @@ def _predicted(learnt: Learnt, name: str, numbers: Numbers) -> FloatArray:
     if learnt.positive:
         return np.asarray(numbers.bases[name] * np.exp(ends))
     return np.asarray(numbers.bases[name] + numbers.units[name] * ends)
-
-
-def _proportional(table: Mapping[str, FloatArray]) -> dict[str, tuple[str, float]]:
-    """Quantities in constant ratio to an earlier one, such as the forces of the linear law."""
-    found: dict[str, tuple[str, float]] = {}
-    for name, values in table.items():
-        for other in table:
-            if other == name:
-                break
-            if other in found:
-                continue
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ratio = values / table[other]
-            middle = float(np.median(ratio))
-            if np.isfinite(ratio).all() and np.abs(ratio - middle).max() <= PROPORTIONAL * abs(middle):
-                found[name] = (other, middle)
-                break
-    return found

@@ -54,15 +54,12 @@ class GaussianProcess:
     numbers: FloatArray
 
     @classmethod
-    def fitted(
-        cls, inputs: FloatArray, values: FloatArray, *, learners: int = LEARNERS, quick: bool = False
-    ) -> Self:
+    def fitted(cls, inputs: FloatArray, values: FloatArray, *, quick: bool = False) -> Self:
         """The process of samples in random order, inputs of shape (n, d) and values of shape (n,).
 
         Args:
             inputs: Of the samples.
             values: Of the quantity.
-            learners: Samples from which the lengths are learnt.
             quick: Whether the intervals of few samples may be too narrow.
         """
         from sklearn.gaussian_process.kernels import RBF
@@ -70,7 +67,7 @@ class GaussianProcess:
         mean, spread = float(values.mean()), float(values.std()) or 1.0
         scaled = (values - mean) / spread
         start = RBF(np.full(inputs.shape[1], 3.0), (0.05, 1e3))
-        lengths, noise = likeliest(inputs[:learners], scaled[:learners], start)
+        lengths, noise = likeliest(inputs[:LEARNERS], scaled[:LEARNERS], start)
         near = inputs / lengths
         covariance = _kernel(near, near, (near**2).sum(axis=1))
         covariance[np.diag_indices_from(covariance)] += noise

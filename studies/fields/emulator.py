@@ -114,7 +114,7 @@ class FieldEmulator:
     def predict(self, finger: Mapping[str, Value], stroke: float) -> PredictedField:
         """The field of a finger at a stroke, mm; see `fault`, which is not asked again."""
         at, share = places(self.inputs, [finger])[0], stroke / self.stroke
-        weights = self.weights(share)
+        weights = self.spline(share)
         path = self.field.vector(at).reshape(len(weights), -1)
         factors = (share * (weights @ path)).astype(np.float32)
         nodal = (factors @ self.vectors).reshape(-1, 2).astype(np.float64)
@@ -161,10 +161,6 @@ class FieldEmulator:
             points = mesh.points if self.motion is None else self.motion.vector(at).reshape(-1, 2)
             mesh = replace(mesh, points=points, depth=shape.depth)
         return Problem(mesh, material.model_copy(update={"law": self.law}), load, finger=shape)
-
-    def weights(self, share: float) -> FloatArray:
-        """Weights of the strokes in the cubic spline at a share of the full one, shape (k,)."""
-        return np.asarray(self.spline(share))
 
     def indicator(self, deviations: FloatArray, weights: FloatArray) -> float:
         """Expected root mean square of the displacement's error over the stroke, from modes' deviations."""
@@ -237,28 +233,28 @@ def grip_force(reaction: FloatArray, load: Load) -> float:
     return float((reaction[..., 0] * u + reaction[..., 1] * v) / hypot(u, v))
 
 
-def fitted_fields(known: Snapshots, stages: Stages | None = None) -> FieldEmulator:
+def fitted_fields(shots: Snapshots, stages: Stages | None = None) -> FieldEmulator:
     """The emulator of fields, with intervals from samples that are each predicted from all others."""
     with (stages or Stages(quiet=True)).stage("emulator") as progress:
-        inputs = places(known.inputs, known.samples)
-        count, strokes, nodes, _ = known.nodal.shape
-        space, coefficients = Modes.of_fields(known.nodal.reshape(-1, nodes, 2), known.space, LEAST)
+        known, inputs = shots.known, places(shots.known.inputs, shots.known.samples)
+        count, strokes, nodes, _ = shots.nodal.shape
+        space, coefficients = Modes.of_fields(shots.nodal.reshape(-1, nodes, 2), shots.space, LEAST)
         progress(0.2, f"{len(space.vectors)} modes of {count} paths")
-        paths = coefficients.reshape(count, strokes, -1) / known.shares[:, None]
+        paths = coefficients.reshape(count, strokes, -1) / shots.shares[:, None]
         field = Block.fitted(inputs, *Modes.of(paths.reshape(count, -1), LEAST_OF_PATHS))
         progress(0.6, "force and contact")
-        strength, numbers = _scaled(known, inputs)
+        strength, numbers = _scaled(shots, inputs)
         units = np.abs(numbers).mean(axis=(0, 1)) + 1e-12
         block = Block.fitted(inputs, *Modes.of((numbers / units).reshape(count, -1), LEAST_OF_PATHS))
         progress(0.8, "mesh")
         motion = None
         if known.inputs.moves:
-            motion = Block.fitted(inputs, *Modes.of(known.points.reshape(count, -1), MOTION))
+            motion = Block.fitted(inputs, *Modes.of(shots.points.reshape(count, -1), MOTION))
         progress(0.9, "intervals")
         ones = np.ones((strokes, 1 + len(FIGURES)))
         made = FieldEmulator(
             inputs=known.inputs,
-            mesh=known.known.meshes.mesh,
+            mesh=known.meshes.mesh,
             space=space,
             field=field,
             strength=strength,
@@ -266,13 +262,13 @@ def fitted_fields(known: Snapshots, stages: Stages | None = None) -> FieldEmulat
             motion=motion,
             units=units,
             known=inputs,
-            lost=places(known.inputs, known.known.lost),
-            reasons=known.known.reasons,
+            lost=places(known.inputs, known.lost),
+            reasons=known.reasons,
             scales=ones,
             calibration=ones,
             errors=np.zeros(count),
         )
-        return _calibrated(made, known, paths)
+        return _calibrated(made, shots, paths)
 
 
 def powers(inputs: FloatArray) -> FloatArray:
@@ -282,10 +278,10 @@ def powers(inputs: FloatArray) -> FloatArray:
     return np.concatenate([one, inputs, inputs[..., first] * inputs[..., second]], axis=-1)
 
 
-def _scaled(known: Snapshots, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _scaled(shots: Snapshots, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Coefficients of the strength, and the samples' numbers over it and powers of the stroke, (s, k, 5)."""
-    numbers = known.numbers / known.shares[:, None] ** POWERS
-    numbers[..., :3] /= known.factors[:, None, None]
+    numbers = shots.numbers / shots.shares[:, None] ** POWERS
+    numbers[..., :3] /= shots.factors[:, None, None]
     forces = np.linalg.norm(numbers[:, numbers.shape[1] // 2, :2], axis=1)
     levels = np.log(np.maximum(forces, 1e-6 * forces.max()))
     terms = powers(inputs)
@@ -295,25 +291,25 @@ def _scaled(known: Snapshots, inputs: FloatArray) -> tuple[FloatArray, FloatArra
     return strength, numbers
 
 
-def _calibrated(made: FieldEmulator, known: Snapshots, paths: FloatArray) -> FieldEmulator:
+def _calibrated(made: FieldEmulator, shots: Snapshots, paths: FloatArray) -> FieldEmulator:
     """The emulator with its intervals."""
-    count, strokes, _ = paths.shape
+    known, (count, strokes, _) = shots.known, paths.shape
     path_errors = (made.field.left_out @ made.field.modes.vectors).reshape(paths.shape)
     number_errors = (made.numbers.left_out @ made.numbers.modes.vectors).reshape(count, strokes, -1)
     values = np.zeros((2, count, strokes, 1 + len(FIGURES)))
     indicators = np.zeros((count, strokes))
-    reader, scales_of = made.reader, known.factors * np.exp(powers(made.known) @ made.strength)
+    reader, scales_of = made.reader, shots.factors * np.exp(powers(made.known) @ made.strength)
     for sample, finger in enumerate(known.samples):
-        points = known.points[min(sample, len(known.points) - 1)]
+        points = shots.points[min(sample, len(shots.points) - 1)]
         material, load = known.inputs.physics(finger)
         position = known.inputs.parameters(finger).contact_abscissa
         deviations = made.field.deviations(made.known[sample])
-        for stroke, share in enumerate(known.shares):
+        for stroke, share in enumerate(shots.shares):
             indicators[sample, stroke] = made.indicator(deviations, np.eye(strokes)[stroke])
-            true = known.nodal[sample, stroke]
+            true = shots.nodal[sample, stroke]
             path = share * (paths[sample, stroke] - path_errors[sample, stroke])
             guess = made.space.combined(path).reshape(-1, 2)
-            scaled = known.numbers[sample, stroke] / scales_of[sample] ** (POWERS > 0)
+            scaled = shots.numbers[sample, stroke] / scales_of[sample] ** (POWERS > 0)
             missed = scaled - number_errors[sample, stroke] * made.units * share**POWERS
             for kind, nodal, numbers in ((0, true, scaled), (1, guess, missed)):
                 stress = reader.stress(points, nodal, made.law, _unit(material, made.young).lame)

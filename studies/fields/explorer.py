@@ -42,16 +42,15 @@ MEANINGS = {"contact_width": "deformed length of the front that touches the cyli
 UNITS = {"contact_width": "mm"}
 
 
-def write_explorer(emulator: FieldEmulator, path: Path, live: str = "") -> Path:
+def write_explorer(emulator: FieldEmulator, path: Path) -> Path:
     """Write the page, atomically.
 
     Args:
         emulator: Of the study's fields.
         path: HTML file.
-        live: Secret with which the page may ask the server that sends it for solutions; empty for none.
     """
     packed = Packed()
-    content = manifest(emulator, packed) | {"live": live}
+    content = manifest(emulator, packed)
     return html.write_html(
         path,
         "explorer.html.j2",

@@ -63,14 +63,13 @@ class Block:
             numbers.append((mean, spread, noise))
             if len(factors) < WATCHED:
                 factors.append(np.linalg.inv(factor[:count, :count]))
-        shape = (0, count, count)
         return cls(
             modes,
             inputs,
-            np.array(rates).reshape(-1, inputs.shape[1]),
-            np.array(weights).reshape(-1, len(inputs)).T,
-            np.array(numbers).reshape(-1, 3).T,
-            np.array(factors) if factors else np.zeros(shape),
+            np.array(rates),
+            np.array(weights).T,
+            np.array(numbers).T,
+            np.array(factors),
         )
 
     def vector(self, inputs: FloatArray) -> FloatArray:

@@ -113,24 +113,15 @@ class Snapshots:
             known, np.array([path.nodal for path in paths]), np.array([path.numbers for path in paths])
         )
 
-    @property
-    def inputs(self) -> Inputs:
-        """Reads the parameters of a sample."""
-        return self.known.inputs
-
-    @property
-    def samples(self) -> list[dict[str, Value]]:
-        """Values of the varied parameters."""
-        return self.known.samples
-
     @cached_property
     def factors(self) -> FloatArray:
         """Young's modulus of every sample over that in the middle of the range, shape (s,)."""
         middle = {
             name: sum(values.ends) / 2 for name, values in self.known.study.varied.items() if name == "young"
         }
-        own = np.array([self.inputs.physics(each)[0].young for each in self.samples])
-        return own / self.inputs.physics(middle)[0].young
+        physics = self.known.inputs.physics
+        own = np.array([physics(each)[0].young for each in self.known.samples])
+        return own / physics(middle)[0].young
 
     @property
     def shares(self) -> FloatArray:
@@ -146,7 +137,7 @@ class Snapshots:
     @cached_property
     def points(self) -> FloatArray:
         """Nodes of every sample's mesh, shape (s, n, 2), mm; of one row where no sample's mesh moves."""
-        if not self.inputs.moves:
+        if not self.known.inputs.moves:
             return self.known.meshes.mesh.points[None]
-        fingers = [Design(**self.inputs.parameters(each).model_dump()) for each in self.samples]
+        fingers = [Design(**self.known.inputs.parameters(each).model_dump()) for each in self.known.samples]
         return np.array([self.known.meshes.of(finger).points for finger in fingers])

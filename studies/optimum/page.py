@@ -9,17 +9,17 @@ import numpy as np
 import pandas as pd
 
 from pinnray.runtime.atomic import write_text
-from pinnray.runtime.html import write_html
 from pinnray.runtime.tables import TextTable
 from pinnray.solvers.finger_figures import QUANTITIES, heading
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import solved, with_law
 from pinnray.studies.optimum.designs import COMMAND, write_designs
-from pinnray.studies.optimum.pictures import draw_front, draw_front_fingers, draw_growth
+from pinnray.studies.optimum.pictures import draw_front, draw_front_fingers
 from pinnray.studies.optimum.question import Question
 from pinnray.studies.optimum.search import Optimum
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.study import title, unit_of
+from pinnray.studies.sweep.page import write_page
+from pinnray.studies.sweep.study import title
 from pinnray.studies.sweep.tables import failure_grid, sample_table
 
 PAGE = "front.html"
@@ -30,15 +30,6 @@ FILES = (
 )
 
 CIRCLE = " Circle: the cylinder where it ends."
-
-SHARP = 0.2
-"""Radius of a tip below which it is called sharp, mm: half the line of a common nozzle."""
-
-AT_AN_END = 0.02
-"""Share of a range within which a value counts as at its end."""
-
-MOST_AT_ENDS = 2 / 3
-"""Share of a front's fingers at ends of a parameter's range from which it is told."""
 
 DRAWN = 6
 """Largest number of fingers that are drawn."""
@@ -82,29 +73,24 @@ def write_front(
             "Fingers on the front at rest and under the load, numbered as in the table."
             f"{CIRCLE if any(each.problem.load.radius for each in solutions.values()) else ''}",
         ),
-        "growth": (draw_growth(optimum), "Hypervolume of the front over the number of runs."),
     }
-    pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
-    page = write_html(
+    pages = write_page(
         folder / PAGE,
-        "designs.html.j2",
-        title=f"Front of {optimum.study.name}",
-        sentences=front_sentences(
-            optimum, min(task.definition.get("tip_radius", SHARP) for task in tasks.values()), command
-        ),
-        tables=page_tables(optimum),
-        pictures=pictures,
-        note=f"Files beside this page: {FILES}. Started {record['started']}.",
+        f"Front of {optimum.study.name}",
+        front_sentences(optimum, command),
+        [*page_tables(optimum), failure_grid(optimum)],
+        drawn,
+        f"{FILES}. Started {record['started']}.",
+        formats,
     )
-    return [page, folder / "front.csv", *pictures], designs
+    return [*pages, folder / "front.csv"], designs
 
 
-def front_sentences(optimum: Optimum, sharpest: float = SHARP, command: str = COMMAND) -> list[str]:
+def front_sentences(optimum: Optimum, command: str = COMMAND) -> list[str]:
     """The search in sentences.
 
     Args:
         optimum: The search.
-        sharpest: Least radius of the tips on the front, mm.
         command: That solves the problem in a file, `{}`.
     """
     question = optimum.study
@@ -124,42 +110,8 @@ def front_sentences(optimum: Optimum, sharpest: float = SHARP, command: str = CO
         f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are on the "
         f"front: none of them is beaten in every objective by another run.{itself} "
         "An emulator proposed fingers; all numbers here are the solver's.",
-        *ends_sentence(optimum),
-        *tip_sentence(sharpest),
         "front/01.toml is the shape of the first finger of the table, for `pinnray design`. "
         f"`{command.format('problems/01.toml')}` solves it with load, material and solver of this search.",
-    ]
-
-
-def ends_sentence(optimum: Optimum) -> list[str]:
-    """Which parameters of the front's fingers are at ends of their ranges, in a sentence; else nothing."""
-    count, found = len(optimum.front), []
-    for name, values in optimum.study.varied.items():
-        if values.values is not None:
-            continue
-        low, high = values.ends
-        places = [(float(optimum.samples[run][name]) - low) / (high - low) for run in optimum.front]
-        lower = sum(place <= AT_AN_END for place in places)
-        upper = sum(place >= 1 - AT_AN_END for place in places)
-        if lower + upper >= MOST_AT_ENDS * count:
-            unit = f" {unit_of(name)}".rstrip()
-            ends = ((lower, f"{low:g}{unit}"), (upper, f"{high:g}{unit}"))
-            found.append(f"{name} ({', '.join(f'{many} at {end}' for many, end in ends if many)})")
-    if not found:
-        return []
-    return [
-        f"Of the {count} fingers most lie at an end of the range of {', '.join(found)}: wider ranges would "
-        "give other fingers."
-    ]
-
-
-def tip_sentence(radius: float) -> list[str]:
-    """What to do about fingers whose tip is a sharp edge; nothing if none is."""
-    if radius >= SHARP:
-        return []
-    return [
-        f"Tips are sharp (tip_radius = {radius:g} mm), which `thinnest_wall` does not see and no printer "
-        "makes: give tip_radius = 0.5 in [fixed], say."
     ]
 
 
@@ -180,15 +132,13 @@ def text_table(title: str, table: pd.DataFrame) -> TextTable:
 
 
 def page_tables(optimum: Optimum) -> list[TextTable]:
-    """The front in two tables, narrow enough for a page, and runs without a result."""
+    """The front in two tables, narrow enough for a page."""
     table = front_table(optimum).rename(columns=_in_lines)
     split = 2 + len(optimum.study.names) + len(optimum.study.varied)
-    found = [
+    return [
         text_table("Fingers on the front", table.iloc[:, :split]),
         text_table("Their other quantities", table.iloc[:, [0, *range(split, len(table.columns))]]),
     ]
-    failures = failure_grid(optimum)
-    return [*found, *([failures] if failures.rows else [])]
 
 
 def _in_lines(heading: str) -> str:

@@ -1,4 +1,4 @@
-"""Pictures of a search: the front among all runs, its growth, and the fingers on it."""
+"""Pictures of a search: the front among all runs, and the fingers on it."""
 
 from collections.abc import Sequence
 
@@ -53,20 +53,6 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
     return drawn
 
 
-def draw_growth(optimum: Optimum) -> Figure:
-    """Draw the hypervolume over the number of runs."""
-    start = optimum.study.samples or 0
-    with figure(2.4) as drawn:
-        write_heading(
-            drawn, "Hypervolume over the runs", f"the first {start} runs are samples, then come proposals"
-        )
-        axes = axes_at(drawn, (0.7, 0.5, WIDTH - 0.9, 1.4))
-        axes.plot(np.arange(1, len(optimum.volumes) + 1), optimum.volumes, color=BLUE, lw=1.4)
-        axes.axvline(start, color=MUTED, lw=0.8, ls=":")
-        axes.set(xlabel="runs", ylabel="hypervolume", ylim=(0, None), xlim=(0, None))
-    return drawn
-
-
 def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figure:
     """Draw fingers on the front, at rest and deformed, to one scale.
 
@@ -105,23 +91,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
             axes.set_axis_off()
             values = optimum.measurements[run].values
             text = ", ".join(f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.objectives)
-            number = axes.annotate(
-                str(optimum.place(run)),
-                (0, 1.03),
-                xycoords="axes fraction",
-                size=9,
-                weight="bold",
-                color=CONTACT,
-            )
-            axes.annotate(
-                text,
-                (1, 0),
-                xycoords=number,
-                xytext=(7, 0),
-                textcoords="offset points",
-                size=SMALL,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},  # over a cylinder
-            )
+            axes.set_title(f"{optimum.place(run)}:  {text}", size=SMALL, loc="left")
     return drawn
 
 

@@ -115,17 +115,6 @@ def question_of(given: Mapping[str, Any]) -> Question:
     }
     if said := [name for name in ("sampling", "samples") if name in content]:
         raise UserError(f"{said[0]} belongs to a study; the search chooses its samples: give runs")
-    limits = own.get("constraints", {})
-    if not isinstance(limits, Mapping) or not all(isinstance(each, Mapping) for each in limits.values()):
-        raise UserError("write constraints as NAME = {at_least = LOW, at_most = HIGH}")
-    own["constraints"] = {name: _limit(name, entry) for name, entry in limits.items()}
     runs = own.get("runs", 120)
     start = max(runs // 3, ENOUGH) if isinstance(runs, int) else ENOUGH
     return Question(**{**content, **own, "sampling": "sobol", "samples": start})
-
-
-def _limit(name: str, entry: Mapping[str, Any]) -> Limit:
-    try:
-        return Limit(**entry)
-    except UserError as error:
-        raise UserError(f"constraints.{name}: {error}") from None

@@ -1,8 +1,6 @@
 """The search for a Pareto front: rounds of an emulator's proposals, each judged by the solver."""
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -14,10 +12,12 @@ from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import brief
 from pinnray.runtime.output_folder import check_resumable_folder, locked
+from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
+from pinnray.runtime.text_files import read_json
 from pinnray.studies.emulator.emulator import fitted_emulator
 from pinnray.studies.emulator.inputs import Inputs
-from pinnray.studies.optimum.front import hypervolume, reference_point, unbeaten
+from pinnray.studies.optimum.front import reference_point, unbeaten
 from pinnray.studies.optimum.question import ENOUGH, Question
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement
@@ -25,7 +25,6 @@ from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import Journal, opened
 from pinnray.studies.sweep.study import Value
 from pinnray.studies.sweep.sweep import JOURNAL, Sweep, finish
-from pinnray.studies.sweep.workers import Workers
 
 QUESTION_FILE, FINGERS_FILE = "question.json", "fingers.json"
 
@@ -43,12 +42,10 @@ class Optimum(Sweep):
     Attributes:
         study: The question.
         front: Numbers of the runs on the Pareto front, ordered by the first objective.
-        volumes: Hypervolume after each run, shape (n,), in the product of the objectives' units.
     """
 
     study: Question
     front: list[int]
-    volumes: FloatArray
 
     __repr__ = brief
 
@@ -79,20 +76,19 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
     with (
         locked(job.out),
         opened(job.out / JOURNAL) as journal,
-        Workers(job.processes, job.scheduler) as workers,
+        Pool(job.processes) as pool,
     ):
         write_json(job.out / QUESTION_FILE, definition)
         journal.forget("failed")
-        fingers = _known_fingers(job.out / FINGERS_FILE)
-        start = len(samples(question))
-        if not fingers:
-            fingers = starting_fingers(job, start)
-            _keep_fingers(job.out / FINGERS_FILE, fingers)
+        file, start = job.out / FINGERS_FILE, len(samples(question))
+        if not file.exists():
+            write_json(file, {"fingers": starting_fingers(job, start)})
+        fingers: list[dict[str, Value]] = read_json(file, "search")["fingers"]  # also of an earlier start
         done = 0
         while True:
             with stages.stage(f"runs {done + 1} to {len(fingers)}") as progress:
                 tasks = {n: job.task(n, finger) for n, finger in enumerate(fingers)}
-                finish(tasks, journal, workers, progress)
+                finish(tasks, journal, pool, progress, question.time_limit)
             done = len(fingers)
             if done >= question.runs:
                 return _optimum(question, fingers, journal)
@@ -100,7 +96,7 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
             with stages.stage(f"proposals after {done}") as progress:
                 progress(0.0, "the emulator is fitted and searched")
                 fingers = fingers + _proposed(job, fingers, journal, count)
-            _keep_fingers(job.out / FINGERS_FILE, fingers)
+            write_json(file, {"fingers": fingers})
 
 
 def starting_fingers(job: StudyJob[Question], count: int) -> list[dict[str, Value]]:
@@ -137,7 +133,8 @@ def _proposed(
         return more
     inputs = Inputs(question, job.task(0, fingers[0]).definition)
     with threadpool_limits(1):  # the same sums, whatever the number of cores
-        emulator = fitted_emulator(Sweep(question, fingers, measured), inputs, fewest=ENOUGH, quick=True)
+        known = Sweep(question, fingers, measured)
+        emulator = fitted_emulator(known, inputs, names=question.names, fewest=ENOUGH, quick=True)
         costs = _allowed_costs(question, measured)
         every = np.array([question.costs(each.values) for each in measured if each.state == "done"])
         found = proposals(
@@ -175,28 +172,7 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
             "constraint, widen the ranges or take a smaller stroke"
         )
     costs = np.array([question.costs(each.values) for each in allowed])
-    converged = [question.costs(each.values) for each in measured if each.state == "done"]
-    reference = reference_point(np.array(converged))
     on_front = [each.number for each, best in zip(allowed, unbeaten(costs), strict=True) if best]
     first = next(iter(question.objectives))
     on_front.sort(key=lambda number: measured[number].values[first])
-    volumes = [
-        hypervolume(costs[[each.number <= number for each in allowed]], reference)
-        for number in range(len(measured))
-    ]
-    return Optimum(question, fingers, measured, on_front, np.array(volumes))
-
-
-def _known_fingers(file: Path) -> list[dict[str, Value]]:
-    """The fingers that an earlier start has chosen."""
-    if not file.exists():
-        return []
-    try:
-        found: list[dict[str, Value]] = json.loads(file.read_text(encoding="utf-8"))["fingers"]
-    except (ValueError, KeyError, OSError):
-        raise UserError(f"{file} is damaged; remove its folder to search again") from None
-    return found
-
-
-def _keep_fingers(file: Path, fingers: list[dict[str, Value]]) -> None:
-    write_json(file, {"fingers": fingers})
+    return Optimum(question, fingers, measured, on_front)

@@ -51,7 +51,6 @@ class Task:
         settings: Its settings.
         density: Of the material, g/cm^3.
         checkpoints: Folder of a training that can be resumed; None for none.
-        time_limit: Time after which it is stopped, s; None for none.
         fields: The field to keep; None for none.
     """
 
@@ -63,7 +62,6 @@ class Task:
     settings: dict[str, Value]
     density: float
     checkpoints: Path | None = None
-    time_limit: float | None = None
     fields: FieldOrder | None = None
 
     def problem(self) -> tuple[Solver, Problem]:
@@ -109,8 +107,7 @@ class StudyJob(Generic[S]):
         study: The study.
         folder: Folder from which paths in the study are meant.
         out: Output folder; samples that an earlier start finished there are kept.
-        processes: Worker processes on this machine.
-        scheduler: Address of a Dask scheduler whose workers are used instead.
+        processes: Worker processes.
         finger: The finger from which the samples differ, in place of the study's design.
     """
 
@@ -118,7 +115,6 @@ class StudyJob(Generic[S]):
     folder: Path
     out: Path
     processes: int = 1
-    scheduler: str | None = None
     finger: Finger | None = None
 
     def task(self, number: int, sample: Mapping[str, Value]) -> Task:
@@ -148,7 +144,6 @@ class StudyJob(Generic[S]):
             {**study.settings, **settings},
             study.density,
             checkpoints,
-            study.time_limit,
             self._field_order(number),
         )
 

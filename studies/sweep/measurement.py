@@ -18,8 +18,6 @@ from pinnray.studies.sweep.field_path import FieldPath
 from pinnray.studies.sweep.job import Task
 from pinnray.studies.sweep.quantities import quantities
 
-OUT_OF_TIME = "stopped at the time limit"
-
 Ending = Literal["done", "not converged", "refused", "failed"]
 """`refused`: the design breaks a rule or the solver does not take it; `failed`: an error of the program."""
 
@@ -48,10 +46,6 @@ class Measurement:
         return THROUGH_ITSELF in self.message
 
 
-class OutOfTime(UserError):
-    """The work on a sample takes too long."""
-
-
 def sampled(task: Task, _report: Callable[..., None]) -> list[Measurement]:
     """The one sample of a task, as a worker answers."""
     return [measured(task)]
@@ -68,19 +62,14 @@ def measured(task: Task) -> Measurement:
         words = " ".join(message.split())
         return Measurement(task.number, state, words, time.perf_counter() - started, values or {})
 
-    def progress(fraction: float, note: str) -> None:
-        spent = time.perf_counter() - started
-        if task.time_limit is not None and spent > task.time_limit and fraction < 1:
-            raise OutOfTime(f"{OUT_OF_TIME}: after {spent:.3g} s, at {note}")
-
     try:
         if "section" not in task.definition and (fault := broken_rule(Parameters(**task.definition))):
             return ended("refused", fault)
         solver, problem = task.problem()
         if task.checkpoints and isinstance(solver, TrainedSolver):
             solver = solver.in_context(TrainingContext(task.checkpoints, resume=True))
-        solution, values = quantities(problem, solver, density=task.density, progress=progress)
-    except (OutOfTime, TrainingDiverged) as error:
+        solution, values = quantities(problem, solver, density=task.density)
+    except TrainingDiverged as error:
         return ended("not converged", str(error))
     except UserError as error:
         return ended("failed" if task.checkpoints else "refused", str(error))

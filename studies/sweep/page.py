@@ -1,17 +1,22 @@
-"""The page of a sweep: summary, tables and pictures in one HTML file."""
+"""The pages of studies, and that of a sweep: sentences, tables and pictures in one HTML file."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pinnray.runtime import html
 from pinnray.runtime.figure import Figure
-from pinnray.studies.sweep.job import StudyJob
-from pinnray.studies.sweep.pictures import SHOWN, draw_fingers, draw_maps, draw_pairs, draw_sensitivity
-from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
-from pinnray.studies.sweep.study import Study
+from pinnray.runtime.html import write_html
+from pinnray.runtime.tables import TextTable
+from pinnray.studies.sweep.pictures import SHOWN, draw_maps, draw_pairs
+from pinnray.studies.sweep.sensitivity import sensitivities, sensitivity_grid
 from pinnray.studies.sweep.sweep import Sweep
-from pinnray.studies.sweep.tables import failure_grid, known_quantities, quantity_grid
+from pinnray.studies.sweep.tables import (
+    failure_grid,
+    known_quantities,
+    quantity_grid,
+    sample_table,
+    write_frame,
+)
 
 PAGE = "sweep.html"
 
@@ -20,47 +25,69 @@ FILES = (
     "versions and hashes), journal.sqlite (from which the same command goes on)"
 )
 
-SAMPLED = {"grid": "on a grid", "latin": "of a Latin hypercube", "sobol": "of a Sobol sequence"}
+SAMPLED = {"grid": "on a grid", "sobol": "of a Sobol sequence"}
 
 
 def write_page(
-    sweep: Sweep, job: StudyJob[Study], folder: Path, record: dict[str, Any], formats: Collection[str] = ()
+    path: Path,
+    title: str,
+    sentences: Sequence[str],
+    tables: Sequence[TextTable],
+    drawn: Mapping[str, tuple[Figure, str]],
+    note: str,
+    formats: Collection[str] = (),
 ) -> list[Path]:
-    """Write the pictures and the page, and return the paths.
+    """Write the page of a study and its pictures beside it, and return the paths.
+
+    Args:
+        path: Of the page.
+        title: Its heading.
+        sentences: What was found, a paragraph each.
+        tables: Those without rows are left out.
+        drawn: Pictures with their captions, by the names of their files.
+        note: Last line of the page.
+        formats: Of the pictures besides PNG.
+    """
+    pictures = {
+        each.save(path.with_name(f"{name}.png"), formats): text for name, (each, text) in drawn.items()
+    }
+    shown = [table for table in tables if table.rows]
+    page = write_html(
+        path,
+        "designs.html.j2",
+        title=title,
+        sentences=sentences,
+        tables=shown,
+        pictures=pictures,
+        note=f"Files beside this page: {note}",
+    )
+    return [page, *pictures]
+
+
+def write_sweep(
+    sweep: Sweep, folder: Path, record: Mapping[str, Any], formats: Collection[str] = ()
+) -> list[Path]:
+    """Write the table, the page and the pictures of a sweep, and return the paths.
 
     Args:
         sweep: The sweep.
-        job: The job that ran it.
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
         formats: Of the pictures besides PNG.
     """
-    found = sensitivities(sweep, SHOWN)
+    files = write_frame(sample_table(sweep), folder / "samples")
     drawn: dict[str, tuple[Figure, str]] = {}
     if sweep.study.sampling == "grid" and len(sweep.study.varied) == 2:
         trained = "rel_l2_displacement" in known_quantities(sweep)
         names = ("rel_l2_displacement", "boundary_violation") if trained else SHOWN[:2]
         drawn["map"] = (draw_maps(sweep, names), "Quantities over both parameters; framed: the least value.")
+    tables = [quantity_grid(sweep), failure_grid(sweep)]
     if len(sweep.good) > 1 and not sweep.study.settings_alone:
         drawn["pairs"] = (draw_pairs(sweep), "Quantities over the varied parameters, a dot for each finger.")
-        drawn["fingers"] = (
-            draw_fingers(sweep, job),
-            "The fingers with the least, the median and the largest value of a quantity, to one scale.",
-        )
-        if found:
-            drawn["sensitivity"] = (draw_sensitivity(found), sensitivity_caption(found))
-    pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
-    failures = failure_grid(sweep)
-    page = html.write_html(
-        folder / PAGE,
-        "designs.html.j2",
-        title=f"Sweep {sweep.study.name}",
-        sentences=sweep_sentences(sweep),
-        tables=[quantity_grid(sweep), *([failures] if failures.rows else [])],
-        pictures=pictures,
-        note=f"Files beside this page: {FILES}. Started {record['started']}.",
-    )
-    return [page, *pictures]
+        tables.append(sensitivity_grid(sensitivities(sweep, SHOWN)))
+    note = f"{FILES}. Started {record['started']}."
+    title = f"Sweep {sweep.study.name}"
+    return files + write_page(folder / PAGE, title, sweep_sentences(sweep), tables, drawn, note, formats)
 
 
 def sweep_sentences(sweep: Sweep) -> list[str]:
@@ -81,19 +108,6 @@ def sweep_sentences(sweep: Sweep) -> list[str]:
             "sensitivities are of the converged ones."
         )
     return [*sentences, *(f"{remark}." for remark in sweep.remarks)]
-
-
-def sensitivity_caption(found: dict[str, Sensitivity]) -> str:
-    """What the picture of the sensitivities shows, and how far to trust it."""
-    caption = (
-        "Sobol' indices by polynomial chaos: the share of a quantity's variance that each parameter causes "
-        "alone and with others, if all vary independently over their ranges. The polynomials explain "
-    )
-    shares = [f"{100 * each.explained:.1f} % of {name}" for name, each in found.items()]
-    caption += f"{', '.join(shares)} at samples that were left out of the fit."
-    if any(each.explained < TRUSTED for each in found.values()):
-        caption += f" Below {100 * TRUSTED:.0f} % (marked *) do not trust the indices: run more samples."
-    return caption
 
 
 def _range(values: Any) -> str:

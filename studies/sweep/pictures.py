@@ -1,6 +1,6 @@
-"""Pictures of a sweep: quantities over parameters, sensitivities, and fingers."""
+"""Pictures of a sweep: quantities over its parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib import colormaps
@@ -8,13 +8,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.patches import Rectangle
 
 from pinnray.comparison.figures.style import HALO, axes_at, write_heading
-from pinnray.geometry.drawing.drawn_finger import finger_from
-from pinnray.geometry.finger.picture import draw_section
-from pinnray.runtime.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.figure import INK, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
-from pinnray.studies.sweep.job import StudyJob
-from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity
-from pinnray.studies.sweep.study import Study, Value, title, unit_of
+from pinnray.studies.sweep.study import Value, title, unit_of
 from pinnray.studies.sweep.sweep import Sweep
 
 SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
@@ -26,9 +22,6 @@ MOST_DOTS = 2_000
 WIDE = 6
 """Largest number of columns that have room for long words."""
 
-COLUMNS = 3
-"""Fingers in a row of the drawing: with the least, the median and the largest value."""
-
 
 def draw_pairs(sweep: Sweep) -> Figure:
     """Draw quantities over the varied parameters: a dot for each sample."""
@@ -36,39 +29,35 @@ def draw_pairs(sweep: Sweep) -> Figure:
     parameters = list(sweep.study.varied)
     good = sweep.good[:MOST_DOTS]
     size = float(np.clip(30 / np.sqrt(len(good)), 1.0, 3.5))
-    left, head, foot, gap, tall = 1.1, 0.5, 0.95, 0.12, 0.62
-    width = (WIDTH - left - 0.1 - gap * (len(parameters) - 1)) / len(parameters)
-    with figure(head + foot + (tall + gap) * len(names)) as drawn:
+    height = 1.45 + 0.74 * len(names)
+    room = {"left": 1.1 / WIDTH, "right": 1 - 0.1 / WIDTH, "top": 1 - 0.5 / height, "bottom": 0.95 / height}
+    with figure(height) as drawn:
         note = f"{len(good)} of {len(sweep.good)} samples"
         write_heading(drawn, f"Quantities over parameters: {sweep.study.name}", note)
-        for row, name in enumerate(names):
-            values = np.array([each.values[name] for each in good])
-            for column, parameter in enumerate(parameters):
-                place = (left + column * (width + gap), head + row * (tall + gap), width, tall)
-                axes = axes_at(drawn, place)
+        grid = drawn.subplots(
+            len(names), len(parameters), sharex="col", sharey="row", squeeze=False, gridspec_kw=room
+        )
+        for row, name in zip(grid, names, strict=True):
+            row[0].set_ylabel(_label(name), rotation=0, ha="right", va="center")
+            for axes, parameter in zip(row, parameters, strict=True):
                 texts = [sweep.samples[each.number][parameter] for each in good]
                 choices = sweep.study.varied[parameter].values
-                x = np.array([choices.index(text) if choices else text for text in texts], dtype=np.float64)
+                x = [choices.index(text) if choices else text for text in texts]
+                values = [each.values[name] for each in good]
                 axes.plot(x, values, "o", ms=size, color="#0072b2", alpha=0.7, mew=0, clip_on=False, zorder=3)
                 axes.tick_params(length=2, pad=1.5)
                 axes.locator_params(axis="y", nbins=3)
-                ends = _ends(sweep, parameter)
-                ticks = [0.0, len(choices) - 1.0] if choices else [float(end) for end in ends]
-                room = 0.06 * (ticks[1] - ticks[0] or 1.0)
-                axes.set_xlim(ticks[0] - room, ticks[1] + room)  # both ends have their numbers
-                axes.set_xticks(ticks)
                 axes.margins(y=0.1)
-                if column:
-                    axes.set_yticklabels([])
-                else:
-                    axes.set_ylabel(_label(name), rotation=0, ha="right", va="center")
-                if row < len(names) - 1:
-                    axes.set_xticklabels([])
-                else:
-                    labels = axes.set_xticklabels(ends)
-                    labels[0].set_horizontalalignment("left")
-                    labels[-1].set_horizontalalignment("right")
-                    axes.set_xlabel(_wrapped(parameter, narrow=len(parameters) > WIDE), labelpad=2)
+        for axes, parameter in zip(grid[-1], parameters, strict=True):
+            ends = _ends(sweep, parameter)
+            choices = sweep.study.varied[parameter].values
+            low, high = (0.0, len(choices) - 1.0) if choices else map(float, ends)
+            room_beside = 0.06 * (high - low or 1.0)
+            axes.set_xlim(low - room_beside, high + room_beside)  # both ends have their numbers
+            labels = axes.set_xticks([low, high], ends)
+            labels[0].label1.set_horizontalalignment("left")
+            labels[-1].label1.set_horizontalalignment("right")
+            axes.set_xlabel(_wrapped(parameter, narrow=len(parameters) > WIDE), labelpad=2)
     return drawn
 
 
@@ -105,73 +94,6 @@ def draw_maps(sweep: Sweep, names: Sequence[str]) -> Figure:
     return drawn
 
 
-def draw_sensitivity(found: Mapping[str, Sensitivity]) -> Figure:
-    """Draw the total indices as a table of colours, with the first-order ones in brackets."""
-    names, parameters = list(found), list(next(iter(found.values())).total)
-    left, head, foot, tall = 1.25, 1.2, 0.3, 0.34
-    width = WIDTH - left - 0.1
-    with figure(head + foot + tall * len(names)) as drawn:
-        write_heading(
-            drawn,
-            "Share of each quantity's variance by parameter, %",
-            "alone and with others; in brackets: alone",
-        )
-        axes = axes_at(drawn, (left, head, width, tall * len(names)))
-        table = np.array([[100 * found[name].total[p] for p in parameters] for name in names])
-        axes.imshow(table, cmap=colormaps["Blues"], norm=Normalize(0, 130), aspect="auto")
-        for row, name in enumerate(names):
-            for column, parameter in enumerate(parameters):
-                total, first = (100 * share[parameter] for share in (found[name].total, found[name].first))
-                text = f"{total:.0f}" + (f" ({first:.0f})" if len(parameters) <= WIDE else f"\n({first:.0f})")
-                axes.text(column, row, text, ha="center", va="center", size=SMALL, linespacing=0.95)
-        axes.set_xticks(
-            range(len(parameters)), [_wrapped(name, narrow=len(parameters) > WIDE) for name in parameters]
-        )
-        axes.set_yticks(range(len(names)), [name + _doubt(found[name]) for name in names])
-        axes.xaxis.tick_top()
-        axes.tick_params(length=0)
-        axes.spines[:].set_visible(False)
-        if any(map(_doubt, found.values())):
-            drawn.text(0.012, 0.1 / drawn.get_figheight(), "*: not to be trusted", size=SMALL, color=MUTED)
-    return drawn
-
-
-def draw_fingers(sweep: Sweep, job: StudyJob[Study]) -> Figure:
-    """Draw, to one scale, the fingers with the least, the median and the largest value of each quantity."""
-    names = [name for name in SHOWN[:4] if _varies(sweep, name)]
-    chosen = []
-    for name in names:
-        ranked = sorted(sweep.good, key=lambda each: each.values[name])
-        for each in [ranked[0], ranked[len(ranked) // 2], ranked[-1]] if len(ranked) > 2 else ranked:
-            finger = finger_from(job.task(each.number, sweep.samples[each.number]).definition)
-            chosen.append((finger, each.number, name, each.values[name]))
-    low = np.min([finger.section.bounds[0] for finger, *_ in chosen], axis=0)
-    high = np.max([finger.section.bounds[1] for finger, *_ in chosen], axis=0)
-    width = (WIDTH - 0.2) / COLUMNS
-    height = (width - 0.1) * (high[1] - low[1]) / (high[0] - low[0])
-    head, label, foot = 0.38, 0.4, 0.1
-    columns = min(COLUMNS, len(sweep.good))
-    which = (
-        "the least, the median and the largest value" if columns > 2 else "the least and the largest value"
-    )
-    with figure(head + (height + label) * len(names) + foot) as drawn:
-        write_heading(drawn, f"Fingers with {which}", "all to one scale")
-        for place, (finger, number, name, value) in enumerate(chosen):
-            row, column = divmod(place, columns)
-            box = (0.1 + column * width, head + row * (height + label) + label, width - 0.1, height)
-            axes = axes_at(drawn, box)
-            draw_section(axes, finger.section)
-            front = np.array([finger.section.front_point(x) for x in np.linspace(*finger.contact_ends, 5)])
-            axes.plot(*front.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=3)
-            axes.set(xlim=(low[0] - 1, high[0] + 1), ylim=(low[1] - 1, high[1] + 1), aspect="equal")
-            axes.set_axis_off()
-            if not column:
-                unit = QUANTITIES[name].unit.replace("deg", "°")
-                axes.set_title(f"{name}, {unit}", size=SMALL, pad=14, loc="left", weight="bold")
-            axes.text(0, 1.04, f"{value:.3g} (sample {number})", size=SMALL, transform=axes.transAxes)
-    return drawn
-
-
 def _varies(sweep: Sweep, name: str) -> bool:
     values = np.array([each.values[name] for each in sweep.good])
     if len(values) < 2 or not np.isfinite(values).all():
@@ -201,7 +123,3 @@ def _ends(sweep: Sweep, parameter: str) -> tuple[str, str]:
 
 def _short(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _doubt(found: Sensitivity) -> str:
-    return "" if found.explained >= TRUSTED else " *"

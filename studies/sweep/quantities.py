@@ -11,7 +11,7 @@ from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.finger_figures import Quantity, figures_at_rest, figures_of
 from pinnray.solvers.problem import Load, Problem, contact_functional
 from pinnray.solvers.solution import Solution
-from pinnray.solvers.solver import Progress, Solver, TrainedSolver, silent, solved, with_law
+from pinnray.solvers.solver import Solver, TrainedSolver, solved, with_law
 
 TRAINING: Mapping[str, Quantity] = {
     "rel_l2_displacement": Quantity("", "relative L2 difference of the displacement from that by fem"),
@@ -27,16 +27,13 @@ TRAINING: Mapping[str, Quantity] = {
 """What a training gives besides, compared with `fem`."""
 
 
-def quantities(
-    problem: Problem, solver: Solver, *, density: float, progress: Progress = silent
-) -> tuple[Solution, dict[str, float]]:
+def quantities(problem: Problem, solver: Solver, *, density: float) -> tuple[Solution, dict[str, float]]:
     """Solve a problem and evaluate every quantity.
 
     Args:
         problem: The problem, with its finger; its material's law is replaced by one that the solver has.
         solver: The solver.
         density: Of the material, g/cm^3.
-        progress: Called by the solver; it may stop it by an exception.
 
     Returns:
         The solution, and the quantities by the names of `QUANTITIES`; NaN where the solver does not give one.
@@ -48,7 +45,7 @@ def quantities(
         solution = prepared.solve(problem.load)
     else:
         lawful = replace(problem, material=with_law(problem.material, solver))
-        solution = solved(solver, lawful, progress)
+        solution = solved(solver, lawful)
         prepared = plain.prepare(replace(linear, load=Load(position=problem.load.position)))
     rest = figures_at_rest(problem, density=density, solve=prepared.solve)
     prepared.destroy()

@@ -1,4 +1,4 @@
-"""The samples of a study: a grid, a Latin hypercube or a Sobol sequence over its varied parameters."""
+"""The samples of a study: a grid or a Sobol sequence over its varied parameters."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -27,18 +27,10 @@ def samples(study: Study) -> list[dict[str, Value]]:
         if (count := prod(map(len, axes))) > MOST:
             raise UserError(f"the grid has {count:,} samples; at most {MOST:,} can be run")
         return [dict(zip(names, values, strict=True)) for values in product(*axes)]
-    places = unit_points(study.sampling, len(names), study.samples or 0, study.seed)
-    return [sample_at(study, row) for row in places]
-
-
-def unit_points(sampling: str, dimensions: int, count: int, seed: int) -> FloatArray:
-    """Points of the unit cube, shape (count, dimensions), by scipy.stats.qmc."""
-    random = np.random.default_rng(seed)
-    if sampling == "latin":
-        return np.asarray(qmc.LatinHypercube(dimensions, rng=random).random(count))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # that only powers of two are balanced
-        return np.asarray(qmc.Sobol(dimensions, scramble=True, rng=random).random(count))
+        places = qmc.Sobol(len(names), rng=np.random.default_rng(study.seed)).random(study.samples)
+    return [sample_at(study, row) for row in places]
 
 
 def sample_at(study: Study, places: FloatArray) -> dict[str, Value]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.tables import TextTable
 from pinnray.studies.sweep.sampling import places_of
 from pinnray.studies.sweep.sweep import Sweep
 
@@ -59,6 +60,26 @@ def sensitivities(sweep: Sweep, names: Sequence[str]) -> dict[str, Sensitivity]:
         if np.ptp(values[known]) > 1e-9 * np.abs(values[known]).max():
             found[name] = _indices(places[known], values[known], parameters)
     return found
+
+
+def sensitivity_grid(found: Mapping[str, Sensitivity]) -> TextTable:
+    """The indices of each quantity, %, and the share of its variance that the polynomials explain."""
+    parameters = list(next(iter(found.values())).total) if found else []
+    rows = [
+        (
+            name,
+            *(f"{100 * each.total[key]:.0f} ({100 * each.first[key]:.0f})" for key in parameters),
+            f"{100 * each.explained:.1f}{'' if each.explained >= TRUSTED else ' *'}",
+        )
+        for name, each in found.items()
+    ]
+    caption = (
+        "Sobol' indices by polynomial chaos: the share of a quantity's variance that each parameter causes "
+        "alone and with others (alone), if all vary independently over their ranges. Explained: by the "
+        f"polynomials, at samples left out of the fit; below {100 * TRUSTED:.0f} % (*) do not trust the "
+        "indices: run more samples."
+    )
+    return TextTable("Sensitivities, %", ["quantity", *parameters, "explained"], rows, caption)
 
 
 def _indices(places: FloatArray, values: FloatArray, parameters: Sequence[str]) -> Sensitivity:

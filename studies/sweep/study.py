@@ -88,8 +88,7 @@ class Study(CheckedModel):
         mesh_size: Element size in walls and ribs, mm.
         density: Of the material, g/cm^3; the default is that of a printed polyurethane.
         time_limit: Time after which the work on a finger is stopped, s; None means no limit.
-        sampling: `grid`: every combination; `latin`: a Latin hypercube; `sobol`: a scrambled Sobol sequence,
-            which can be continued.
+        sampling: `grid`: every combination; `sobol`: a scrambled Sobol sequence, which can be continued.
         samples: Number of samples, unless on a grid.
         strokes: Number of equal strokes up to the full one at which each sample's displacement field is kept,
             for `pinnray explore`; None keeps none. Needs a cylinder and `fem-nonlinear`.
@@ -106,7 +105,7 @@ class Study(CheckedModel):
     mesh_size: float = bounded(0.5, 0.02, 20, "mm", "", "Largest element in the walls and ribs")
     density: float = bounded(1.2, 1e-3, 30, "g/cm^3", "", "Density of the material")
     time_limit: float | None = bounded(None, 0.1, 1e6, "s", "", "Longest time for a finger")
-    sampling: Literal["grid", "latin", "sobol"] = "sobol"
+    sampling: Literal["grid", "sobol"] = "sobol"
     samples: int | None = bounded(None, 1, MOST, "", "", "Number of samples")
     strokes: int | None = bounded(None, 2, 100, "", "", "Strokes at which a sample's field is kept")
     seed: int = bounded(0, 0, 2**32 - 1, "", "", "Seed of the samples")

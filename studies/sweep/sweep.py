@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -14,25 +15,28 @@ from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.output_folder import check_links, check_resumable_folder, locked
 from pinnray.runtime.processes.child import ProcessFailed
-from pinnray.runtime.processes.pool import Input
+from pinnray.runtime.processes.pool import Input, Pool
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.text_files import read_json
 from pinnray.solvers.solver import Progress, silent
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.measurement import OUT_OF_TIME, Measurement, sampled
+from pinnray.studies.sweep.measurement import Measurement, sampled
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import Journal, opened
 from pinnray.studies.sweep.study import Study, Value
-from pinnray.studies.sweep.workers import DEATHS, Workers
 
 STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
 
 FEW = 5
 """Samples that a remark names."""
 
-GRACE, GRACE_S = 1.5, 10.0
-"""A worker whose sample does not stop at its limit of time is ended after so many times the limit and so many
-seconds more, for what it has to load first."""
+DEATHS = 8
+"""Deaths of its worker after which a sample counts as failed, for any process may be killed by chance."""
+
+OUT_OF_TIME = "stopped at the time limit"
+
+GRACE_S = 10.0
+"""Time that a worker has besides the limit of its sample, for what it has to load first, s."""
 
 
 @dataclass(frozen=True)
@@ -95,20 +99,29 @@ def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
         journal.forget("failed")
         if before.time_limit != job.study.time_limit:
             journal.forget("not converged", OUT_OF_TIME)
-        with stages.stage("samples") as progress, Workers(job.processes, job.scheduler) as workers:
-            finish(tasks, journal, workers, progress)
+        with stages.stage("samples") as progress, Pool(job.processes) as pool:
+            finish(tasks, journal, pool, progress, job.study.time_limit)
         found = [each for each in journal.measurements() if each.number in tasks]
         return Sweep(job.study, all_samples, found)
 
 
 def finish(
-    tasks: Mapping[int, Task], journal: Journal, workers: Workers, progress: Progress = silent
+    tasks: Mapping[int, Task],
+    journal: Journal,
+    pool: Pool,
+    progress: Progress = silent,
+    time_limit: float | None = None,
 ) -> None:
-    """Run the tasks that have no result in the journal, by the samples' numbers, and keep each at once."""
+    """Run the tasks that have no result in the journal, by the samples' numbers, and keep each at once.
+
+    The first of all runs alone: it compiles the forms of FEniCS, which all would compile at once if its cache
+    is empty.
+    """
     known = journal.numbers()
     waiting = {number: task for number, task in tasks.items() if number not in known}
-    limit = next((task.time_limit for task in tasks.values()), None)
-    run_tasks(sampled, waiting, tasks, journal, workers, progress, time_limit=limit, deaths=DEATHS)
+    alone = 0 if known else 1
+    for part in (dict(islice(waiting.items(), alone)), dict(islice(waiting.items(), alone, None))):
+        run_tasks(sampled, part, tasks, journal, pool, progress, time_limit=time_limit, deaths=DEATHS)
 
 
 def run_tasks(
@@ -116,7 +129,7 @@ def run_tasks(
     tasks: Mapping[Any, Input],
     samples: Collection[Any],
     journal: Journal,
-    workers: Workers | None,
+    pool: Pool | None,
     progress: Progress = silent,
     *,
     time_limit: float | None = None,
@@ -129,7 +142,7 @@ def run_tasks(
         tasks: By name; where a process dies, the name is that of the failed sample.
         samples: Numbers or names of all samples of the study.
         journal: Where the results are kept.
-        workers: The processes that do the work; None for this one.
+        pool: The processes that do the work; None for this one.
         progress: Called with the share that is done and a note.
         time_limit: Of each task, s.
         deaths: Deaths of its process after which a task has failed.
@@ -142,11 +155,11 @@ def run_tasks(
         done += 1
         progress(done / len(samples), f"{done} of {len(samples)} samples")
 
-    hard = inf if time_limit is None else GRACE * time_limit + GRACE_S
-    if workers is None:
+    hard = inf if time_limit is None else time_limit + GRACE_S
+    if pool is None:
         answers: Iterable[Any] = ((name, work(task, partial(keep, name))) for name, task in tasks.items())
     else:
-        answers = workers.answers(work, tasks, report=keep, timeout_s=hard, deaths=deaths)
+        answers = pool.answers(work, tasks, report=keep, timeout_s=hard, deaths=deaths)
     for name, answer in answers:
         if not isinstance(answer, ProcessFailed):
             found = list(answer)

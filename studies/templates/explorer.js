@@ -64,11 +64,10 @@
   }
 
   // One finger is computed once for all strokes; a frame is drawn when the browser is ready for it.
-  let known, asked, solved;
+  let known, asked;
   function set(control, value) {
     values[control.name] = value;
     show(control);
-    solved = undefined;
     if (control !== stroke) known = undefined;
     asked ??= requestAnimationFrame(draw);
   }
@@ -85,24 +84,24 @@
   function draw() {
     asked = undefined;
     const started = performance.now();
-    const why = solved ? "" : unknown();
+    const why = unknown();
     byId("explorer-fault").hidden = !why;
     byId("explorer-fault").textContent = why;
     byId("explorer").classList.toggle("unknown", Boolean(why));
     const inside = { ...values };
     for (const { name, low, high } of controls) inside[name] = Math.min(Math.max(values[name], low), high);
     known ??= finger(inside);
-    const now = solved ?? predicted(known, inside.stroke / manifest.stroke);
+    const now = predicted(known, inside.stroke / manifest.stroke);
     for (const { name, value, half } of now.figures) {
       const { cells, unit } = rows.get(name);
       cells[0].textContent = why ? "not known" : `${digits(value)} ${unit}`;
       const least = name === "contact_width" ? Math.max(value - half, 0) : value - half;
-      cells[1].textContent = why ? "" : solved ? "finite elements" : `${digits(least)} to ${digits(value + half)}`;
+      cells[1].textContent = why ? "" : `${digits(least)} to ${digits(value + half)}`;
     }
     picture(now);
     curve(why);
     compareMarkers(now);
-    byId("explorer-note").textContent = why ? "" : solved ? `True scale. Solved with finite elements: ${solved.message}` :
+    byId("explorer-note").textContent = why ? "" :
       `True scale. Displacement within ${digits(100 * now.error, 2)} % in 19 of 20 cases (root mean square).`;
     byId("explorer-copied").hidden = true;
     byId("explorer").dataset.milliseconds = performance.now() - started;
@@ -164,13 +163,10 @@
   function curve(why) {
     svg.replaceChildren();
     if (why) return;
-    const full = solved ? values.stroke : manifest.stroke;
-    const share = values.stroke / full;
-    const rest = { s: 0, value: 0, half: 0 };
-    const points = solved
-      ? [rest, ...solved.forces.map((value, k) => ({ s: (k + 1) / solved.forces.length, value, half: 0 }))]
-      : [rest, ...Array.from({ length: 32 }, (_, k) => (k + 1) / 32).map((s) => ({ s, ...force(known, s) }))];
-    const now = solved ? points.at(-1) : force(known, share);
+    const share = values.stroke / manifest.stroke;
+    const strokes = Array.from({ length: 32 }, (_, k) => (k + 1) / 32);
+    const points = [{ s: 0, value: 0, half: 0 }, ...strokes.map((s) => ({ s, ...force(known, s) }))];
+    const now = force(known, share);
     const most = Math.max(...points.map(({ value, half }) => value + half), 1e-9);
     const step = [1, 2, 5, 10].map((each) => each * 10 ** Math.floor(Math.log10(most / 4))).find((each) => most / each <= 5);
     const high = step * Math.ceil(most / step);
@@ -197,7 +193,7 @@
       parts.push(made("text", { x: 40, y: Y(value) + 4, "text-anchor": "end" }, digits(value)));
     }
     for (const s of [0, 0.25, 0.5, 0.75, 1]) {
-      parts.push(made("text", { x: X(s), y: 188, "text-anchor": "middle" }, digits(s * full)));
+      parts.push(made("text", { x: X(s), y: 188, "text-anchor": "middle" }, digits(s * manifest.stroke)));
     }
     svg.replaceChildren(...parts);
   }
@@ -272,33 +268,12 @@
     });
   }
 
-  // With a server behind the page: what the study does not know is solved.
-  byId("explorer-solve")?.addEventListener("click", async ({ target }) => {
-    const asking = Object.fromEntries(controls.map(({ name }) => [name, values[name]]));
-    target.disabled = true;
-    byId("explorer-said").textContent = "solving …";
-    try {
-      const reply = await fetch("/solve", { method: "POST", headers: { "X-Pinnray": manifest.live }, body: JSON.stringify(asking) });
-      if (!reply.ok) throw new Error(`the server says ${reply.status}`);
-      const found = await reply.json();
-      byId("explorer-said").textContent = found.nodal ? "" : found.message;
-      if (found.nodal && controls.every(({ name }) => values[name] === asking[name])) {
-        const figures = manifest.figures.map(({ name }) => ({ name, value: found.figures[name], half: 0 }));
-        solved = { points: found.points, moved: found.nodal, stress: found.stress, figures, forces: found.forces, message: found.message };
-        draw();
-      }
-    } catch (error) {
-      byId("explorer-said").textContent = `no answer (${error.message}); is pinnray app still running?`;
-    }
-    target.disabled = false;
-  });
-
   function middle() {
     for (const control of controls) {
       values[control.name] = control.value;
       show(control);
     }
-    known = solved = undefined;
+    known = undefined;
     draw();
   }
   byId("explorer-reset").addEventListener("click", middle);

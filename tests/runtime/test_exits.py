@@ -11,7 +11,7 @@ from pinnray.runtime.exits import INTERRUPTED, interruptible
 
 
 def test_an_error_that_a_signal_caused_is_the_interruption(capsys: pytest.CaptureFixture[str]) -> None:
-    """Dask's wait answers a signal by an error of its lock."""
+    """A library that waits may answer a signal by an error of its lock."""
 
     def waiting() -> None:
         with going_on_from(Path("out/search")):

@@ -8,7 +8,7 @@ from pinnray.runtime.errors import UserError
 
 
 @quietable
-def command(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False) -> int:
+def command(sweep: Path, *, out: OptionalOutputPath = None) -> int:
     """Write a page that shows the deformed finger at any load of a sweep, while sliders move.
 
     The page is one file that needs no network. The study must have kept fields: strokes = 10 in its file.
@@ -17,7 +17,6 @@ def command(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False)
     Args:
         sweep: Folder of `pinnray sweep`.
         out: HTML file; default: explore.html in that folder.
-        refit: Fit the emulator again.
     """
     from pinnray.runtime.stages import Stages
     from pinnray.studies.fields.explorer import write_explorer
@@ -27,7 +26,7 @@ def command(sweep: Path, *, out: OptionalOutputPath = None, refit: bool = False)
     if path.suffix.lower() != ".html":
         raise UserError(f"--out {path}: give the name of an HTML file, such as explore.html")
     with Stages() as stages:
-        emulator = fields_of(sweep, refit=refit, stages=stages)
+        emulator = fields_of(sweep, stages)
         with stages.stage("page") as progress:
             size = write_explorer(emulator, path).stat().st_size
             progress(1.0, f"{size / 1e6:.1f} MB")

@@ -21,7 +21,6 @@ def command(
     *,
     set: Repeated = (),
     csv: Path | None = None,
-    refit: bool = False,
     out: OptionalOutputPath = None,
 ) -> int:
     """Predict the quantities of fingers that a sweep did not solve, each with a 95 % interval.
@@ -33,7 +32,6 @@ def command(
         sweep: Folder of `pinnray sweep`.
         set: A parameter that the sweep varies, such as rib_count=6 or N=6; give every one.
         csv: CSV file of many fingers: a column for every varied parameter, a row for every finger.
-        refit: Fit the emulator again.
         out: CSV file of the predictions for --csv; default: beside it, NAME-predicted.csv.
     """
     from pinnray.runtime.atomic import write_text
@@ -50,7 +48,7 @@ def command(
     existing(csv)
     rows = read_rows(csv) if csv else [finger_given(set)]
     with Stages() as stages:
-        emulator = emulator_of(sweep, refit=refit, stages=stages)
+        emulator = emulator_of(sweep, stages)
     fingers = [emulator.inputs.finger(row, f"{csv}, row {place}: " if csv else "") for place, row in rows]
     found = emulator.predict(fingers)
     if csv is None:

@@ -25,19 +25,18 @@ def command(
     """
     from pinnray.runtime.stages import Stages
     from pinnray.runtime.tables import terminal_table
-    from pinnray.studies.sweep.page import write_page
+    from pinnray.studies.sweep.page import write_sweep
     from pinnray.studies.sweep.study import load_study
     from pinnray.studies.sweep.sweep import run_sweep
-    from pinnray.studies.sweep.tables import failure_grid, quantity_grid, sample_table, write_frame
+    from pinnray.studies.sweep.tables import failure_grid, quantity_grid
 
     formats = read_formats(options.pictures)
     read = load_study(study)
     job = options.job(read, study, "sweep")
     with going_on_from(job.out), Stages() as stages:
         done = run_sweep(job, stages)
-        written = write_frame(sample_table(done), job.out / "samples")
         with stages.stage("pictures"):
-            written += write_page(done, job, job.out, stages.record(), formats)
+            written = write_sweep(done, job.out, stages.record(), formats)
     quantities, failures = quantity_grid(done), failure_grid(done)
     for grid in (quantities, failures):
         if grid.rows:

@@ -22,7 +22,7 @@ from pinnray.studies.crossval.fold_runner import SolverTask, run_folds
 from pinnray.studies.crossval.folds import ALL, LOAD, ONE, RANDOM, Fold, LoadCase
 from pinnray.studies.crossval.scores import FIELDS
 from pinnray.studies.crossval.study import SolverVariant
-from pinnray.studies.crossval.true_fields import FieldSampler, TrueContact, TrueField
+from pinnray.studies.crossval.true_fields import FieldSampler, TrueField
 from pinnray.studies.sweep.measurement import Measurement
 from tests.studies.crossval.conftest import NOISE
 
@@ -36,7 +36,7 @@ def task(coarse_mesh, truth, observations) -> SolverTask:
     """`gp` and one fold of each kind, at the full load and half of it."""
     sampled = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8).of_solution(truth, coarse_mesh)
     truths = [
-        TrueField(sampled * share, TrueContact(tuple(share * truth.reaction), 35.0, 34.0, 2.0))
+        TrueField(sampled * share, share * float(np.linalg.norm(truth.reaction)), 35.0)
         for share in (1.0, 0.5)
     ]
     half = replace(observations, displacements=0.5 * observations.displacements)

@@ -1,20 +1,13 @@
 """The explorer as a reader has it: its numbers against the emulator's, its sliders, files and faults."""
 
-import json
-import threading
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
-from http.server import ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page
 
-from pinnray.runtime.errors import UserError
 from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields
 from pinnray.studies.fields.explorer import write_explorer
-from pinnray.studies.fields.live import HOST, handler
 from tests.compare.report.browser import chromium, opened
 from tests.studies.fields.synthetic import known, snapshots, study
 
@@ -134,39 +127,3 @@ def test_the_finger_is_copied_as_command_options_and_python(page):
     ):
         page.click(f"[data-copy={kind}]")
         assert part in page.inner_text("#explorer-copied")
-
-
-def test_the_server_answers_its_own_page_alone():
-    asked = []
-
-    def answer(values):
-        asked.append(values)
-        if values["stroke"] < 0:
-            raise UserError("stroke -1: the indenter presses")
-        return {"message": "done"}
-
-    server = ThreadingHTTPServer((HOST, 0), handler(b"<p>page", "secret", answer))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    address = f"http://{HOST}:{server.server_port}"
-
-    def reply(path: str, data: object = None, **headers: str) -> tuple[int, bytes]:
-        content = None if data is None else json.dumps(data).encode()
-        request = urllib.request.Request(address + path, content, headers)
-        try:
-            with urllib.request.urlopen(request) as response:
-                return response.status, response.read()
-        except urllib.error.HTTPError as error:
-            return error.code, error.read()
-
-    own = {"X-Pinnray": "secret"}
-    assert reply("/") == (200, b"<p>page")
-    assert reply("/", Host="elsewhere.example")[0] == 403  # a name that somebody has made to lead here
-    assert reply("/etc/passwd")[0] == 404
-    assert reply("/solve", {"stroke": 3})[0] == 403
-    assert reply("/solve", {"stroke": 3}, **own) == (200, b'{"message": "done"}')
-    assert b"presses" in reply("/solve", {"stroke": -1}, **own)[1]
-    for wrong in ([1], {"stroke": "x"}, "x" * 20_000):
-        assert reply("/solve", wrong, **own)[0] == 400
-    assert asked == [{"stroke": 3.0}, {"stroke": -1.0}]
-    server.shutdown()
-    server.server_close()

@@ -15,7 +15,7 @@ from pinnray.solvers.lagrange import LagrangeField
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields, places
 from pinnray.studies.fields.reader import FieldReader
-from pinnray.studies.fields.store import _assembled, _parts, fields_of
+from pinnray.studies.fields.store import fields_of, load, save
 from pinnray.studies.sweep.field_path import FieldPath, MovedMesh
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.sampling import samples
@@ -72,8 +72,9 @@ def test_a_field_outside_the_study_is_refused_with_the_reason(emulator):
     assert "it buckles" in str(missing.fault(inside, 5.0))
 
 
-def test_an_emulator_is_kept_whole(emulator):
-    again = _assembled(_parts(emulator), known(study()))
+def test_an_emulator_is_kept_whole(emulator, tmp_path):
+    save(emulator, tmp_path / "fields.npz")
+    again = load(tmp_path / "fields.npz", known(study()))
     sample = {"contact_position": 40.0, "radius": 9.0}
     first, second = (each.predict(sample, 7.0) for each in (emulator, again))
     assert np.array_equal(first.nodal, second.nodal)
@@ -96,6 +97,7 @@ CHANGED = {
 def test_an_emulator_is_kept_for_what_it_was_fitted_to(what, emulator, tmp_path, monkeypatch):
     now = known(study(), [{"contact_position": 59.0, "radius": 4.5}])
     fitted = []
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path))
     monkeypatch.setattr("pinnray.studies.fields.store.KnownSamples.of", lambda folder: now)
     monkeypatch.setattr("pinnray.studies.fields.store.Snapshots.load", lambda known: known)
     monkeypatch.setattr(

@@ -26,12 +26,6 @@ def test_a_sobol_sequence_is_continued_by_more_samples() -> None:
     assert many[:5] == few
 
 
-def test_a_latin_hypercube_has_one_sample_in_each_slice() -> None:
-    study = Study(name="s", sampling="latin", samples=20, varied={"height": {"from": 80, "to": 100}})
-    heights = sorted(float(sample["height"]) for sample in samples(study))
-    assert [int(height - 80) for height in heights] == list(range(20))
-
-
 def test_whole_numbers_are_equally_frequent() -> None:
     counts = [sample["rib_count"] for sample in samples(Study(name="s", samples=64, varied=VARIED))]
     assert all(isinstance(count, int) for count in counts)

@@ -9,7 +9,7 @@ from scipy.stats import sobol_indices, uniform
 from pinnray.runtime.arrays import FloatArray
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
+from pinnray.studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities, sensitivity_grid
 from pinnray.studies.sweep.study import Study
 from pinnray.studies.sweep.sweep import Sweep
 
@@ -57,7 +57,16 @@ def test_a_curved_law_has_the_indices_of_another_estimator() -> None:
 
 def test_noise_is_not_trusted() -> None:
     noise = np.random.default_rng(0).normal(size=200)
-    assert found(lambda x: noise).explained < 0.1 < TRUSTED
+    doubtful = found(lambda x: noise)
+    assert doubtful.explained < 0.1 < TRUSTED
+    assert sensitivity_grid({"force": doubtful}).rows[0][-1].endswith(" *")
+
+
+def test_the_table_has_both_indices_of_every_parameter() -> None:
+    table = sensitivity_grid({"force": found(lambda x: 3 * x[0] + 4 * x[1])})
+    assert table.headings == ["quantity", *VARIED, "explained"]
+    assert table.rows == [("force", "36 (36)", "64 (64)", "0 (0)", "100.0")]
+    assert sensitivity_grid({}).rows == []
 
 
 def test_a_constant_and_too_few_samples_have_no_indices() -> None:
