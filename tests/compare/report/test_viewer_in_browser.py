@@ -1,12 +1,13 @@
 """The viewer of the report: moved, compared, played and saved as a reader does it, in Chromium."""
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -130,19 +131,19 @@ def test_a_field_is_shown_minus_the_truth(viewer: Page, pinn: Evaluation, truth:
     viewer.select_option("#viewer-solver", label="pinn-std")
     viewer.select_option("#viewer-quantity", label="Von Mises stress")
     viewer.select_option("#viewer-show", label="minus truth")
-    assert viewer.inner_text("#viewer-title") == "Von Mises stress, MPa: pinn-std minus truth"
-    assert "a scale of its own" in viewer.inner_text("#viewer-note")
+    expect(viewer.locator("#viewer-title")).to_have_text("Von Mises stress, MPa: pinn-std minus truth")
+    expect(viewer.locator("#viewer-note")).to_contain_text("a scale of its own")
     expected = pinn.per_triangle(pinn.von_mises - truth.von_mises)
     found = fields(viewer, 1, 1, 1.0, "'truth'")
     np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(expected).max())
     viewer.select_option("#viewer-solver", label="truth (simulated)")
-    assert "is what the others are compared with" in viewer.inner_text("#viewer-note")
+    expect(viewer.locator("#viewer-note")).to_contain_text("is what the others are compared with")
 
 
 def test_two_fields_lie_side_by_side_and_move_together(viewer: Page) -> None:
     viewer.select_option("#viewer-beside", label="pinn-std")
     viewer.wait_for_timeout(400)
-    assert viewer.inner_text("#viewer-title").endswith("left fem; right pinn-std")
+    expect(viewer.locator("#viewer-title")).to_have_text(re.compile("left fem; right pinn-std$"))
     coloured = np.ptp(shot(viewer)[:FOOT], axis=2) > 30
     middle = coloured.shape[1] // 2
     assert coloured[:, : middle - 5].sum() == pytest.approx(coloured[:, middle + 5 :].sum(), rel=0.2)
@@ -150,7 +151,7 @@ def test_two_fields_lie_side_by_side_and_move_together(viewer: Page) -> None:
     left, right = viewer.evaluate("pinnrayViewer.shown.map(({ at }) => at.scale)")
     assert left == right
     viewer.select_option("#viewer-beside", label="the same minus truth")
-    assert viewer.inner_text("#viewer-title").endswith("left fem; right fem minus truth")
+    expect(viewer.locator("#viewer-title")).to_have_text(re.compile("left fem; right fem minus truth$"))
 
 
 def test_the_picture_is_saved_as_png(viewer: Page) -> None:
