@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -54,9 +54,9 @@ def test_the_body_moves_along_the_path_that_the_solver_found(viewer: Page) -> No
         )
         assert np.nanmedian(shares) == pytest.approx(share, abs=1e-2)
     viewer.select_option("#viewer-solver", index=0)
-    assert "as the linear law has it" in viewer.inner_text("#viewer-note")
+    expect(viewer.locator("#viewer-note")).to_contain_text("as the linear law has it")
     viewer.select_option("#viewer-solver", index=2)
-    assert "load path of 2 equilibria" in viewer.inner_text("#viewer-note")
+    expect(viewer.locator("#viewer-note")).to_contain_text("load path of 2 equilibria")
 
 
 def test_the_load_is_played_until_it_is_stopped(viewer: Page) -> None:
