@@ -1,4 +1,4 @@
-"""What the virtual rig films, besides finger, load, exposure and motion: camera, markers, cables, boards."""
+"""Settings of the virtual rig besides finger, load, exposure and motion: camera, markers, cables, boards."""
 
 import re
 from pathlib import Path

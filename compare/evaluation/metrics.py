@@ -14,7 +14,7 @@ from pinnray.comparison.evaluation.scores import (
     Means,
     SolverScores,
     TruthDifferences,
-    Uncertainty,
+    UncertaintyScores,
 )
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import nearest_similarity
@@ -103,11 +103,11 @@ def _figures(figures: FingerFigures) -> FigureScores:
     return FigureScores(values=figures.columns(), places=figures.places)
 
 
-def _uncertainty(evaluation: Evaluation) -> Uncertainty | None:
+def _uncertainty(evaluation: Evaluation) -> UncertaintyScores | None:
     own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
     if own is None or markers is None:
         return None
-    return Uncertainty(
+    return UncertaintyScores(
         energy_norm=float(np.sqrt(abs(own.rel_energy))),
         rel_l2_displacement=own.rel_l2_displacement,
         rel_l2_von_mises=own.rel_l2_von_mises,

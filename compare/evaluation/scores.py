@@ -98,7 +98,7 @@ class CertificateScore(Numbers):
         return self.rel_excess if self.rel_excess > ROUNDING**2 else 0.0
 
 
-class Uncertainty(Numbers):
+class UncertaintyScores(Numbers):
     """A solver's estimate of its own error."""
 
     energy_norm: Number
@@ -143,7 +143,7 @@ class SolverScores(Numbers):
     #: its turn for one that was given all; None where no displacement is known, or it predicts none without.
     held_out: MarkerErrors | None
     rigid_motion_off: Means | None  #: Means as in `markers`; see `without_rigid_motion`.
-    uncertainty: Uncertainty | None
+    uncertainty: UncertaintyScores | None
     to_reference: ReferenceDifferences
     to_truth: TruthDifferences | None  #: None where the markers were measured: nobody knows a real field.
     force_to_truth_rel: Number  #: Relative error of the size of the indenter's force; NaN likewise.
