@@ -14,7 +14,7 @@ from rich.table import Table
 from pinnray.comparison.figures.style import axes_at, write_heading
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
-from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera import INTRINSICS, Camera
 from pinnray.vision.calibration.camera_calibration import Calibration
 
 MARGIN, GAP, HEAD, TITLE = 0.12, 0.14, 0.56, 0.2
@@ -27,8 +27,8 @@ def calibration_table(calibration: Calibration) -> Table:
     """The intrinsics with standard deviations, and the reprojection errors."""
     camera = calibration.camera
     table = Table("camera", "value", "±", "unit", box=SIMPLE_HEAD)
-    deviations = camera.standard_deviations or (0.0,) * len(camera.intrinsic_names)
-    for name, value, deviation in zip(camera.intrinsic_names, camera.intrinsics, deviations, strict=True):
+    deviations = camera.standard_deviations or (0.0,) * len(INTRINSICS)
+    for name, value, deviation in zip(INTRINSICS, camera.intrinsics, deviations, strict=True):
         digits, unit = (5, "") if name[0] in "kp" else (2, "px")
         table.add_row(name, f"{value:.{digits}f}", f"{deviation:.{digits}f}" if deviation else "fixed", unit)
     seen = len(calibration.view_errors)
@@ -87,11 +87,7 @@ def draw_calibration(calibration: Calibration, name: str, photograph: NDArray[np
 
 def undistorted(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
     """The image of a pinhole camera with the same matrix, to look at, not to measure in."""
-    height, width = image.shape[:2]
-    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
-    places = camera.distort(pixels).astype(np.float32).reshape(height, width, 2)
-    straight = cv2.remap(image, places, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
-    return np.asarray(straight, dtype=np.uint8)
+    return np.asarray(cv2.undistort(image, camera.matrix, np.array(camera.distortion)), dtype=np.uint8)
 
 
 def _residuals(axes: Axes, calibration: Calibration, factor: float) -> None:

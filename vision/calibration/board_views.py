@@ -24,7 +24,7 @@ def find_views(
     """Find a board in photographs; only one is in memory at a time.
 
     Returns:
-        The views by the name of the photograph, (width, height) of all, and why others are left out, by name.
+        The views by the name of the photograph, (width, height) of all, and why others show none, by name.
 
     Raises:
         UserError: If the sizes differ.
@@ -39,10 +39,8 @@ def find_views(
             continue  # the rest only tells which size is the usual one
         if (corners := board.find(image)) is None:
             left_out[name] = f"no board of {board} was found"
-        elif board.determines_pose(np.isfinite(corners[:, 0])):
-            views[name] = corners
         else:
-            left_out[name] = unusable(corners)
+            views[name] = corners
     if len(sizes) > 1:
         raise UserError(_other_sizes(sizes))
     return views, next(iter(sizes), (0, 0)), left_out
