@@ -177,7 +177,7 @@ def rig(
         material: The elastic constants, or the name of a material.
         load: Motion of the indenter, or its kind alone.
         progress: Whether to show the stages; if None in a notebook only.
-        given: Camera, markers, cables and calibration boards by the words of
+        given: Camera, markers and calibration boards by the words of
             `pinnray.film.rig_settings.RigSettings`, such as `frame`, `tilt`, `paint`, `boards`; parameters of
             finger, material and load, as for `solve`.
 
@@ -202,11 +202,7 @@ def rig(
     settings = RigSettings(**taken(given, RigSettings))
     words = ("size", "material", "load", *RigSettings.model_fields)
     finger, elastic, moved = read_job(design, material, load, given, besides=words)
-    (
-        settings.view(finger),
-        settings.sheet(),
-        settings.covered,
-    )  # or says what is wrong, before the mesh is made
+    settings.view(finger), settings.sheet()  # or says what is wrong, before the mesh is made
     chosen = None if solver is None else read_solver(solver)
     with shown_stages(progress) as stages:
         with stages.stage("mesh"):
