@@ -16,7 +16,7 @@ import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.calibration.board_views import FEWEST_VIEWS, MAX_NAMED, coverage, find_views, unusable
+from pinnray.vision.calibration.board_views import FEWEST_VIEWS, coverage, find_views, unusable
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.camera_fit import fit_camera, held_out_rms, rms
 from pinnray.vision.calibration.chessboard import Board
@@ -124,15 +124,11 @@ def _check_enough(views: Mapping[str, FloatArray], left_out: Mapping[str, str], 
     if len(views) >= FEWEST_VIEWS:
         return
     missing = f"no board of {board} was found"
-    others = [f"{name}: {reason}" for name, reason in left_out.items() if reason != missing]
+    weak = [f"{name}: {reason}" for name, reason in left_out.items() if reason != missing]
+    advice = f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
     raise UserError(
         f"{len(views)} of {len(views) + len(left_out)} photographs show the board of {board}; "
-        + (
-            f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
-            if views or others
-            else "count them"
-        )
-        + "".join(f"; {other}" for other in others[:MAX_NAMED])
+        + "; ".join([advice if views or weak else "count them", *weak])
     )
 
 

@@ -64,7 +64,7 @@ def load_camera(path: Path) -> Camera:
     width, height = (_number(content, name, path) for name in ("image_width", "image_height"))
     matrix = _matrix(content, "camera_matrix", path, sizes=(9,)).reshape(3, 3)
     if content.get("fisheye_model"):
-        raise UserError(f"{path}: fisheye cameras are not read; calibrate by pinnray calibrate, or undistort")
+        raise UserError(f"{path}: its lens is a fisheye, which is not read; calibrate with pinnray calibrate")
     distortion = _matrix(content, "distortion_coefficients", path, sizes=(4, 5))
     coefficients = tuple(np.resize([*distortion, 0.0], 5).tolist())
     fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
@@ -103,17 +103,11 @@ def _entry(rows: Sequence[Sequence[float]]) -> dict[str, object]:
 
 
 def _covariance(content: Mapping[str, Any], size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:
-    """The covariance in the file, or a diagonal one from standard deviations, or None."""
+    """The covariance in the file, or None."""
     if "intrinsics_covariance" in content:
         covariance = _matrix(content, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
-    elif "intrinsics_standard_deviations" in content:
-        deviations = _matrix(content, "intrinsics_standard_deviations", path, sizes=(size,))
-        if (deviations < 0).any():
-            raise UserError("a standard deviation is below zero")
-        covariance = np.diag(deviations**2)
-    else:
-        return None
-    return tuple(map(tuple, covariance.tolist()))
+        return tuple(map(tuple, covariance.tolist()))
+    return None
 
 
 def _number(content: Mapping[str, Any], name: str, path: Path) -> int:

@@ -72,7 +72,7 @@ def pages(content: bytes, label: str) -> Sequence[int]:
         if not content.startswith(TIFF):
             return range(getattr(file, "n_frames", 1))
         for page in ImageSequence.Iterator(file):
-            kinds.append(page.tag_v2.get(SUBFILE, 0))
+            kinds.append(getattr(page, "tag_v2", {}).get(SUBFILE, 0))
     if promised > len(kinds):
         raise UserError(
             f"cannot read {label}: its end is missing, or it is a stack of more than 4 GB: {len(kinds)} of "

@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 
 from pinnray.commands.quiet import quietable
-from pinnray.options.shared import Flag, OutputPath, Repeated
+from pinnray.options.shared import Flag, OutputPath
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
 from pinnray.runtime.machine import package_versions
@@ -21,7 +21,6 @@ def command(
     marker: float | None = None,
     dictionary: str = "5X5_100",
     k3: Flag = False,
-    without: Repeated = (),
     out: OutputPath = Path("out/camera.json"),
 ) -> int:
     """Calibrate a camera from photographs of a chessboard or a ChArUco board.
@@ -34,7 +33,6 @@ def command(
         marker: Side of a marker of a ChArUco board, mm.
         dictionary: ArUco dictionary of a ChArUco board.
         k3: Fit the third radial coefficient too.
-        without: Photograph to leave out; may be repeated.
         out: Camera file, .json.
     """
     from pinnray.film.calibration_report import calibration_table, draw_calibration, view_table
@@ -47,13 +45,13 @@ def command(
     if not images:
         raise UserError("no photograph was given; name at least 4 that show the board")
     chosen = parse_board(board, square, marker=marker, dictionary=dictionary)
-    calibration = calibrate_camera(photographs(images, without=without), chosen, k3=k3)
+    calibration = calibrate_camera(photographs(images), chosen, k3=k3)
     versions = package_versions()
     save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})
     errors = calibration.view_errors
     worst = max(errors, key=errors.__getitem__)
     picture = out.with_suffix(".png")
-    photograph = next(image for name, image in photographs(images, without=without) if name == worst)
+    photograph = next(image for name, image in photographs(images) if name == worst)
     draw_calibration(calibration, worst, photograph).save(picture)
     for reason in dict.fromkeys(calibration.left_out.values()):
         names = [name for name, said in calibration.left_out.items() if said == reason]

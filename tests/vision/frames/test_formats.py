@@ -53,7 +53,6 @@ def test_stacks_of_a_folder_follow_each_other(tmp_path):
     assert seen(tmp_path) == [30, 40, 50, 60, 70]
     names = [Path(name).name for name, _ in photographs([tmp_path])]
     assert names == ["run1.tif:0", "run1.tif:1", "run2.tif:0", "run2.tif:1", "run10.tif"]
-    assert len(list(photographs([tmp_path], without=["run1.tif:1"]))) == 4
 
 
 def test_a_long_stack_gives_a_calibration_forty_pages(tmp_path):
