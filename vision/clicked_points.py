@@ -13,7 +13,7 @@ from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import HAND_HELD, Homography, nearest_similarity
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.tables import read_number, read_table
+from pinnray.runtime.tables import read_table
 
 FEWEST = 3
 """Points that tell a picture's mirror image from itself."""
@@ -56,12 +56,7 @@ def read_clicks(path: Path) -> Clicks:
     `UserError` names what cannot be read.
     """
     table = read_table(path, "clicks", {"x": "x", "y": "y"}, {"point": "point"})
-    values = []
-    for line, cells in table.rows:
-        values.append([read_number(cell) for cell in cells.values()])
-        for name, value in zip(cells, values[-1], strict=True):
-            if not np.isfinite(value):
-                raise UserError(f"{path}, line {line}: {name} is {cells[name]!r}, which is no finite number")
+    values = table.numbers()
     if len(values) < FEWEST:
         raise UserError(f"{path} has {len(values)} points; give at least {FEWEST}")
     clicks = np.array(values)[:, :2]

@@ -43,6 +43,10 @@ FILES = {
     "text.csv": "strain,stress_MPa\n0.1,1\n0.2,x\n0.3,2\n",
     "short.csv": "strain,stress_MPa\n0,0\n0.2,1\n",
     "empty.csv": "",
+    "true.csv": "True strain,stress_MPa\n0.1,1\n",
+    "unit.csv": "strain,stress\n0.1,1\n0.2,2\n0.3,3\n",
+    "percent.csv": "strain,stress_MPa\n10,1\n20,2\n30,3\n",
+    "longer.csv": "strain,stress_MPa\n0.1,1,23\n",
 }
 
 
