@@ -54,8 +54,8 @@ def finger_mesh(
     settings = settings or MeshSettings()
     sizes = settings.model_dump()
     task = Task(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))
-    entry = _entry("mesh", finger.digest, (sizes, across), ".npz", cache_dir)
-    return _made(entry, task, TriangleMesh.load, TriangleMesh.save if keep else None)
+    entry = (cache_dir or cache_folder()) / f"mesh-{cache_key(finger.digest, (sizes, across))}.npz"
+    return _cached(entry, task, TriangleMesh.load, TriangleMesh.save if keep else None)
 
 
 def mesh_sizes(
@@ -95,8 +95,8 @@ def drawn_finger(
         raise UserError(f"there is no drawing {file}")
     lines = description.model_dump(mode="json")
     task = Task(f"reading {file.name}", _reader, (file.absolute(), lines))  # the child has its own folder
-    entry = _entry("drawing", file_digest(file), (file.name, lines), ".json", cache_dir)
-    return _made(entry, task, DrawnFinger.load, DrawnFinger.save)
+    entry = (cache_dir or cache_folder()) / f"drawing-{cache_key(file_digest(file), (file.name, lines))}.json"
+    return _cached(entry, task, DrawnFinger.load, DrawnFinger.save)
 
 
 def cad_files(
@@ -136,11 +136,7 @@ def cache_key(digest: str, asked: object) -> str:
     return content_hash(parts)
 
 
-def _entry(kind: str, digest: str, asked: object, suffix: str, cache_dir: Path | None) -> Path:
-    return (cache_dir or cache_folder()) / f"{kind}-{cache_key(digest, asked)}{suffix}"
-
-
-def _made(
+def _cached(
     entry: Path,
     task: Task,
     load: Callable[[Path], Result],
