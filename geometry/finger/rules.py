@@ -48,11 +48,11 @@ def broken_rule(p: Parameters) -> str | None:
 def cavities_open(p: Parameters) -> RuleResult:
     """Walls, ribs and tip leave every cavity open."""
     first, last = cells(p)[0], cells(p)[-1]
-    rib, end = ("rib", "last rib") if p.rib_count else ("tip block", "base wall")
+    near, far = ("first rib", "last rib") if p.rib_count else ("tip block", "base wall")
     gaps = {
         "front and back wall at the tip block": last[3, 1] - last[2, 1],
-        f"base wall and first {rib}": (first[[3, 2]] - first[[0, 1]])[:, 0].min(),
-        f"{end} and tip block": (last[[3, 2]] - last[[0, 1]])[:, 0].min(),
+        f"base wall and {near}": (first[[3, 2]] - first[[0, 1]])[:, 0].min(),
+        f"{far} and tip block": (last[[3, 2]] - last[[0, 1]])[:, 0].min(),
     }
     if p.rib_count > 1:
         gaps["neighbouring ribs"] = rib_pitch(p) * np.cos(np.radians(rib_slope(p))) - p.rib_thickness
