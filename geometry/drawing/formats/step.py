@@ -27,17 +27,22 @@ SAME = 0.005
 
 
 class Cut(NamedTuple):
-    """A section of a solid, turned so that it lies across z."""
+    """A section of a solid or of a layer of it, turned so that it lies across z."""
 
     faces: Sequence[cq.Face]
     frame: cq.Location  # from the turned solid's frame into the file's
     offset: float  # of the section along z, mm
-    depth: float  # of the solid along z, mm
+    depth: float  # of the solid or layer along z, mm
 
     @property
     def area(self) -> float:
         """Area, mm^2."""
         return float(sum(face.Area() for face in self.faces))
+
+    @property
+    def volume(self) -> float:
+        """Area times depth, mm^3."""
+        return self.area * self.depth
 
     @property
     def plane(self) -> str:
@@ -79,14 +84,14 @@ def read_step(
     scale = Scale(UNITS[units], units, "given") if units else Scale(origin="of the file")
     unit = scale.length
     turned, cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
-    is_extruded = _is_extruded(turned, cut)
-    if not (is_extruded or depth_known):
-        found = _depths(turned)
-        deep = ", ".join(f"{area * unit**2:.4g} mm2 over {depth * unit:.4g} mm" for area, depth in found)
+    apart = _apart(turned, cut)
+    if apart > SAME and not depth_known:
+        deep = _depths(_layers(turned, cut.frame))
+        sections = ", ".join(f"{area * unit**2:.4g} mm2 over {depth * unit:.4g} mm" for area, depth in deep)
         raise UserError(
-            f"the solid is not extruded: across {cut.plane} its section is {deep}, and its volume "
+            f"the solid is not extruded: across {cut.plane} its section is {sections}, and its volume "
             f"{turned.Volume() * unit**3:.5g} mm3; give the depth of the finger and its plane, such as "
-            f'depth = {found[0][1]:.4g} and plane = "{cut.plane}"'
+            f'depth = {deep[0][1]:.4g} and plane = "{cut.plane}"'
         )
     pieces = [
         piece
@@ -97,7 +102,8 @@ def read_step(
     ]
     discs = np.array([_disc(marker.moved(cut.frame.inverse)) for marker in markers]).reshape(-1, 4) * unit
     depth = f"{cut.depth * unit:.6g} mm"
-    how = f"extruded by {depth}" if is_extruded else f"cut, {depth} across"
+    how = f"extruded by {depth}" if apart <= SAME else f"cut, {depth} across"
+    how += f" but for {100 * apart:.2g} % of the volume" if 1e-6 < apart <= SAME else ""
     closed = closed_loops(pieces, scale=scale, tolerance=tolerance)
     return Drawing(
         loops=closed.loops,
@@ -134,74 +140,48 @@ def _across(solid: cq.Solid) -> tuple[cq.Shape, Cut]:
     for normal in sorted(_directions(solid), key=lambda normal: -abs(normal[2])):
         frame, turned = _turned(solid, normal)
         low, high = _extent(turned)
-        largest = max(_layers(turned), key=lambda layer: layer.volume)
-        cut = Cut(largest.faces, frame, largest.middle, high - low)
+        layer = max(_layers(turned, frame), key=lambda layer: layer.volume)
+        cut = layer._replace(depth=high - low)
         for offset in (low, high):  # a cap has the edges of the file
             cap = [face for face in turned.Faces() if np.abs(np.subtract(_extent(face), offset)).max() < 1e-6]
-            if abs(sum(face.Area() for face in cap) - largest.area) < 1e-7 * largest.area:
+            if abs(sum(face.Area() for face in cap) - cut.area) < 1e-7 * cut.area:
                 cut = cut._replace(faces=cap, offset=offset)
                 break
-        if _is_extruded(turned, cut):
+        if _apart(turned, cut) <= SAME:
             return turned, cut
-        found.append((round(abs(largest.volume / solid.Volume() - 1), 1), turned, cut))
+        found.append((round(abs(layer.volume / solid.Volume() - 1), 1), turned, cut))
     if not found:
         raise UserError('the solid has no flat face; give depth, and the plane, such as plane = "z = 6"')
     _, turned, cut = min(found, key=lambda each: each[0])
     return turned, cut
 
 
-def _is_extruded(turned: cq.Shape, cut: Cut) -> bool:
-    """Whether a solid is its section times its depth, but for `SAME`."""
+def _apart(turned: cq.Shape, cut: Cut) -> float:
+    """Volume in which a solid and its section times its depth differ, as a share of the solid's."""
     low, volume = _extent(turned)[0], turned.Volume()
-    if abs(cut.area * cut.depth - volume) > SAME * volume:
-        return False
-    along = cq.Vector(0, 0, cut.depth)
-    prisms = [
-        cq.Solid.extrudeLinear(face.moved(cq.Location(cq.Vector(0, 0, low - cut.offset))), along)
-        for face in cut.faces
-    ]
-    common = sum(turned.intersect(prism).Volume() for prism in prisms)
-    return bool(volume + cut.area * cut.depth - 2 * common <= SAME * volume)
+    if abs(cut.volume - volume) > SAME * volume:
+        return abs(cut.volume - volume) / volume
+    lower, along = cq.Location(cq.Vector(0, 0, low - cut.offset)), cq.Vector(0, 0, cut.depth)
+    prisms = [cq.Solid.extrudeLinear(face.moved(lower), along) for face in cut.faces]
+    return (volume + cut.volume - 2 * sum(turned.intersect(prism).Volume() for prism in prisms)) / volume
 
 
-class Layer(NamedTuple):
-    """Part of a solid between two heights in which no face lies across z."""
-
-    thickness: float  # mm
-    middle: float  # height, mm
-    faces: Sequence[cq.Face]  # of the section there
-    area: float  # of the section, mm^2
-
-    @property
-    def volume(self) -> float:
-        """Of a layer whose section is everywhere that in the middle, mm^3."""
-        return self.thickness * self.area
-
-
-def _layers(turned: cq.Shape) -> list[Layer]:
-    """The layers of a solid that have a section, from the lowest on."""
-    faces = [_extent(face) for face in turned.Faces()]
-    ends = [*_extent(turned), *(low for low, high in faces if high - low < 1e-5)]
-    heights = sorted({round(height, 6) for height in ends})
+def _layers(turned: cq.Shape, frame: cq.Location) -> list[Cut]:
+    """Sections half way between the faces that lie across z, each with the distance of these faces."""
+    extents = [_extent(face) for face in turned.Faces()]
+    ends = [*_extent(turned), *(low for low, high in extents if high - low < 1e-5)]
     found = []
-    for low, high in pairwise(heights):
-        faces = _section(turned, middle := 0.5 * (low + high))
-        area = float(sum(face.Area() for face in faces))
-        if high - low > 1e-4 and area > 0:
-            found.append(Layer(high - low, middle, faces, area))
+    for low, high in pairwise(sorted({round(height, 6) for height in ends})):
+        if high - low > 1e-4 and (faces := _section(turned, 0.5 * (low + high))):
+            found.append(Cut(faces, frame, 0.5 * (low + high), high - low))
     return found
 
 
-def _depths(turned: cq.Shape) -> list[tuple[float, float]]:
+def _depths(layers: Sequence[Cut]) -> list[tuple[float, float]]:
     """Areas of sections, mm^2, from the largest on, and the depths, mm, over which they are so large."""
-    layers = sorted(_layers(turned), key=lambda layer: -layer.area)
-    depths = np.cumsum([layer.thickness for layer in layers])
-    last = [*(round(a.area, 3) != round(b.area, 3) for a, b in pairwise(layers)), True]
-    return [
-        (layer.area, float(deep))
-        for layer, deep, is_last in zip(layers, depths, last, strict=True)
-        if is_last
-    ]
+    areas = np.array([layer.area for layer in layers]).round(3)
+    depths = np.array([layer.depth for layer in layers])
+    return [(area, float(depths[areas >= area].sum())) for area in np.unique(areas)[::-1].tolist()]
 
 
 def _directions(solid: cq.Solid) -> list[FloatArray]:

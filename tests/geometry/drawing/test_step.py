@@ -230,7 +230,6 @@ def test_coloured_faces_are_read_like_others(tmp_path):
     """Their labels have no names."""
     whole = cq.Assembly(name="whole").add(BODY, name="body", color=cq.Color("red"))
     for number, face in enumerate(BODY.Faces()):
-        whole.addSubshape(face, color=cq.Color(0.1 * number, 0.5, 0.5))
         whole.children[0].addSubshape(face, color=cq.Color(0.1 * number, 0.5, 0.5))
     assert area(exported(tmp_path, whole)) == pytest.approx(1200)
 
