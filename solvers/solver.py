@@ -303,8 +303,6 @@ class TrainingContext:
 
     folder: Path | None = None  #: Folder for checkpoints and the history; None to write nothing
     resume: bool = False  #: Whether to continue from the checkpoint in `folder` if there is one
-    #: Energy of a reference solution per depth, N mm/mm, for the progress text
-    reference_energy: float | None = None
 
 
 @runtime_checkable

@@ -10,7 +10,6 @@ for every derivative by X:
     P_ij = det(I + ∇W) P(G)_im M_jm        A_ijkl = det(I + ∇W) A(G)_imkn M_jm M_ln
 """
 
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -180,26 +179,13 @@ class NetworkBody:
 
     def displacements(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacements (s, n, 2) of states (s, *shape) at points of the drawn body."""
-        return self._summed(self._energy.basis.values, "nuw,swiu->nsi", states, location)
+        basis, outputs = self._energy.basis, torch.from_numpy(states)
+        return basis.summed(basis.values, "nuw,swiu->nsi", outputs, location.points).swapaxes(0, 1)
 
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
-        return self._summed(self._energy.basis.gradients, "xnwu,swiu->nsix", states, location)
-
-    def _summed(
-        self,
-        functions: Callable[[torch.Tensor, torch.Tensor], torch.Tensor],
-        sums: str,
-        states: FloatArray,
-        location: LocatedPoints,
-    ) -> FloatArray:
-        """Sums (s, n, ...) of functions of the windows near points, times the states, as for `einsum`."""
-        outputs = torch.from_numpy(states)
-        found = self._energy.basis.evaluated(
-            location.points,
-            lambda points, near: torch.einsum(sums, functions(points, near), outputs[:, near]),
-        )
-        return found.swapaxes(0, 1)
+        basis, outputs = self._energy.basis, torch.from_numpy(states)
+        return basis.summed(basis.gradients, "xnwu,swiu->nsix", outputs, location.points).swapaxes(0, 1)
 
     @property
     def points(self) -> FloatArray:
