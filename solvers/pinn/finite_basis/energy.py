@@ -65,7 +65,6 @@ class NetworkEnergy:
     rows: IntArray  # First window of every pair that a patch has, shape (b,)
     columns: IntArray  # Second window, not before the first, shape (b,)
     small: bool  # Whether the patches' basis gradients take at most `KEPT`
-    origin: FiniteBasisField | None = None  # Displacement of zero energy; None for zero
     # Basis gradients of the patches met so far, by their numbers; None if they are not kept
     kept: dict[int, torch.Tensor] | None = dataclass_field(default=None, repr=False)
 
@@ -139,8 +138,8 @@ class NetworkEnergy:
 
     @property
     def quadratic(self) -> bool:
-        """Whether the energy is a quadratic form of the output layer, with its least value at zero."""
-        return self.material.law == "linear" and self.origin is None
+        """Whether the energy is a quadratic form of the output layer."""
+        return self.material.law == "linear"
 
     @cached_property
     def factors_at_rest(self) -> Factors:
@@ -150,7 +149,7 @@ class NetworkEnergy:
         return self.hessian(tangent).factorised(REGULARISATION)
 
     def gradients(self, outputs: torch.Tensor) -> torch.Tensor:
-        """Gradients less the origin's at the points, (s, q, 2, 2), of output layers (s, c, 2, m + 1)."""
+        """Displacement gradients at the points, (s, q, 2, 2), of output layers (s, c, 2, m + 1)."""
         found = outputs.new_zeros(len(outputs), self.points, 2, 2)
         if outputs.any():
             layers = outputs.permute(1, 3, 0, 2).contiguous()
@@ -162,11 +161,23 @@ class NetworkEnergy:
 
             for rows, here in imap_in_threads(task, range(len(self.patches))):
                 found[:, rows] = here
-        return found if self.origin is None else found - self.gradients_of(self.origin)
+        return found
 
-    def gradients_of(self, field: FiniteBasisField) -> torch.Tensor:
+    def nearest(self, field: FiniteBasisField) -> tuple[torch.Tensor, Factors] | None:
+        """The output layer nearest to another network by the tangent at its displacement, and that's factors.
+
+        None if a point is turned inside out.
+        """
+        gradient = self._gradients_of(field)
+        _, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
+        if not torch.isfinite(tangent).all():
+            return None
+        forces = self.forces(torch.einsum("nijkl,nkl->nij", tangent, gradient)[None])[0]
+        factors = self.hessian(tangent).factorised(REGULARISATION, definite=False)
+        return torch.from_numpy(factors.solve(forces.numpy().reshape(1, -1))).view_as(forces), factors
+
+    def _gradients_of(self, field: FiniteBasisField) -> torch.Tensor:
         """Displacement gradients of another network at the points, shape (q, 2, 2)."""
-
         basis, output = field.basis, field.output
 
         def task(patch: QuadraturePatch) -> torch.Tensor:

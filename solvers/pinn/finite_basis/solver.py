@@ -15,7 +15,7 @@ from pinnray.solvers.assimilation.marker_forces import MarkerFit
 from pinnray.solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
 from pinnray.solvers.assimilation.pictures import FreePictures
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END
-from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import LAWS, NetworkEnergy
 from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
@@ -278,13 +278,19 @@ class FiniteBasisSolver(NetworkSolver):
 
 def _train(network: ConstrainedNetwork, coarse: FiniteBasisField | None, progress: Progress) -> LoadStep:
     """Equilibrium of a level: at once for a linear law, else from a coarser level's or along the load."""
-    if network.energy.material.law == "linear":
-        state, iterations = network.step(network.zero_output), 1
-    elif coarse is not None:
-        state, iterations = find_equilibrium(network, network.project(coarse), 1.0)
-    else:
-        state = None
-    return follow_load(network, progress) if state is None else LoadStep(1.0, state, iterations)
+    if network.energy.quadratic:
+        return LoadStep(1.0, network.at_rest(), 1)
+
+    def reach(guess: NewtonIterate, fraction: float) -> tuple[NewtonIterate | None, int]:
+        return find_equilibrium(network, guess.output, fraction)
+
+    rest = NewtonIterate(network.zero_output, np.zeros(len(network.targets)), 0.0)
+    near = None if coarse is None else network.energy.nearest(coarse)
+    if near is not None:
+        state, iterations = reach(rest._replace(output=near[0]), 1.0)
+        if state is not None:
+            return LoadStep(1.0, state, iterations)
+    return follow_load(rest, reach, progress)
 
 
 def _press(
