@@ -103,7 +103,7 @@ class ConstrainedNetwork:
         """The network with other neurons (3, m, c), the factor of the markers' weights held."""
         basis = replace(self.energy.basis, neurons=neurons)
         functionals = _functionals(self.springs, basis)
-        return replace(self, energy=self.energy.with_basis(basis), functionals=functionals, factor=factor)
+        return replace(self, energy=replace(self.energy, basis=basis), functionals=functionals, factor=factor)
 
     @property
     def zero_output(self) -> torch.Tensor:
