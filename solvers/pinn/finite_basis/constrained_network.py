@@ -112,11 +112,6 @@ class ConstrainedNetwork:
         return torch.zeros(basis.windows.count, 2, basis.per_window, dtype=torch.float64)
 
     @property
-    def markers_at_rest(self) -> MarkerForces | None:
-        """The forces at the markers under the whole load, of a linear law; None without markers."""
-        return self.at_rest().markers
-
-    @property
     def load_count(self) -> int:
         """Number of springs of the load: the first ones."""
         return len(self.springs[0].axes) * len(self.springs[0].weights)

@@ -10,6 +10,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.cylinder_contact import ContactRegion
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
 from pinnray.solvers.solver import Progress
 from pinnray.solvers.stability import ShiftedStep, aside, descended
 
@@ -35,6 +36,18 @@ class LoadStep(NamedTuple):
     state: NewtonIterate  # Equilibrium there
     iterations: int  # Newton iterations so far
     region: ContactRegion | None = None  # Where a cylinder touches; None without one, and where it does not
+
+
+class Level(NamedTuple):
+    """A refinement level."""
+
+    network: ConstrainedNetwork
+    reached: LoadStep  # Its last equilibrium
+
+    @property
+    def field(self) -> FiniteBasisField:
+        """The displacement of the last equilibrium."""
+        return self.network.field(self.reached.state.output)
 
 
 Reach = Callable[[NewtonIterate, float], tuple[NewtonIterate | None, int]]

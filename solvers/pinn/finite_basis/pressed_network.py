@@ -18,8 +18,7 @@ from pinnray.solvers.cylinder_contact import ContactRegion, ContactState, Cylind
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION
-from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
-from pinnray.solvers.pinn.finite_basis.newton import LoadStep, follow_load
+from pinnray.solvers.pinn.finite_basis.newton import Level, LoadStep, follow_load
 from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Progress
@@ -101,14 +100,14 @@ class PressedNetwork:
         values = csr_matrix(values.reshape(len(points), -1))
         return cls(network, contact, values, len(space.nodes))
 
-    def refined(self, coarse: LoadStep, field: FiniteBasisField) -> LoadStep | None:
-        """Equilibrium under the full load from that of a coarser network; None if it is not found.
+    def equilibrium(self, coarse: Level | None, progress: Progress) -> LoadStep:
+        """Equilibrium from that of a coarser network or, if that fails, along the load."""
+        found = self.refined(coarse) if coarse is not None and coarse.reached.fraction == 1 else None
+        return self.followed(progress) if found is None else found
 
-        Args:
-            coarse: Of the coarser network, whose forces are taken.
-            field: Its displacement.
-        """
-        near, forces = self.network.energy.nearest(field), coarse.state.forces
+    def refined(self, coarse: Level) -> LoadStep | None:
+        """Equilibrium under the full load from that of a coarser network; None if it is not found."""
+        near, forces = self.network.energy.nearest(coarse.field), coarse.reached.state.forces
         if near is None:
             return None
         tangent = Tangent(*near)
@@ -120,7 +119,7 @@ class PressedNetwork:
         forces = gently.forces(soft.stage(found.output, 1.0, forces))
         held = self._held(found.output, 1.0, forces, found.tangent)
         start = min((found.output, held), key=lambda each: self._potential(each, 1.0, forces))
-        state, iterations = self._equilibrium(start, 1.0, forces, found.tangent)
+        state, iterations = self._in_balance(start, 1.0, forces, found.tangent)
         return None if state is None else self._load_step(1.0, state, first + iterations)
 
     def followed(self, progress: Progress) -> LoadStep:
@@ -130,7 +129,7 @@ class PressedNetwork:
             output, forces = guess.output, guess.forces
             if not output.any():
                 output, forces = self._pressed_at_one_node(fraction)
-            return self._equilibrium(output, fraction, forces)
+            return self._in_balance(output, fraction, forces)
 
         rest = NewtonIterate(self.network.zero_output, np.zeros(len(self.contact.positions)), 0.0)
         longest = self.contact.longest_step
@@ -147,7 +146,7 @@ class PressedNetwork:
         stage = self.stage(state.output, fraction, state.forces)
         return LoadStep(fraction, state, iterations, ContactRegion.of(self.contact, stage))
 
-    def _equilibrium(
+    def _in_balance(
         self, output: torch.Tensor, fraction: float, multipliers: FloatArray, tangent: Tangent | None = None
     ) -> tuple[NewtonIterate | None, int]:
         """Equilibrium from a guess, None if the iteration fails, and the Newton iterations taken.

@@ -119,7 +119,7 @@ def test_gaps_that_no_forces_close_are_let_be(coarse, monkeypatch):
         (1.0, (None, UPDATES)),
     ):
         pressed = replace(coarse, contact=replace(coarse.contact, travel=np.array([0.0, -depth])))
-        found = pressed._equilibrium(output, 1.0, none, tangent)
+        found = pressed._in_balance(output, 1.0, none, tangent)
         assert found == expected
 
 
