@@ -176,12 +176,6 @@ class PhysicsOptions(Physics):
 
         return preset(self.material).material
 
-    def check_law(self, solvers: "Sequence[Solver]") -> None:
-        """Raise a `UserError` if none of the solvers has the law that is given."""
-        if "law" in self.model_fields_set and not any(self.law in solver.laws for solver in solvers):
-            known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
-            raise UserError(f"--law {self.law}: none of the solvers has it ({known})")
-
 
 @Parameter(name="*", group=TRAINING)
 class SolverOptions(CheckedModel):

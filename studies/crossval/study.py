@@ -20,7 +20,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.problem import Load, Material
-from pinnray.solvers.solver import Solver, check_load, check_name, with_law
+from pinnray.solvers.solver import Solver, check_law, check_load, check_name, with_law
 from pinnray.studies.crossval.folds import ALL, SCHEMES
 
 SIZES = MeshSettings(size=0.5)
@@ -195,6 +195,7 @@ class CrossvalStudy:
             raise UserError(
                 f"noise {self.noise:g}: give a standard deviation of zero or more, at most 100 mm"
             )
+        check_law([variant.solver for variant in self.variants], self.material)
         for variant in self.variants:
             solver = variant.solver
             check_name(solver.name)

@@ -97,7 +97,6 @@ def command(
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
         made, set_up = options.read(names), {text.partition(".")[0] for text in options.solver_set}
-        physics.check_law(made)
         finger.check_cost(design, mesh, made, simulated=measurements is None)
         job = Job(
             design=design,

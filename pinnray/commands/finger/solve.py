@@ -55,7 +55,7 @@ def command(
     from pinnray.solvers.finger_figures import break_warning
     from pinnray.solvers.problem import Problem
     from pinnray.solvers.registry import unknown_solver
-    from pinnray.solvers.solver import Traits, solved, with_law
+    from pinnray.solvers.solver import check_asked, solved, with_law
     from pinnray.vision.measurements import read_measurements
 
     if not solver:
@@ -70,14 +70,12 @@ def command(
     chosen_solvers = options.read(solver)
     if len(chosen_solvers) != 1:
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
-    physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
-    finger.check_cost(chosen, settings, [made])
     given = None
     if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)
-    if given and not Traits.of(made).assimilates:
-        raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
+    check_asked(made, material, given)
+    finger.check_cost(chosen, settings, [made])
     with Stages() as stages:
         triangles, adaptation = shared_mesh(
             chosen,
