@@ -117,13 +117,14 @@ class ElementSettings(FieldSettings):
 
 @dataclass(frozen=True)
 class Cost:
-    """Time of a solver on one core for the default finger and load, by default that of `fem`.
+    """Time and memory of a solver on one core for the default finger and load, by default those of `fem`.
 
     It need not be exact: by it solvers are shared out between two processes and fine meshes ask for consent.
     """
 
     per_triangle: float = 55.0  #: Time for each of the default mesh's triangles, µs
     fixed: float = 0.0  #: Time that does not depend on the mesh, s
+    kilobytes: float = 30.0  #: Memory for each triangle: factors and error estimates take most of it
 
     def of_mesh(self, triangles: int) -> float:
         """The part of the time that depends on the mesh, s; factors take more of a fine mesh's triangles."""
