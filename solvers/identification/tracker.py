@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.special import chdtri, ndtri
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
@@ -103,7 +104,7 @@ class ForceTracker:
             raise UserError(f"a force is followed with {' and '.join(sorted(missing))} among the unknowns")
         self._model, self.law = model, model.unknowns.problem.material.law
         self._parameters = model.unknowns.parameters(model.flexibility())
-        self._bounds = np.array([parameter.bounds for parameter in self._parameters]).T
+        self._bounds = tuple(np.array([parameter.bounds for parameter in self._parameters]).T)
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
         measurement = MarkerData(points, still, still, inside, np.arange(len(points)))
         self._markers = MarkerModel(model, measurement)
@@ -187,33 +188,18 @@ class ForceTracker:
 
     def _posterior(self, prior: _Prior, slopes: FloatArray, residuals: FloatArray) -> _Posterior:
         """The minimum for residuals (n,) over σ at the last equilibrium and their derivatives (n, p)."""
-        z, inflation = self._last.z, 1.0
-        spread = np.linalg.inv(np.linalg.cholesky(prior.precision)).T
+        root, inflation = np.linalg.cholesky(prior.precision).T, 1.0
+        spread = np.linalg.inv(root)
+        observed = slopes @ self._last.z - residuals
         for _ in range(20):  # φ is known to a thousandth much earlier
-            a, r = slopes / inflation, residuals / inflation
-            curvature = a.T @ a + prior.precision
-            gradient = np.asarray(a.T @ r + prior.precision @ (z - prior.mean), dtype=np.float64)
-            found = self._bounded(z, curvature, gradient)
-            freedom = degrees_of_freedom(a @ spread)
-            used, inflation = inflation, inflation_of(residuals + slopes @ (found - z), freedom)
+            rows = np.vstack([slopes / inflation, root])
+            right = np.concatenate([observed / inflation, root @ prior.mean])
+            z = np.asarray(lsq_linear(rows, right, self._bounds, method="bvls").x)
+            freedom = degrees_of_freedom(slopes @ spread / inflation)
+            used, inflation = inflation, inflation_of(slopes @ z - observed, freedom)
             if abs(inflation / used - 1) < 1e-3:
                 break
-        return _Posterior(found, np.linalg.inv(curvature), used, quantile_of(used, freedom))
-
-    def _bounded(self, z: FloatArray, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Minimum of a quadratic within the bounds: an unknown that leaves them is held at its bound."""
-        free = np.ones(len(z), dtype=bool)
-        found = z.copy()
-        for _ in z:
-            held = np.where(free, 0.0, found - z)
-            pulled = -gradient - curvature @ held
-            found[free] = z[free] + np.linalg.solve(curvature[np.ix_(free, free)], pulled[free])
-            outside = (found < self._bounds[0]) | (found > self._bounds[1])
-            if not outside.any():
-                break
-            found = np.clip(found, *self._bounds)
-            free &= ~outside
-        return found
+        return _Posterior(z, np.linalg.inv(rows.T @ rows), used, quantile_of(used, freedom))
 
     def _linearised(self, z: FloatArray) -> _Linearised | None:
         """The markers about the equilibrium at z; None if there is none.

@@ -54,11 +54,8 @@ def command(
     calibration = calibrate_camera(photographs(images, without=without), chosen, lens=lens)
     versions = package_versions()
     save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})
-    errors = calibration.view_errors
-    worst = max(errors, key=errors.__getitem__)
     picture = out.with_suffix(".png")
-    photograph = next(image for name, image in photographs(images, without=without) if name == worst)
-    draw_calibration(calibration, worst, photograph).save(picture)
+    draw_calibration(calibration).save(picture)
     for reason in dict.fromkeys(calibration.left_out.values()):
         names = [name for name, said in calibration.left_out.items() if said == reason]
         say(f"warning: left out {', '.join(names)}: {reason}")
