@@ -1,5 +1,6 @@
 """The unknowns of the inverse problem, their priors, and the finger and contact that they describe."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import log
@@ -177,33 +178,29 @@ class Unknowns:
     def slopes(self, values: FloatArray) -> HypothesisSlopes:
         """Derivatives of the hypothesis of values, shape (p,)."""
         named, material = self._named(values), self.material(values)
-        parts = {picture: [f"{picture}_{part}" for part in PARTS] for picture in ("pressed", "drawn")}
-        known = (
-            *NAMES,
-            SHARE,
-            *self.motion.names,
-            *self.feet.names,
-            *parts["pressed"],
-            *parts["drawn"],
-        )
-        by = {name: np.zeros(len(self.names)) for name in known}
-        by |= dict(zip(self.names, np.eye(len(self.names)), strict=True))
+        count = len(self.names)
+        by = defaultdict(lambda: np.zeros(count), zip(self.names, np.eye(count), strict=True))
         young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
         normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
         along = by["tangential_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
+
+        def stacked(names: Sequence[str]) -> FloatArray:
+            """Derivatives (p, k) of k numbers, of which those that are no unknowns have none."""
+            return np.array([by[name] for name in names]).reshape(-1, count).T
+
         return HypothesisSlopes(
             position=by["position"],
             width=by["width"],
             force=np.stack([by["normal_force"], along], axis=1) @ self.directions,
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
-            changes=np.array([by[name] for name in self.motion.names]).reshape(-1, len(self.names)).T,
+            changes=stacked(self.motion.names),
             softness=by["base_compliance"] / young - compliance / young**2 * by["young"],
-            feet=np.array([by[name] for name in self.feet.names]).reshape(-1, len(self.names)).T,
-            pressed=np.stack([by[name] for name in parts["pressed"]], axis=1),
-            drawn=np.stack([by[name] for name in parts["drawn"]], axis=1),
+            feet=stacked(self.feet.names),
+            pressed=stacked([f"pressed_{part}" for part in PARTS]),
+            drawn=stacked([f"drawn_{part}" for part in PARTS]),
         )
 
     def material(self, values: FloatArray) -> Material:
