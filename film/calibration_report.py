@@ -36,18 +36,6 @@ def calibration_table(calibration: Calibration) -> Table:
     return table
 
 
-def view_table(calibration: Calibration, *, most: int = 15) -> Table:
-    """The reprojection errors of the photographs, largest first."""
-    table = Table("photograph", "corners", "rms error, px", box=SIMPLE_HEAD)
-    errors = sorted(calibration.view_errors.items(), key=lambda entry: -entry[1])
-    for name, error in errors[:most]:
-        seen = np.isfinite(calibration.views[name][:, 0]).sum()
-        table.add_row(name, f"{seen}", f"{error:.3f}")
-    if len(errors) > most:
-        table.add_row(f"and {len(errors) - most} with smaller errors", "", "")
-    return table
-
-
 def draw_calibration(calibration: Calibration) -> Figure:
     """Draw the residuals of all photographs, and the part of the image that they cover."""
     camera = calibration.camera

@@ -8,11 +8,14 @@ import numpy as np
 from rich.table import Table
 
 from pinnray.comparison.figures.force_charts import draw_force_track
+from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import Cell, terminal_table, write_csv
+from pinnray.solvers.identification.model import ResponseModel
 from pinnray.solvers.identification.tracker import ForceReading, ForceTracker
+from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Progress
@@ -38,24 +41,25 @@ class FrameForce(NamedTuple):
     delay: float
 
 
-def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, radius: float) -> ForceTracker:
-    """The force tracker of a finger.
+def force_tracker(mesh: TriangleMesh, finger: Finger, material: Material, points: FloatArray) -> ForceTracker:
+    """The force tracker of a finger, by quadratic elements.
 
     Args:
         mesh: Of the finger.
+        finger: The finger.
         material: If its law is the linear one, the neo-Hookean one is taken.
         points: Markers at rest, shape (m, 2), mm.
-        radius: Of the markers, mm.
 
     Raises:
         UserError: If DOLFINx is missing.
     """
     make_solver("fem-id")  # or says which library is missing
-    from pinnray.solvers.fem.identification import fem_force_tracker
+    from pinnray.solvers.fem.identification import FemBody
 
     law = "neo-hookean" if material.law == "linear" else material.law
-    problem = Problem(mesh, material.model_copy(update={"law": law}))
-    return fem_force_tracker(problem, points, radius)
+    problem = Problem(mesh, material.model_copy(update={"law": law}), finger=finger)
+    unknowns = Unknowns(problem, DEFAULT)
+    return ForceTracker(ResponseModel(FemBody(unknowns, 2), unknowns), points, finger.marker_radius)
 
 
 def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> list[FrameForce]:
@@ -85,17 +89,15 @@ def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> 
 
 
 def force_line(force: FrameForce, depth: float) -> str:
-    """A force in words: N and N/mm with the interval, place, delay, remarks."""
+    """A force in words: N and place with their intervals, and the delay."""
     reading = force.reading
-    parts = [f"{force.time:8.2f} s  no force"]
-    if np.isfinite(reading.size):
-        parts = [
-            f"{force.time:8.2f} s  force {reading.size * depth:.2f} N ({reading.low * depth:.2f} to "
-            f"{reading.high * depth:.2f}), {reading.size:.3g} N/mm, at x = {reading.position:.1f} mm "
-            f"({reading.position_low:.1f} to {reading.position_high:.1f})"
-        ]
-    parts.append(f"after {1000 * force.delay:.0f} ms")
-    return "; ".join(filter(None, [*parts, reading.status]))
+    if not np.isfinite(reading.size):
+        return f"no force: {reading.status}"
+    return (
+        f"force {reading.size * depth:.2f} N ({reading.low * depth:.2f} to {reading.high * depth:.2f}) at "
+        f"x = {reading.position:.1f} mm ({reading.position_low:.1f} to {reading.position_high:.1f}), "
+        f"{1000 * force.delay:.0f} ms after {force.time:.2f} s"
+    )
 
 
 def force_row(force: FrameForce, depth: float) -> dict[str, Cell | None]:
@@ -147,24 +149,19 @@ def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int | N
     if known:
         largest = max(known, key=lambda force: force.reading.size)
         rows = [_row("largest", largest, depth), _row("last", known[-1], depth)]
-    seconds = np.array([force.reading.seconds for force in forces])
-    delays = np.array([force.delay for force in forces])
+    delays = 1000 * np.array([force.delay for force in forces])
     unexplained = sum(force.reading.inflation > 1 for force in known)
-    parts = [
+    caption = (
         "in brackets: intervals of 95 %, for Young's modulus as given and the walls as drawn within their "
         f"tolerances; {len(known)} of {len(forces)} frames have a force, in {unexplained} of them the "
-        "markers are farther off than noise explains",
-        f"{1000 * seconds.mean():.0f} ms a frame, at most {1000 * seconds.max():.0f} ms",
-    ]
-    if passed_over is not None:
-        parts.append(
-            f"live: {passed_over} frames passed over; delay {1000 * delays.mean():.0f} ms, at most "
-            f"{1000 * delays.max():.0f} ms"
-        )
-    headings = ("", "time, s", "force, N", "N/mm", "contact, x in mm")
-    return terminal_table(
-        f"Force of the indenter on a finger {depth:g} mm deep", headings, rows, caption="; ".join(parts)
+        f"markers are farther off than noise explains; {delays.mean():.0f} ms after a frame, at most "
+        f"{delays.max():.0f} ms"
     )
+    if passed_over is not None:
+        caption += f"; {passed_over} frames were passed over"
+    headings = ("", "time, s", "force, N", "N/mm", "contact, x in mm")
+    title = f"Force of the indenter on a finger {depth:g} mm deep"
+    return terminal_table(title, headings, rows, caption=caption)
 
 
 def _row(name: str, force: FrameForce, depth: float) -> list[str]:

@@ -238,9 +238,7 @@ class Identified:
         parts.append(f"markers missed by {np.sqrt((missed**2).mean()):.2g} mm (root mean square)")
         if found.inflation > 1:
             parts.append(
-                f"{found.inflation:.3g} times their standard deviations: no values of these parameters "
-                "explain them, so the model is wrong elsewhere and they make up for that; intervals are as "
-                "much wider"
+                f"{found.inflation:.3g} times their standard deviations; intervals are as much wider"
             )
         if unresolved := [
             f"{u.name} ({share:.0%})"

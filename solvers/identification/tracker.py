@@ -21,7 +21,7 @@ from scipy.optimize import lsq_linear
 from scipy.special import chdtri, ndtri
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.runtime.errors import ShapeError, UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import (
     LEVEL,
     degrees_of_freedom,
@@ -93,15 +93,10 @@ class ForceTracker:
         model: The finger, with `normal_force` and `position` among its unknowns.
         points: The m markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of their discs, mm; less is taken where one is nearer to the boundary.
-
-    Raises:
-        UserError: If the unknowns lack the force or its place.
     """
 
     def __init__(self, model: ResponseModel, points: FloatArray, radius: float) -> None:
         self._unknowns, names = model.unknowns, model.unknowns.names
-        if missing := {"normal_force", "position"} - set(names):
-            raise UserError(f"a force is followed with {' and '.join(sorted(missing))} among the unknowns")
         self._model, self.law = model, model.unknowns.problem.material.law
         self._parameters = model.unknowns.parameters(model.flexibility())
         self._bounds = tuple(np.array([parameter.bounds for parameter in self._parameters]).T)
@@ -124,17 +119,8 @@ class ForceTracker:
             displacements: Of the markers since rest, shape (m, 2), mm; any value where one is hidden.
             deviations: Their standard deviations, shape (m, 2), mm; `MIN_STANDARD_DEVIATION` at least.
             visible: Mask of the markers that were seen, shape (m,).
-
-        Raises:
-            ShapeError: If the arrays have other numbers of markers.
         """
-        started, shape = time.perf_counter(), self._markers.measurement.points.shape
-        if displacements.shape != shape or deviations.shape != shape or visible.shape != shape[:1]:
-            raise ShapeError(
-                f"a frame has displacements and deviations of shape {shape} and a mask of shape {shape[:1]}, "
-                f"got {displacements.shape}, {deviations.shape} and {visible.shape}"
-            )
-        self._evaluations = 0
+        started, self._evaluations = time.perf_counter(), 0
         reading = self._updated(displacements, deviations, visible)
         return replace(reading, evaluations=self._evaluations, seconds=time.perf_counter() - started)
 

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pinnray.geometry.mesh.wall_motion import WallMotion
-from pinnray.geometry.registration import PARTS, Homography, Pictures
+from pinnray.geometry.registration import PARTS, Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Parameter
-from pinnray.solvers.assimilation.pictures import picture_parameters
+from pinnray.solvers.assimilation.pictures import picture_parameters, pictures_of
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
 from pinnray.solvers.identification.boundary import Feet, FrontTraction
 from pinnray.solvers.problem import Material, Problem, contact_ends
@@ -98,7 +98,7 @@ class Unknowns:
         self.traction, self.motion = FrontTraction(problem.mesh), WallMotion.of(problem.mesh)
         self.feet = Feet(problem.mesh, held="feet" not in names)
         seen = problem.observations
-        self._centre = np.zeros(2) if seen is None else seen.points.mean(axis=0)
+        self.centre = np.zeros(2) if seen is None else seen.points.mean(axis=0)
         self._pictures = [] if seen is None else picture_parameters(seen)
         finger = [name for name in names if name not in (*WALLS, "feet") or name in self.motion.names]
         if problem.load.friction:
@@ -172,7 +172,7 @@ class Unknowns:
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
             feet=np.array([named.get(name, 0.0) for name in self.feet.names]),
-            pictures=Pictures(*(self.homography(picture, named) for picture in ("pressed", "drawn"))),
+            pictures=pictures_of(self.centre, named),
         )
 
     def slopes(self, values: FloatArray) -> HypothesisSlopes:
@@ -208,10 +208,6 @@ class Unknowns:
         named = self._named(values)
         changed = {name: value for name, value in named.items() if name in ("young", "poisson")}
         return self.problem.material.model_copy(update=changed)
-
-    def homography(self, picture: str, named: Mapping[str, float]) -> Homography:
-        """The homography of `pressed` or `drawn` pictures with values by name, zero for the rest."""
-        return Homography(self._centre, np.array([named.get(f"{picture}_{part}", 0.0) for part in PARTS]))
 
     def _named(self, values: FloatArray) -> dict[str, float]:
         return dict(zip(self.names, map(float, values), strict=True))

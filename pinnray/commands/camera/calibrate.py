@@ -40,7 +40,7 @@ def command(
         without: Photograph to leave out; may be repeated.
         out: Camera file, .json.
     """
-    from pinnray.film.calibration_report import calibration_table, draw_calibration, view_table
+    from pinnray.film.calibration_report import calibration_table, draw_calibration
     from pinnray.vision.calibration.camera_calibration import better_lens, calibrate_camera
     from pinnray.vision.calibration.camera_file import check_format, save_calibration
     from pinnray.vision.calibration.charuco import parse_board
@@ -61,9 +61,7 @@ def command(
         say(f"warning: left out {', '.join(names)}: {reason}")
     if better := better_lens(calibration, lens):
         say(f"warning: with {better[0]} the error held out would be {better[1]:.3f} px")
-    console = Console()
-    console.print(calibration_table(calibration))
-    console.print(view_table(calibration))
+    Console().print(calibration_table(calibration))
     print(out)
     print(picture)
     return 0

@@ -81,7 +81,7 @@ def command(
             mesh = shared_mesh(design, settings, stages)[0] if material else None
             following = tracker = None
             if mesh is not None and material and live:
-                tracker = force_tracker(mesh, material, design.markers, design.marker_radius)
+                tracker = force_tracker(mesh, design, material, design.markers)
                 following = LiveForce(tracker, design.depth)
             watch = None
             if live:
@@ -95,7 +95,7 @@ def command(
                 forces, passed_over = following.finished(), following.passed_over
         if mesh is not None and material and not live:
             with Stages(console) as more, more.stage("force") as report:
-                tracker = force_tracker(mesh, material, observations.points, design.marker_radius)
+                tracker = force_tracker(mesh, design, material, observations.points)
                 forces = forces_of(tracking, tracker, report)
         provenance = {"design": design.definition(), "versions": package_versions(), "machine": machine()}
         if tracker is not None and material:
