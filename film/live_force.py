@@ -7,8 +7,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-from rich.live import Live
-from rich.text import Text
 
 from pinnray.film.force_estimate import FrameForce, force_line, force_row
 from pinnray.runtime.arrays import BoolArray, FloatArray
@@ -98,19 +96,18 @@ class LiveForce:
         return FrameForce(frame.number, frame.time, reading, time.perf_counter() - tracked)
 
 
-def frame_lines(
-    force: LiveForce | None, shown: Live, *, publish: bool
-) -> Callable[[Frame, FrameDetections], None]:
-    """A function that takes each frame of a film: it goes to the force, and a line on it is shown.
+def frame_lines(force: LiveForce | None, *, publish: bool) -> Callable[[Frame, FrameDetections], str]:
+    """A function that takes each frame of a film and returns words on it, to be shown.
+
+    The words are the newest force or, without one to follow, the displacements, mm.
 
     Args:
         force: Follows the force, if anything does.
-        shown: Shows the displacements, mm, and the newest force in words.
         publish: Whether to print a line of JSON on the standard output, too.
     """
     start: FloatArray | None = None
 
-    def watch(frame: Frame, detections: FrameDetections) -> None:
+    def watch(frame: Frame, detections: FrameDetections) -> str:
         nonlocal start
         start = detections.places if start is None else start
         if force is not None:
@@ -120,11 +117,9 @@ def frame_lines(
         if publish:
             row = None if force is None or newest is None else force_row(newest, force.depth)
             print(json.dumps(line | {"force": row}), flush=True)
-        cells = ["–" if moved is None else "{:+.2f},{:+.2f}".format(*moved) for moved in line["moved_mm"]]
-        lines = [f"{frame.time:8.2f} s  {'  '.join(cells)}"]
-        if force is not None:
-            lines.append(force_line(newest, force.depth) if newest else "force: not yet")
-        shown.update(Text("\n".join(lines), no_wrap=True, overflow="ellipsis"))
+        if force is None:
+            return " ".join("–" if uv is None else "{:+.2f},{:+.2f}".format(*uv) for uv in line["moved_mm"])
+        return force_line(newest, force.depth) if newest else "force: not yet"
 
     return watch
 

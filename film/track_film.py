@@ -42,7 +42,7 @@ def track_film(
     report: Progress,
     *,
     video: bool = True,
-    watch: Callable[[Frame, FrameDetections], None] | None = None,
+    watch: Callable[[Frame, FrameDetections], str | None] | None = None,
 ) -> tuple[Tracking, Observations]:
     """Track a film and write `observations.csv`, `tracks.csv`, `track.json` and pictures into a folder.
 
@@ -52,7 +52,7 @@ def track_film(
         folder: An existing folder.
         report: Called with the fraction done and a short text.
         video: Whether to write the annotated video too.
-        watch: Called with every frame and its detections.
+        watch: Called with every frame and its detections; the words that it returns are reported.
 
     Raises:
         UserError: If the film cannot be read or tracked.
@@ -83,10 +83,9 @@ def track_film(
             if write is not None:
                 lines = [f"frame {frame.number}, {frame.time:.3f} s", status]
                 write(annotated(frame.image, detections, lines))
-            if watch is not None:
-                watch(frame, detections)
+            said = watch(frame, detections) if watch is not None else None
             share = (frame.number + 1) / frames.count if frames.count else 0.0
-            report(min(share, 1.0), f"frame {frame.number + 1}, {status}")
+            report(min(share, 1.0), f"frame {frame.number + 1}, {said or status}")
 
         tracking = track(frames, scene, see)
         if not frames.timed and len(tracking.times) > BEFORE_AND_AFTER:

@@ -18,7 +18,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
-from pinnray.solvers.identification.unknowns import doubt_of_the_plane, log_prior
+from pinnray.solvers.identification.unknowns import LAW_ODDS, doubt_of_the_plane
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
@@ -50,7 +50,7 @@ class Fit(NamedTuple):
     @property
     def log_posterior(self) -> float:
         """Logarithm of the law's probability, up to a constant that all laws share."""
-        return self.log_evidence + log_prior(self.law)
+        return self.log_evidence + float(np.log(LAW_ODDS.get(self.law, 1.0)))
 
     @property
     def standard_errors(self) -> FloatArray:

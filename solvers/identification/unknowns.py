@@ -39,11 +39,6 @@ are one there. With odds of 3 to 1, noise decided, and the force of a film was 1
 LAWS = tuple(LAW_ODDS)
 
 
-def log_prior(law: LawName) -> float:
-    """Logarithm of a law's odds before the markers are seen."""
-    return log(LAW_ODDS.get(law, 1.0))
-
-
 def doubt_of_the_plane(problem: Problem) -> float:
     """Deviation of force and stress of a finger with a depth from those of the plane, as a share.
 

@@ -7,7 +7,6 @@ from threading import Event
 import cv2
 import numpy as np
 import pytest
-from rich.live import Live
 
 from pinnray.cli import main
 from pinnray.film.force_estimate import FrameForce, force_row
@@ -161,11 +160,13 @@ def test_an_error_of_the_estimate_ends_the_tracking():
 
 def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(capsys):
     force = LiveForce(Recorder(), DEPTH)
-    see = frame_lines(force, Live(), publish=True)
+    see = frame_lines(force, publish=True)
     see(frame(0), seen(REST))
     while force.newest() is None:
         pass
-    see(frame(1), seen(REST - np.array([0.0, 1.0]), hidden=[1]))
+    assert see(frame(1), seen(REST - np.array([0.0, 1.0]), hidden=[1])).startswith(
+        "force 2.00 N (1.80 to 2.20)"
+    )
     first, second = (json.loads(line) for line in capsys.readouterr().out.splitlines())
     assert (first["schema"], first["frame"], first["time_s"], first["status"]) == (2, 0, 0.0, "")
     assert second["markers_mm"] == [[10.0, -2.0], None, [80.0, -4.0]]

@@ -1,12 +1,10 @@
 """Track markers through a video."""
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Group, Parameter
 from rich.console import Console
-from rich.live import Live
 
 from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
@@ -46,20 +44,14 @@ def command(
         force: Estimate the indenter's force and its place in every frame; with --live in the newest one. It
             is in proportion to Young's modulus; the markers correct Poisson's ratio and choose the law of
             finite strain unless --law gives one.
-        live: Show the displacements of every frame as it comes.
+        live: Show the newest force or, without --force, the displacements of every frame as it comes.
         publish: As --live, and write a line of JSON for every frame, with the newest force if --force, to the
             standard output; tables then go to standard error.
         without_video: Write no annotated video.
         out: Output folder.
     """
     from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.film.force_estimate import (
-        MESH,
-        force_table,
-        force_tracker,
-        forces_of,
-        write_forces,
-    )
+    from pinnray.film.force_estimate import MESH, force_table, force_tracker, forces_of, write_forces
     from pinnray.film.live_force import LiveForce, frame_lines
     from pinnray.film.track_film import track_film, track_table
     from pinnray.runtime.machine import machine, package_versions
@@ -77,26 +69,23 @@ def command(
     console, live = Console(stderr=True), live or publish
     forces, passed_over = [], None
     with replaced_folder(out) as folder:
-        with Stages(console, quiet=live) as stages, ExitStack() as stack:
+        with Stages(console) as stages:
             mesh = shared_mesh(design, settings, stages)[0] if material else None
             following = tracker = None
             if mesh is not None and material and live:
                 tracker = force_tracker(mesh, design, material, design.markers)
                 following = LiveForce(tracker, design.depth)
-            watch = None
-            if live:
-                line = stack.enter_context(Live(console=console, refresh_per_second=10))
-                watch = frame_lines(following, line, publish=publish)
-            report = stack.enter_context(stages.stage("track"))
-            tracking, observations = track_film(
-                film, design, folder, report, video=not without_video, watch=watch
-            )
+            watch = frame_lines(following, publish=publish) if live else None
+            with stages.stage("track") as report:
+                tracking, observations = track_film(
+                    film, design, folder, report, video=not without_video, watch=watch
+                )
             if following is not None:
                 forces, passed_over = following.finished(), following.passed_over
-        if mesh is not None and material and not live:
-            with Stages(console) as more, more.stage("force") as report:
-                tracker = force_tracker(mesh, design, material, observations.points)
-                forces = forces_of(tracking, tracker, report)
+            elif mesh is not None and material:
+                with stages.stage("force") as report:
+                    tracker = force_tracker(mesh, design, material, observations.points)
+                    forces = forces_of(tracking, tracker, report)
         provenance = {"design": design.definition(), "versions": package_versions(), "machine": machine()}
         if tracker is not None and material:
             write_forces(folder, forces, design.depth)
