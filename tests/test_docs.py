@@ -456,8 +456,9 @@ def test_the_docs_have_every_name_of_a_list(page, column, listed):
 
 
 def test_the_docs_have_every_key_of_a_published_line():
+    from pinnray.film.force_estimate import force_row
     from pinnray.film.live_force import frame_line
-    from tests.film.test_force_estimate import FORCES, REST, force_row, frame, seen
+    from tests.film.test_force_estimate import FORCES, REST, frame, seen
 
     page = HOW_TO / "force-from-film.md"
     (example,) = (block.text for block in blocks(page) if block.language == "json")

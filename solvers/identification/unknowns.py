@@ -174,7 +174,8 @@ class Unknowns:
         """Derivatives of the hypothesis of values, shape (p,)."""
         named, material = self._named(values), self.material(values)
         count = len(self.names)
-        by = defaultdict(lambda: np.zeros(count), zip(self.names, np.eye(count), strict=True))
+        by: dict[str, FloatArray] = defaultdict(lambda: np.zeros(count))
+        by |= zip(self.names, np.eye(count), strict=True)
         young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
         normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
