@@ -12,6 +12,7 @@ from rich.table import Table
 from pinnray.comparison.figures.style import axes_at, write_heading
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
+from pinnray.vision.calibration.camera import INTRINSICS
 from pinnray.vision.calibration.camera_calibration import Calibration
 
 MARGIN, HEAD = 0.12, 0.56
@@ -24,8 +25,8 @@ def calibration_table(calibration: Calibration) -> Table:
     """The intrinsics with standard deviations, and the reprojection errors."""
     camera = calibration.camera
     table = Table("camera", "value", "±", "unit", box=SIMPLE_HEAD)
-    deviations = camera.standard_deviations or (0.0,) * len(camera.intrinsic_names)
-    for name, value, deviation in zip(camera.intrinsic_names, camera.intrinsics, deviations, strict=True):
+    deviations = camera.standard_deviations or (0.0,) * len(INTRINSICS)
+    for name, value, deviation in zip(INTRINSICS, camera.intrinsics, deviations, strict=True):
         digits, unit = (5, "") if name[0] in "kp" else (2, "px")
         table.add_row(name, f"{value:.{digits}f}", f"{deviation:.{digits}f}" if deviation else "fixed", unit)
     seen = len(calibration.view_errors)

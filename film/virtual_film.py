@@ -18,7 +18,6 @@ from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.boards import board_poses, board_scene
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
-from pinnray.vision.rig.occluders import cables, check_covers
 from pinnray.vision.rig.recording import Recording
 from pinnray.vision.rig.recording_files import photograph, record
 
@@ -66,7 +65,7 @@ def film_finger(
         solver: See `filmed_solution`.
         out: The folder, which is replaced.
         stages: Shows the progress.
-        rig: Camera, markers, cables and board.
+        rig: Camera, markers and board.
         exposure: Light, lens and sensor.
         motion: Numbers of frames at rest, moving and held.
         codec: Of the video.
@@ -79,8 +78,7 @@ def film_finger(
     if finger is None:
         raise UserError("a film is of a finger")
     workspace, camera, pose = rig.view(finger)
-    board, covered = rig.sheet(), rig.covered
-    check_covers(covered, len(mesh.marker_nodes))
+    board = rig.sheet()
     bench = Bench(mesh, finger, workspace, rig.paint, rig.irregular)
     solution, source = filmed_solution(problem, solver, stages)
     course = filmed_course(solution)
@@ -91,7 +89,6 @@ def film_finger(
         pose=pose,
         exposure=exposure,
         motion=motion,
-        occluders=cables(bench, course, motion, covered, rig.cover_during, paint=rig.cover_paint),
         seed=seed,
         course=course,
     )

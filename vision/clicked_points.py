@@ -13,7 +13,7 @@ from pinnray.geometry.observations import Observations
 from pinnray.geometry.registration import HAND_HELD, Homography, nearest_similarity
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.measurements import csv_rows
+from pinnray.runtime.tables import read_number, read_table
 
 FEWEST = 3
 """Points that tell a picture's mirror image from itself."""
@@ -55,28 +55,19 @@ def read_clicks(path: Path) -> Clicks:
     With a column `point`, clicks of one number are repeats, and points are in the order of their numbers. A
     `UserError` names what cannot be read.
     """
-    _, rows = csv_rows(path, "clicks")
-    header = [cell.lower() for cell in rows[0][1]] if rows else []
-    if not {"x", "y"} <= set(header):
-        found = f"it has {', '.join(map(repr, header))}" if header else "it is empty"
-        raise UserError(f"{path}: the header must name the columns x and y, and may name point; {found}")
-    columns = [header.index(name) for name in ("x", "y", "point") if name in header]
+    table = read_table(path, "clicks", {"x": "x", "y": "y"}, {"point": "point"})
     values = []
-    for line, row in rows[1:]:
-        try:
-            values.append([float(row[column]) for column in columns])
-        except (ValueError, IndexError):
-            said = f"{path}, line {line}: {','.join(row)!r} has no number in x, y or point"
-            raise UserError(said) from None
-        if not np.isfinite(values[-1]).all():
-            raise UserError(f"{path}, line {line}: {','.join(row)!r} has a number that is not finite")
+    for line, cells in table.rows:
+        values.append([read_number(cell) for cell in cells.values()])
+        for name, value in zip(cells, values[-1], strict=True):
+            if not np.isfinite(value):
+                raise UserError(f"{path}, line {line}: {name} is {cells[name]!r}, which is no finite number")
     if len(values) < FEWEST:
         raise UserError(f"{path} has {len(values)} points; give at least {FEWEST}")
-    table = np.array(values)
-    clicks = table[:, :2]
-    if table.shape[1] == 2:
+    clicks = np.array(values)[:, :2]
+    if "point" not in table.titles:
         return Clicks(clicks, None)
-    numbers, group = np.unique(table[:, 2], return_inverse=True)
+    numbers, group = np.unique(np.array(values)[:, 2], return_inverse=True)
     if len(numbers) < FEWEST:
         raise UserError(f"{path} has {len(numbers)} points; give at least {FEWEST}")
     counts = np.bincount(group)
