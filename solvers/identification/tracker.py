@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear
-from scipy.special import chdtri, ndtri
+from scipy.special import chdtri
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
@@ -30,8 +30,9 @@ from pinnray.solvers.assimilation.estimation import (
     values_of,
 )
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
+from pinnray.solvers.identification.fit import NORMAL, place_of, size_of
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, SHARE, doubt_of_the_plane
+from pinnray.solvers.identification.unknowns import CONTACT, SHARE
 
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
@@ -215,26 +216,19 @@ class ForceTracker:
 
     def _reading(self, found: _Posterior, status: str) -> ForceReading:
         values, derivatives = values_of(self._parameters, found.z)
-        directions = self._unknowns.slopes(values).force
-        by_z = directions * derivatives[:, None]
-        spread = by_z.T @ found.covariance @ by_z
-        force = values @ directions
-        size = float(np.linalg.norm(force))
-        along = force / size if size else self._unknowns.directions[0]
-        doubt = doubt_of_the_plane(self._unknowns.problem) * size
-        half = found.quantile * float(np.hypot(np.sqrt(along @ spread @ along), doubt))
-        wider = found.quantile / float(ndtri((1 + LEVEL) / 2))
-        may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chdtri(len(force), 1 - LEVEL)
-        of_place = np.isin(self._unknowns.names, ("position", "eccentricity")).astype(np.float64)
-        place, place_by_z = float(of_place @ values), of_place * derivatives
-        around = found.quantile * np.sqrt(place_by_z @ found.covariance @ place_by_z)
-        ends = np.clip(place + around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
+        errors = found.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(found.covariance)
+        force = self._unknowns.hypothesis(values).force
+        size, deviation = size_of(self._unknowns, values, errors)
+        by_errors = self._unknowns.slopes(values).force.T @ errors
+        may_be_none = force @ np.linalg.solve(by_errors @ by_errors.T, force) < chdtri(len(force), 1 - LEVEL)
+        place, around = place_of(self._unknowns, values, errors)
+        ends = np.clip(place + NORMAL * around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
         return replace(
             self._unknown(status),
             force=force,
             size=size,
-            low=0.0 if may_be_none else max(size - half, 0.0),
-            high=size + half,
+            low=0.0 if may_be_none else max(size - NORMAL * deviation, 0.0),
+            high=size + NORMAL * deviation,
             position=place,
             position_low=float(ends[0]),
             position_high=float(ends[1]),

@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 
 from pinnray.cli import main
-from pinnray.film.force_estimate import FrameForce, force_row
+from pinnray.film.force_estimate import FrameForce, force_row, force_tracker
 from pinnray.film.live_force import LiveForce, frame_lines
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
+from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.identification.tracker import ForceReading
+from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.vision.frames.frame import Frame
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.tracking.frame_tracker import FrameDetections
@@ -57,6 +62,17 @@ def test_a_row_has_forces_for_the_depth_and_nothing_where_nothing_is_known():
     assert second["force_low_N"] == 0
     assert second["remark"].startswith("2 of 9 markers")
     assert first.keys() == second.keys()
+
+
+def test_the_interval_counts_that_a_finger_is_not_plane():
+    """As that of `fem-id`: half of the difference between the plane states."""
+    finger = Design()
+    mesh = finger_mesh(finger, settings=MeshSettings(size=3.0))
+    moved = FemSolver(estimate=False).solve(Problem(mesh, load=Load(displacement=(None, -3.0)))).at_markers()
+    tracker = force_tracker(mesh, finger, Material(), finger.markers)
+    seen, deviations = np.ones(len(moved), dtype=bool), np.full_like(moved, 0.005)
+    found = tracker.update(moved, deviations, seen)
+    assert found.high - found.size > 1.95 * 0.5 * 0.4**2 * found.size
 
 
 class Recorder:

@@ -8,10 +8,16 @@ from rich.console import Console
 
 from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
-from pinnray.options.shared import FilmOptions, FingerOptions, Flag, OutputFlag, OutputPath
+from pinnray.options.shared import (
+    FilmOptions,
+    FingerOptions,
+    Flag,
+    MaterialOptions,
+    OutputFlag,
+    OutputPath,
+)
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
-from pinnray.solvers.physics import Material
 
 FORCE = Group("Force", sort_key=5)
 
@@ -23,7 +29,7 @@ def command(
     finger: FingerOptions = FingerOptions(),
     options: FilmOptions = FilmSettings(),
     force: Annotated[bool, Parameter(group=FORCE, negative="")] = False,
-    elastic: Annotated[Material, Parameter(name="*", group=FORCE)] = Material(),
+    elastic: Annotated[MaterialOptions, Parameter(name="*", group=FORCE)] = MaterialOptions(),
     live: Flag = False,
     publish: Flag = False,
     without_video: OutputFlag = False,
@@ -62,7 +68,7 @@ def command(
     if elastic.model_fields_set and not force:
         raise UserError(f"--{min(elastic.model_fields_set)} is for --force")
     design, settings = finger.read(usual=MESH)
-    film, material = options.of(source), elastic if force else None
+    film, material = options.of(source), elastic.made() if force else None
     if material:
         finger.check_cost(design, settings, [make_solver("fem-id")])
     check_output(out)
