@@ -92,9 +92,9 @@ class FieldSettings:
         return preset | {name: getattr(self, name) for name in names}
 
     def check_positive(self, *names: str) -> None:
-        """Raise a `UserError` unless settings are above zero."""
+        """Raise a `UserError` unless settings are above zero and finite."""
         for name in names:
-            if not (value := getattr(self, name)) > 0:
+            if not 0 < (value := getattr(self, name)) < inf:
                 raise UserError(f"{self.name}: {name} must be positive, got {value}")
 
     def check_not_negative(self, *names: str) -> None:

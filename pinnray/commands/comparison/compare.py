@@ -27,7 +27,7 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 from pinnray.runtime.machine import cores
 
 if TYPE_CHECKING:
-    from pinnray.film.measured_film import MeasuredFilm
+    from pinnray.film.film import Film
 
 
 @quietable
@@ -162,12 +162,10 @@ def _truth(name: str | None, measurements: str | None) -> str:
     return SLIDING.name if name is None else name
 
 
-def _measurements(source: str | None, options: FilmSettings) -> "Path | MeasuredFilm | None":
+def _measurements(source: str | None, options: FilmSettings) -> "Path | Film | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
         if source is None and options.model_fields_set:
             raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
-        from pinnray.film.measured_film import MeasuredFilm
-
-        return None if source is None else MeasuredFilm(options.of(source))
+        return None if source is None else options.of(source)
     return existing(Path(source))

@@ -113,6 +113,8 @@ def command(
         print("\n".join(figures_lines(figures, grip)))
         if said := break_warning(figures.strain_over_break):
             say(f"warning: {said[:1].lower()}{said[1:-1]}")
+    if solution.identified:
+        print(solution.identified.advice)
     for path in written:
         print(path)
     return 0 if evaluation.converged and tolerance_reached(adaptation) else NOT_CONVERGED
