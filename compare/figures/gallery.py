@@ -10,12 +10,11 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import IN_SAMPLE, Evaluation
 from pinnray.comparison.evaluation.force_curves import ForceCurve, force_curves
 from pinnray.comparison.figures.body import PERCENT
-from pinnray.comparison.figures.design_drawing import draw_design
 from pinnray.comparison.figures.fields import QUANTITIES, FieldQuantity, draw_field, drawn_solvers
 from pinnray.comparison.figures.force_charts import draw_force_displacement
 from pinnray.comparison.figures.mesh_drawing import draw_mesh, mesh_numbers
 from pinnray.comparison.figures.overlay import draw_overlay
-from pinnray.comparison.figures.solver_charts import draw_convergence, draw_losses, draw_marker_errors
+from pinnray.comparison.figures.solver_charts import draw_losses, draw_marker_errors
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.figure import Figure
 
@@ -137,20 +136,6 @@ def _force_displacement(comparison: Results) -> Illustration | None:
     )
 
 
-def _convergence(comparison: Results) -> Illustration | None:
-    if (figure := draw_convergence(comparison)) is None:
-        return None
-    return Illustration(
-        figure,
-        "Convergence",
-        f"Elastic energy per unit depth: as each solver went on, with its relative distance from that of "
-        f"{comparison.reference.label} (dashed line) beside it; along the load; over factors of the markers’ "
-        f"weight, the energy that they add. A solver that solves directly keeps no record. One that was "
-        f"given the markers pays energy for them.",
-        each_of("Energy at the end, N mm per mm", comparison.evaluations, lambda each: each.energy),
-    )
-
-
 def _losses(comparison: Results) -> Illustration | None:
     if (figure := draw_losses(comparison)) is None:
         return None
@@ -172,13 +157,11 @@ def _losses(comparison: Results) -> Illustration | None:
 
 def _design(comparison: Results) -> Illustration:
     finger = comparison.design
-    symbols = " under the paper’s symbols" if any(symbol for _, symbol, _ in finger.facts()) else ""
     return Illustration(
-        draw_design(finger),
+        finger.plot(),
         "Design",
-        f"The finger “{finger.name}”, to scale, with its dimensions{symbols}, the clamped base (hatched), "
-        f"the contact (orange) and the numbered markers.",
-        "; ".join(f"{name} {value}" for name, symbol, value in finger.facts() if symbol or not symbols),
+        f"The finger “{finger.name}”, to scale: clamped base (hatched), contact (orange), numbered markers.",
+        "; ".join(f"{name} {value}" for name, _, value in finger.facts()),
     )
 
 
@@ -204,7 +187,6 @@ GALLERY: dict[str, tuple[str, Callable[..., Illustration | None]]] = {
     "force_displacement": ("chart of force over displacement", _force_displacement),
     "design": ("drawing of the design", _design),
     "mesh": ("picture of the mesh", _mesh),
-    "convergence": ("chart of the energy", _convergence),
     "losses": ("chart of the losses", _losses),
 }
 """By file name: words for the progress line, and the function; it gives None if there is nothing to draw."""

@@ -50,19 +50,6 @@ def axes_at(drawn: Figure, box: Sequence[float]) -> Axes:
     return drawn.add_axes((left / total_width, bottom, width / total_width, height / total_height))
 
 
-def write_letter(axes: Axes, number: int) -> None:
-    """The letter of a panel at the upper left of its axes, outside of them: (a) for number 0."""
-    axes.annotate(
-        f"({chr(ord('a') + number)})",
-        (0, 1),
-        xytext=(-44, 3),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        weight="bold",
-        color=INK,
-    )
-
-
 def arrow(
     axes: Axes,
     start: Sequence[float] | FloatArray,

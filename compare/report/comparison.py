@@ -35,8 +35,7 @@ class Comparison(Results):
 
         Args:
             picture: `overlay`, `marker_errors`, `von_mises`, `strain_principal`, `strain_xx`, `strain_yy`,
-                `strain_xy`, `force_displacement`, `convergence`, `losses`,
-                `design` or `mesh`.
+                `strain_xy`, `force_displacement`, `losses`, `design` or `mesh`.
             solvers: Names of those whose fields are drawn, for a picture of fields; all that a page has room
                 for if empty.
 

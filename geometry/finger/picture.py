@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
@@ -15,9 +16,14 @@ from pinnray.geometry.section.thickness import inner_normals
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, SMALL, Figure, body_figure
 
+COLUMNS, ROW = 4, 0.17
+"""Parameters beside each other below the section, and height of their lines, inches."""
+
 
 def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], FloatArray]) -> Figure:
     """The section to scale: the clamp hatched, an arrow at the contact, numbered markers.
+
+    Below it the parameters of the paper, if the finger has them.
 
     Args:
         finger: The finger.
@@ -29,7 +35,13 @@ def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], 
     tip, tail = place(np.stack([contact, contact + np.array([0.0, 0.09 * extent])]))
     hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
     shown = _not_tall(np.concatenate([hatched, tip[None], tail[None]]))
-    with body_figure(shown, f"Finger “{finger.name}”") as (drawn, axes):
+    parameters = [_with_symbol(symbol, value) for _, symbol, value in finger.facts() if symbol]
+    rows = -(-len(parameters) // COLUMNS)
+    with body_figure(shown, f"Finger “{finger.name}”", foot=ROW * rows) as (drawn, axes):
+        for number, said in enumerate(parameters):
+            row, column = divmod(number, COLUMNS)
+            place_in_page = (0.1 + 0.9 * column / COLUMNS, ROW * (rows - row - 0.5) / drawn.get_figheight())
+            drawn.text(*place_in_page, said, fontsize=SMALL, color=INK, va="center")
         draw_section(axes, section)
         for loop, which in section.named("base"):
             axes.plot(*loop.along(which, np.linspace(0, 1, 60)).T, color=INK, lw=2.2, zorder=3)
@@ -43,11 +55,18 @@ def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], 
             "fontsize": SMALL,
             "color": MEASURED,
             "zorder": 6,
+            "path_effects": [patheffects.withStroke(linewidth=2, foreground="white")],
         }
         for number, centre in enumerate(place(finger.markers), start=1):
             axes.add_patch(Circle(tuple(centre), finger.marker_radius, fc=MEASURED, ec="none", zorder=4))
             axes.annotate(str(number), centre, xytext=(3, 3), **text)
     return drawn
+
+
+def _with_symbol(symbol: str, value: str) -> str:
+    """A parameter of the paper, such as `L_tip`, and its value, with the symbol as mathematics."""
+    letter, _, index = symbol.partition("_")
+    return rf"${letter}_\mathrm{{{index}}}$ = {value}" if index else f"${letter}$ = {value}"
 
 
 def draw_section(axes: Axes, shape: Section) -> None:

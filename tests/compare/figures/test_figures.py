@@ -59,7 +59,7 @@ def pages(drawings: dict[str, Illustration]) -> dict[str, Page]:
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
     """In letters, not in pixels; and the same file every time."""
-    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", {"convergence": GALLERY["convergence"]})
+    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", {"design": GALLERY["design"]})
     first, second = (
         [path.read_bytes() for path in sorted(folder.glob(f"*.{kind}"))]
         for folder in (tmp_path / "first", tmp_path / "second")
@@ -80,7 +80,7 @@ def test_every_picture_is_told_in_numbers_to_those_who_cannot_see_it(drawings, c
 
 
 FIELDS = tuple(quantity.name for quantity in QUANTITIES if quantity.name not in LIKE_OTHERS)
-ALL = (*("overlay", "marker_errors", *FIELDS, "force_displacement", "design", "mesh", "convergence"),)
+ALL = (*("overlay", "marker_errors", *FIELDS, "force_displacement", "design", "mesh"),)
 
 
 def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawings, tmp_path, monkeypatch):
@@ -115,7 +115,7 @@ def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     more += [replace(told, solver="gp"), replace(told, solver="statfem", converged=False)]
     eight = compared(fem, pinn, failed, *more)
-    for name in ("overlay", "marker_errors", "von_mises", "convergence"):
+    for name in ("overlay", "marker_errors", "von_mises"):
         page = page_of(draw(eight, name).figure)
         assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
 
@@ -184,12 +184,6 @@ def test_the_overlay_shows_the_whole_of_every_solution_that_converged(mesh, pinn
     assert extent.top > 0
 
 
-def test_the_reference_energy_is_a_line(pages: dict[str, Page]) -> None:
-    energies, distances, *_ = pages["convergence"].figure.axes
-    assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
-    np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [4400.0, 100.0, 21.0])
-
-
 def test_no_remark_on_a_field_lies_on_a_slender_finger(fem, pinn, mesh, compared):
     x, y = mesh.points.T
     length, width = float(np.ptp(x)), float(np.ptp(y))
@@ -213,11 +207,8 @@ def test_the_number_beside_a_field_is_its_largest_mean_of_a_triangle(fem, compar
     assert "largest 1 MPa" in page_of(draw(compared(peak), "von_mises").figure).text
 
 
-def test_ticks_of_six_characters_leave_room_for_the_labels(fem, pinn, compared):
-    history = {"units": np.array([3200.0, 8000.0]), "energy": np.array([1.1015, 1.0881])}
+def test_ticks_of_six_characters_leave_room_for_the_labels(pinn, compared):
     followed = {"load_fraction": np.array([0.0, 1.0]), "reaction_x": np.zeros(2), "reaction_y": [0, -0.0021]}
-    near = replace(fem, energy=1.0924)
-    assert page_of(draw(compared(near, replace(pinn, history=history)), "convergence").figure).cut_off() == []
     follower = replace(pinn, history=followed, reaction=np.array([0.0, -0.0021]))
     assert page_of(draw(compared(follower), "force_displacement").figure).cut_off() == []
 
