@@ -3,15 +3,16 @@
 from collections.abc import Callable, Collection
 from typing import NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 
 from pinnray.comparison.evaluation.comparison import TRUTH, Results
 from pinnray.comparison.evaluation.differences import COMPONENTS, FieldDifference
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import body
-from pinnray.comparison.figures.body import ColourScale, diverging, sequential, symmetric
+from pinnray.comparison.figures.body import DIVERGING, ColourScale, sequential, symmetric
 from pinnray.comparison.figures.canvas import Canvas
-from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.comparison.figures.layout import axes_at, write_heading
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
@@ -162,7 +163,7 @@ def draw_field(comparison: Results, quantity: FieldQuantity, solvers: Collection
         bars = [
             (scale, f"${quantity.symbol}$, {quantity.unit}"),
             (
-                ColourScale(-1.0, 1.0, diverging()),
+                ColourScale(-1.0, 1.0, mpl.colormaps[DIVERGING]),
                 f"difference of ${quantity.symbol}$, share of the panel's own scale",
             ),
         ]

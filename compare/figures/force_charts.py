@@ -7,13 +7,8 @@ import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.force_curves import ForceCurve, follows_load
-from pinnray.comparison.figures.style import (
-    axes_at,
-    legend_above,
-    legend_height,
-    solver_colour,
-    write_heading,
-)
+from pinnray.comparison.figures.layout import axes_at, legend_above, legend_height, write_heading
+from pinnray.comparison.figures.solver_colours import solver_colour
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
 

@@ -41,7 +41,7 @@ def _overlay(comparison: Results) -> Illustration:
         "Deformed finger",
         f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
         f"displacement is not exaggerated. {circles}Crosses: the solver’s markers. "
-        f"Grey: the undeformed body.{cylinder} {_given(comparison)}{_simulated(comparison)}",
+        f"Grey: the undeformed body.{cylinder}{_given(comparison)}",
         each_of(
             "Largest displacement, mm",
             comparison.evaluations,
@@ -64,11 +64,10 @@ def _marker_errors(comparison: Results) -> Illustration | None:
         draw_marker_errors(comparison),
         "Errors at the markers",
         f"Absolute difference between each solver’s displacement and the {observations.label} one, "
-        f"for both components, on one logarithmic scale, which a solver that did not converge may exceed "
-        f"and at whose lower end are all smaller errors; markers are numbered as in the drawing of the "
-        f"design. Bars: at a marker that the solver was "
-        f"not given, predicted from all others if it was given those. Circles: training errors."
-        f"{unseen} {_given(comparison)}{_simulated(comparison)}",
+        f"for both components, on one logarithmic scale; smaller errors are at its lower end. Markers are "
+        f"numbered as in the drawing of the design. Bars: at a marker that the solver was not given, "
+        f"predicted from all others if it was given those. Circles: training errors."
+        f"{unseen}{_given(comparison)}",
         each_of(
             "Mean of |Δu| + |Δv| at markers that were not given, mm",
             comparison.evaluations,
@@ -99,7 +98,9 @@ def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str
     return Illustration(
         draw_field(comparison, quantity, solvers),
         quantity.title,
-        f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
+        f"{quantity.title}, drawn as the {QUANTITIES[0].title}."
+        if quantity is not QUANTITIES[0]
+        else f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
         f"mean. One scale for all: {PERCENT:g} % of the area of {reference} lie "
         f"within it, the peaks at the corners take the end colours. At a sharp corner the field has no "
         f"bound: the largest mean of a triangle, printed beside, grows with refinement.{beside}{mixed}",
@@ -146,7 +147,7 @@ def _losses(comparison: Results) -> Illustration | None:
         f"value is not zero, and where the conditions are met, every further one raises it. So markers "
         f"cannot lower it at convergence. A network with the lower L_PDE at some epoch has come farther "
         f"in its training or misses its conditions by more, which L_BC tells; it is no more accurate for "
-        f"it. A curve that still falls is a training that has not ended. {_given(comparison)}",
+        f"it. A curve that still falls is a training that has not ended.{_given(comparison)}",
         each_of(
             "Last L_PDE",
             [each for each in comparison.evaluations if "PDE" in each.history],
@@ -215,11 +216,4 @@ def each_of(quantity: str, evaluations: Iterable[Evaluation], value: Callable[[E
 
 def _given(comparison: Results) -> str:
     """The meaning of the mark beside a solver's name, if there is one."""
-    return f"{IN_SAMPLE}. " if any(evaluation.in_sample for evaluation in comparison.evaluations) else ""
-
-
-def _simulated(comparison: Results) -> str:
-    observations = comparison.observations
-    if observations.label != "simulated":
-        return ""
-    return f"The marker positions are simulated, not measured: {observations.source.rstrip('.')}."
+    return f" {IN_SAMPLE}." if any(evaluation.in_sample for evaluation in comparison.evaluations) else ""

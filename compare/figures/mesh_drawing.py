@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 from pinnray.comparison.figures import body
-from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.comparison.figures.layout import axes_at, write_heading
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray

@@ -12,9 +12,9 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.scores import SolverScores
 from pinnray.comparison.figures import body
-from pinnray.comparison.figures.body import ColourScale
+from pinnray.comparison.figures.body import SEQUENTIAL, ColourScale
 from pinnray.comparison.figures.canvas import Canvas, Extent
-from pinnray.comparison.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
+from pinnray.comparison.figures.layout import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
@@ -36,7 +36,7 @@ def draw_overlay(comparison: Results) -> Figure:
     extent = overlay_extent(comparison, width)
     height = width * extent.height / extent.width
     high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
-    scale = ColourScale(0.0, high or 1.0, mpl.colormaps["viridis"])
+    scale = ColourScale(0.0, high or 1.0, mpl.colormaps[SEQUENTIAL])
     notes = []
     if any(evaluation.in_sample for evaluation in evaluations):
         notes.append("† was given these markers and meets them; held out: each predicted from the others")

@@ -11,14 +11,14 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.scores import SolverScores
-from pinnray.comparison.figures.style import (
+from pinnray.comparison.figures.layout import (
     axes_at,
     legend_above,
     legend_below_heading,
     legend_height,
-    solver_colour,
     write_heading,
 )
+from pinnray.comparison.figures.solver_colours import solver_colour
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 

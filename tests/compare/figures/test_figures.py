@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.certifier import with_certificates
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import FORMATS, draw_all

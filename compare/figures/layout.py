@@ -1,4 +1,4 @@
-"""The layout that all charts share: heading, axes by inches, legends, colours of solvers."""
+"""The layout that all pictures share: heading, axes by inches, arrows, legends."""
 
 from collections.abc import Sequence
 
@@ -14,24 +14,6 @@ HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 
 LEGEND_LINE = 0.17
 """Height of a line of a legend, inches."""
-
-SOLVER_COLOURS = (
-    "#0072b2",
-    "#e69f00",
-    "#009e73",
-    "#56b4e9",
-    "#d55e00",
-    "#000000",
-    "#8c6bb1",
-    "#999933",
-    "#8c510a",
-)
-"""Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and more."""
-
-
-def solver_colour(number: int) -> str:
-    """Colour of the solver with that number in the run's order."""
-    return SOLVER_COLOURS[number % len(SOLVER_COLOURS)]
 
 
 def write_heading(drawn: Figure, text: str, note: str = "") -> None:
