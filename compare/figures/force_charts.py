@@ -19,6 +19,7 @@ def draw_force_displacement(
     depth: float,
     truth: ForceCurve | None = None,
     identified: Mapping[int, Evaluation] | None = None,
+    page: float = WIDTH,
 ) -> Figure:
     """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
 
@@ -34,10 +35,10 @@ def draw_force_displacement(
         if each.identified is not None
     }
     more = [f"{each.label}, {force.size.value:.3g} N/mm, identified" for each, force in found.values()]
-    top, height, left = 0.3 + legend_height([*labels, *true_label, *more]), 2.4, 0.75  # inches
-    with figure(top + height + 0.45) as drawn:
+    top, height, left = 0.3 + legend_height([*labels, *true_label, *more], page), 2.4, 0.75  # inches
+    with figure(top + height + 0.45, page) as drawn:
         write_heading(drawn, "Force of the indenter along its travel")
-        axes = axes_at(drawn, (left, top, WIDTH - left - 0.65, height))
+        axes = axes_at(drawn, (left, top, page - left - 0.65, height))
         straight = sum(not follows_load(curve.evaluation) for curve in curves)
         for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
             followed = follows_load(curve.evaluation)
@@ -91,7 +92,7 @@ def draw_force_displacement(
 
 
 def _end_label(curve: ForceCurve, name: str) -> str:
-    return f"{name}, {curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
+    return f"{name}, {curve.force[-1]:.3g} N/mm"
 
 
 def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, *, depth: float) -> Figure:

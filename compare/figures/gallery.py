@@ -1,6 +1,6 @@
 """The pictures of a comparison by name, in the order of the report, with their captions."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -13,10 +13,10 @@ from pinnray.comparison.figures.body import PERCENT
 from pinnray.comparison.figures.fields import QUANTITIES, FieldQuantity, draw_field, drawn_solvers
 from pinnray.comparison.figures.force_charts import draw_force_displacement
 from pinnray.comparison.figures.mesh_drawing import draw_mesh, mesh_numbers
-from pinnray.comparison.figures.overlay import draw_overlay
+from pinnray.comparison.figures.overlay import Panels, draw_overlay
 from pinnray.comparison.figures.solver_charts import draw_losses, draw_marker_errors
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.figure import Figure
+from pinnray.runtime.figure import WIDTH, Figure
 
 
 class Illustration(NamedTuple):
@@ -28,7 +28,7 @@ class Illustration(NamedTuple):
     alt: str
 
 
-def _overlay(comparison: Results) -> Illustration:
+def _overlay(comparison: Results, page: float) -> Illustration:
     observations = comparison.observations
     cylinder = "" if comparison.load.radius is None else " Grey circle: the cylinder where it ends."
     circles = f"Circles: {observations.label} marker positions. " if observations.known else ""
@@ -37,11 +37,12 @@ def _overlay(comparison: Results) -> Illustration:
             "Pink arrows: errors there, times the factor above the panel, of held-out markers if known. "
         )
     return Illustration(
-        draw_overlay(comparison),
+        draw_overlay(comparison, page),
         "Deformed finger",
         f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
         f"displacement is not exaggerated. {circles}Crosses: the solver’s markers. "
-        f"Grey: the undeformed body.{cylinder}{_given(comparison)}",
+        f"Grey: the undeformed body.{cylinder}{_given(comparison)}"
+        f"{_absent(comparison.evaluations, Panels.on(comparison, page).solvers)}",
         each_of(
             "Largest displacement, mm",
             comparison.evaluations,
@@ -50,7 +51,7 @@ def _overlay(comparison: Results) -> Illustration:
     )
 
 
-def _marker_errors(comparison: Results) -> Illustration | None:
+def _marker_errors(comparison: Results, page: float) -> Illustration | None:
     observations = comparison.observations
     if not observations.known:
         return None
@@ -61,7 +62,7 @@ def _marker_errors(comparison: Results) -> Illustration | None:
         else ""
     )
     return Illustration(
-        draw_marker_errors(comparison),
+        draw_marker_errors(comparison, page),
         "Errors at the markers",
         f"Absolute difference between each solver’s displacement and the {observations.label} one, "
         f"for both components, on one logarithmic scale; smaller errors are at its lower end. Markers are "
@@ -76,8 +77,10 @@ def _marker_errors(comparison: Results) -> Illustration | None:
     )
 
 
-def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str] = ()) -> Illustration:
-    drawn = drawn_solvers(comparison, solvers)
+def _field(
+    comparison: Results, page: float, quantity: FieldQuantity, solvers: Collection[str] = ()
+) -> Illustration:
+    drawn = drawn_solvers(comparison, solvers, page)
     reference = drawn[0].label
     mixed = (
         " The solvers have different laws: strain is Green-Lagrange where it is finite, stress is Cauchy."
@@ -92,11 +95,9 @@ def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str
     )
     if comparison.truth is not None:
         beside += " Truth: the simulated finger of the markers."
-    names = {each.solver for each in drawn}
-    if absent := [each.label for each in comparison.shown_fields if each.solver not in names]:
-        beside += f" Not drawn, as a page has no more room or others were chosen: {', '.join(absent)}."
+    beside += _absent(comparison.shown_fields, drawn)
     return Illustration(
-        draw_field(comparison, quantity, solvers),
+        draw_field(comparison, quantity, solvers, page),
         quantity.title,
         f"{quantity.title}, drawn as the {QUANTITIES[0].title}."
         if quantity is not QUANTITIES[0]
@@ -112,7 +113,7 @@ def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str
     )
 
 
-def _force_displacement(comparison: Results) -> Illustration | None:
+def _force_displacement(comparison: Results, page: float) -> Illustration | None:
     depth = comparison.design.depth
     if not (curves := force_curves(comparison.evaluations, comparison.load)):
         return None
@@ -123,7 +124,7 @@ def _force_displacement(comparison: Results) -> Illustration | None:
     found = {n: each for n, each in enumerate(comparison.evaluations) if each.identified}
     squares = " Squares: forces identified from the markers, with intervals of 95 %." if found else ""
     return Illustration(
-        draw_force_displacement(curves, depth=depth, truth=truth, identified=found),
+        draw_force_displacement(curves, depth=depth, truth=truth, identified=found, page=page),
         "Force over displacement",
         f"Force of the indenter along its travel: per mm of depth (left), and for the finger’s "
         f"{depth:g} mm (right). A point is an equilibrium that a solver found as the load "
@@ -137,8 +138,8 @@ def _force_displacement(comparison: Results) -> Illustration | None:
     )
 
 
-def _losses(comparison: Results) -> Illustration | None:
-    if (figure := draw_losses(comparison)) is None:
+def _losses(comparison: Results, page: float) -> Illustration | None:
+    if (figure := draw_losses(comparison, page)) is None:
         return None
     return Illustration(
         figure,
@@ -156,20 +157,20 @@ def _losses(comparison: Results) -> Illustration | None:
     )
 
 
-def _design(comparison: Results) -> Illustration:
+def _design(comparison: Results, page: float) -> Illustration:
     finger = comparison.design
     return Illustration(
-        finger.plot(),
+        finger.plot(page),
         "Design",
         f"The finger “{finger.name}”, to scale: clamped base (hatched), contact (orange), numbered markers.",
         "; ".join(f"{name} {value}" for name, _, value in finger.facts()),
     )
 
 
-def _mesh(comparison: Results) -> Illustration:
+def _mesh(comparison: Results, page: float) -> Illustration:
     numbers = mesh_numbers(comparison.mesh)
     return Illustration(
-        draw_mesh(comparison.mesh),
+        draw_mesh(comparison.mesh, page),
         "Mesh",
         f"The mesh that every solver shares: {numbers['size']}, edges from {numbers['edges']}. Quality is "
         f"twice the ratio of the inscribed to the circumscribed radius (1 for an equilateral triangle): "
@@ -193,8 +194,10 @@ GALLERY: dict[str, tuple[str, Callable[..., Illustration | None]]] = {
 """By file name: words for the progress line, and the function; it gives None if there is nothing to draw."""
 
 
-def draw(comparison: Results, name: str, solvers: Collection[str] = ()) -> Illustration:
+def draw(comparison: Results, name: str, solvers: Collection[str] = (), page: float = WIDTH) -> Illustration:
     """One picture of a comparison by its name; a picture of fields may have chosen solvers only.
+
+    The page has a width in inches.
 
     Raises:
         UserError: If there is no such picture or solver, or nothing to draw in it.
@@ -204,7 +207,7 @@ def draw(comparison: Results, name: str, solvers: Collection[str] = ()) -> Illus
     what, make = GALLERY[name]
     if solvers and name not in CHOOSING:
         raise UserError(f"the {what} has all solvers; chosen ones are for {', '.join(CHOOSING)}")
-    if (drawing := make(comparison, solvers=solvers) if solvers else make(comparison)) is None:
+    if (drawing := make(comparison, page, solvers=solvers) if solvers else make(comparison, page)) is None:
         raise UserError(f"{name}: no solver of this comparison has data for the {what}")
     return drawing
 
@@ -212,6 +215,15 @@ def draw(comparison: Results, name: str, solvers: Collection[str] = ()) -> Illus
 def each_of(quantity: str, evaluations: Iterable[Evaluation], value: Callable[[Evaluation], float]) -> str:
     """A quantity of every evaluation in words."""
     return f"{quantity}: {', '.join(f'{each.label} {value(each):.3g}' for each in evaluations)}."
+
+
+def _absent(every: Sequence[Evaluation], drawn: Sequence[Evaluation]) -> str:
+    """The solvers that a picture does not have, if there are any."""
+    names = {each.solver for each in drawn}
+    absent = [each.label for each in every if each.solver not in names]
+    if not absent:
+        return ""
+    return f" Not drawn, as a page has no more room or others were chosen: {', '.join(absent)}."
 
 
 def _given(comparison: Results) -> str:

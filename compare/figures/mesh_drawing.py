@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 from pinnray.comparison.figures import body
-from pinnray.comparison.figures.layout import axes_at, write_heading
+from pinnray.comparison.figures.layout import LEGEND_LINE, axes_at, wrapped, write_heading
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
@@ -36,17 +36,18 @@ def quality(mesh: TriangleMesh) -> FloatArray:
     return np.asarray((b + c - a) * (c + a - b) * (a + b - c) / (a * b * c))
 
 
-def draw_mesh(mesh: TriangleMesh) -> Figure:
-    """Draw the mesh with its contact, clamp and markers."""
-    width = WIDTH - 2 * MARGIN
+def draw_mesh(mesh: TriangleMesh, page: float = WIDTH) -> Figure:
+    """Draw the mesh with its contact, clamp and markers, on a page of a width in inches."""
+    width = page - 2 * MARGIN
     size = float(np.ptp(mesh.points, axis=0).max())
     extent = body.panel_extent(mesh.points, width, margin=0.025 * size, tallest=4.2)
     height = width * extent.height / extent.width
     numbers = mesh_numbers(mesh)
-    note = f"{numbers['size']}; edges {numbers['edges']}; quality: {numbers['quality']}"
-    with figure(HEAD + height + MARGIN) as drawn:
+    note = wrapped(f"{numbers['size']}; edges {numbers['edges']}; quality: {numbers['quality']}", width)
+    head = HEAD + LEGEND_LINE * note.count("\n")
+    with figure(head + height + MARGIN, page) as drawn:
         write_heading(drawn, "Mesh, shared by every solver", note)
-        axes = axes_at(drawn, (MARGIN, HEAD, width, height))
+        axes = axes_at(drawn, (MARGIN, head, width, height))
         body.prepare(axes, extent)
         edges = LineCollection(list(mesh.points[mesh.edges]), colors="#3d5a80", linewidths=0.12)
         axes.add_collection(edges, autolim=False)

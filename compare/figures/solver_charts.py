@@ -13,6 +13,7 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.scores import SolverScores
 from pinnray.comparison.figures.layout import (
     axes_at,
+    head_height,
     legend_above,
     legend_below_heading,
     legend_height,
@@ -20,7 +21,7 @@ from pinnray.comparison.figures.layout import (
 )
 from pinnray.comparison.figures.solver_colours import solver_colour
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.runtime.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.figure import INK, MUTED, NARROW, SMALL, WIDTH, Figure, figure
 
 HEAD = 0.3
 """Height of the heading, inches."""
@@ -32,7 +33,7 @@ def wants_log(values: FloatArray) -> bool:
     return bool(finite.size and finite.min() > 0 and finite.max() > 20 * finite.min())
 
 
-def draw_losses(comparison: Results) -> Figure | None:
+def draw_losses(comparison: Results, page: float = WIDTH) -> Figure | None:
     """Draw a chart for each term of the loss, with a line for every solver that has it (Fig. 7 of the paper).
 
     None without a record.
@@ -46,12 +47,12 @@ def draw_losses(comparison: Results) -> Figure | None:
         return None
     units = {"PDE": "MPa", "BC": "mm²", "ASM": "mm²"}
     terms = [name for name in units if any(name in each.history for each in trained.values())]
-    head = HEAD + legend_height([evaluation.label_at_markers for evaluation in trained.values()])
+    head = HEAD + legend_height([evaluation.label_at_markers for evaluation in trained.values()], page)
     height, gap, foot, left = 1.15, 0.15, 0.42, 0.85  # inches
-    with figure(head + len(terms) * (height + gap) + foot) as drawn:
-        write_heading(drawn, "Losses over the epochs, without their weights")
+    with figure(head + len(terms) * (height + gap) + foot, page) as drawn:
+        write_heading(drawn, "Losses, without their weights")
         for row, term in enumerate(terms):
-            axes = axes_at(drawn, (left, head + row * (height + gap), WIDTH - left - 0.15, height))
+            axes = axes_at(drawn, (left, head + row * (height + gap), page - left - 0.15, height))
             for number, evaluation in trained.items():
                 if term in evaluation.history:
                     epochs, losses = evaluation.history["epoch"], evaluation.history[term]
@@ -73,37 +74,42 @@ CIRCLE: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3.2, "mfc": "white", "m
 """Look of a training error, which is seen even where the error vanishes."""
 
 
-def draw_marker_errors(comparison: Results) -> Figure:
+def draw_marker_errors(comparison: Results, page: float = WIDTH) -> Figure:
     """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one logarithmic scale.
 
-    Bars: at markers that the solver was not given. Circles: at markers that it was given.
+    Bars: at markers that the solver was not given. Circles: at markers that it was given. Beside them are the
+    means, if the page, of a width in inches, is not narrow.
     """
     evaluations, observations = comparison.evaluations, comparison.observations
-    head, title, height, gap, foot = 0.62, 0.19, 0.5, 0.1, 0.4  # inches: with legend; a solver's name; ...
+    title, height, gap, foot = 0.24, 0.5, 0.07, 0.4  # inches: a solver's name; its bars; ...
     left, step = 0.72, title + height + gap
-    width = WIDTH / 2 - left - 1.02  # where the means stand
+    width = page / 2 - left - (1.02 if page > NARROW else 0.1)  # where the means stand
     scores = [comparison.scores[evaluation.solver] for evaluation in evaluations]
     span = _span(scores)
-    with figure(head + len(evaluations) * step + foot) as drawn:
-        write_heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
+    head = head_height(page, 2) + 0.05
+    with figure(head + len(evaluations) * step + foot, page) as drawn:
+        write_heading(drawn, f"Absolute error at {observations.label} markers, mm")
         fitted = any(evaluation.in_sample for evaluation in evaluations)
         handles = [
-            Patch(facecolor=MUTED, edgecolor=MUTED, label="held out: the solver was not given this marker"),
-            Line2D([], [], **CIRCLE, color=MUTED, label="training: it was given this marker (†)"),
+            Patch(facecolor=MUTED, edgecolor=MUTED, label="held out: not given"),
+            Line2D([], [], **CIRCLE, color=MUTED, label="training: given (†)"),
         ]
         legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
         for row, (evaluation, own) in enumerate(zip(evaluations, scores, strict=True)):
             for column, symbol in enumerate("uv"):
-                axes = axes_at(drawn, (left + column * WIDTH / 2, head + title + row * step, width, height))
-                _draw_errors(axes, symbol, own, solver_colour(row), span[0])
+                axes = axes_at(drawn, (left + column * page / 2, head + title + row * step, width, height))
+                said = _draw_errors(axes, symbol, own, solver_colour(row), span[0])
                 _set_scales(axes, observations.visible, span)
-                axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=SMALL)
-                if row == 0:
-                    axes.text(1.03, 1.06, "mean, mm", size=SMALL, color=INK, transform=axes.transAxes)
+                axes.set_ylabel(rf"$|\Delta {symbol}|$", size=SMALL)
+                beside: dict[str, Any] = {"size": SMALL, "transform": axes.transAxes}
+                if page > NARROW:
+                    axes.text(1.03, 0.5, said, va="center", color=MUTED, **beside)
+                if page > NARROW and row == 0:
+                    axes.text(1.03, 1.06, "mean, mm", color=INK, **beside)
                 if column == 0:
-                    axes.set_title(evaluation.label_at_markers, size=8.5, pad=2, weight="bold")
+                    axes.set_title(evaluation.label_at_markers, size=8.5, pad=6, weight="bold")
                 if row == len(evaluations) - 1:
-                    axes.set_xlabel("marker, by its number in the drawing")
+                    axes.set_xlabel("marker")
                 else:
                     axes.tick_params(labelbottom=False)
     return drawn
@@ -129,8 +135,8 @@ def _span(scores: Sequence[SolverScores]) -> tuple[float, float]:
     return 10 ** min(low, high - 1), 10**high
 
 
-def _draw_errors(axes: Axes, symbol: str, own: SolverScores, colour: str, floor: float) -> None:
-    """The bars and circles of one solver and component, and their means beside; none is below the floor."""
+def _draw_errors(axes: Axes, symbol: str, own: SolverScores, colour: str, floor: float) -> str:
+    """The bars and circles of one solver and component, none below the floor; and their means in words."""
     words = []
     for errors, kind in ((own.held_out, "held out"), (own.given, "training")):
         if errors is None:
@@ -143,7 +149,7 @@ def _draw_errors(axes: Axes, symbol: str, own: SolverScores, colour: str, floor:
         else:
             axes.bar(marker[seen], values[seen], 0.72, color=colour, edgecolor=colour, linewidth=0.6)
         words.append(f"{getattr(errors, f'mae_{symbol}'):.3f} {kind}")
-    axes.text(1.03, 0.5, "\n".join(words), size=SMALL, va="center", color=MUTED, transform=axes.transAxes)
+    return "\n".join(words)
 
 
 def _set_scales(axes: Axes, visible: BoolArray, span: tuple[float, float]) -> None:

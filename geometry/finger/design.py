@@ -77,11 +77,11 @@ class Design(Parameters):
             rows.append((meaning, symbol, words))
         return [*rows, ("Abscissa of the contact's middle", "", _in_words(self.contact_abscissa, "mm"))]
 
-    def plot(self) -> "Figure":
+    def plot(self, width: float | None = None) -> "Figure":
         """The section with clamp, contact and numbered markers, as a matplotlib figure."""
         from pinnray.geometry.finger.picture import plot_finger
 
-        return plot_finger(self, self.section, np.asarray)
+        return plot_finger(self, self.section, np.asarray, width)
 
     def _repr_html_(self) -> str:
         """The section and the paper's nine parameters, in a notebook."""

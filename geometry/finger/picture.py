@@ -14,13 +14,15 @@ from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import inner_normals
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, SMALL, Figure, body_figure
+from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, body_figure
 
-COLUMNS, ROW = 4, 0.17
-"""Parameters beside each other below the section, and height of their lines, inches."""
+COLUMN, ROW = 1.2, 0.17
+"""Width and height of a parameter below the section, inches."""
 
 
-def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], FloatArray]) -> Figure:
+def plot_finger(
+    finger: Finger, section: Section, place: Callable[[FloatArray], FloatArray], width: float | None = None
+) -> Figure:
     """The section to scale: the clamp hatched, an arrow at the contact, numbered markers.
 
     Below it the parameters of the paper, if the finger has them.
@@ -29,19 +31,22 @@ def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], 
         finger: The finger.
         section: Its section in the frame of the picture.
         place: From the finger's frame into that of the picture, points of shape (n, 2), mm.
+        width: Of the figure, inches; the usual one if None.
     """
+    page = width or WIDTH
     extent = float(np.ptp(section.bounds, axis=0).max())
     contact = finger.section.front_point(finger.contact_abscissa)
     tip, tail = place(np.stack([contact, contact + np.array([0.0, 0.09 * extent])]))
     hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
     shown = _not_tall(np.concatenate([hatched, tip[None], tail[None]]))
     parameters = [_with_symbol(symbol, value) for _, symbol, value in finger.facts() if symbol]
-    rows = -(-len(parameters) // COLUMNS)
-    with body_figure(shown, f"Finger “{finger.name}”", foot=ROW * rows) as (drawn, axes):
+    columns = int((page - 0.4) / COLUMN)
+    rows = -(-len(parameters) // columns)
+    with body_figure(shown, f"Finger “{finger.name}”", foot=ROW * rows, page=page) as (drawn, axes):
         for number, said in enumerate(parameters):
-            row, column = divmod(number, COLUMNS)
-            place_in_page = (0.1 + 0.9 * column / COLUMNS, ROW * (rows - row - 0.5) / drawn.get_figheight())
-            drawn.text(*place_in_page, said, fontsize=SMALL, color=INK, va="center")
+            row, column = divmod(number, columns)
+            x, y = 0.4 + column * COLUMN, ROW * (rows - row - 0.5)
+            drawn.text(x / page, y / drawn.get_figheight(), said, fontsize=SMALL, color=INK, va="center")
         draw_section(axes, section)
         for loop, which in section.named("base"):
             axes.plot(*loop.along(which, np.linspace(0, 1, 60)).T, color=INK, lw=2.2, zorder=3)

@@ -1,5 +1,6 @@
 """The main job: solve one finger with several solvers and compare them."""
 
+import re
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -45,6 +46,7 @@ def command(
     from_: Annotated[Path | None, Parameter(name=OPTION)] = None,
     out: OptionalOutputPath = None,
     pictures: Annotated[str, Parameter(group=OUTPUT)] = "",
+    width: Annotated[str | None, Parameter(group=OUTPUT)] = None,
     resume: OutputFlag = False,
     json_: Annotated[bool, Parameter(name="--json", group=OUTPUT)] = False,
 ) -> int:
@@ -74,6 +76,8 @@ def command(
             run.json of an earlier run, which is repeated so; default: none.
         out: Output folder; default out/DESIGN.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
+        width: Width of the pictures, such as 85mm (a journal's column) or 180mm (its page), whose type has 8
+            to 9 points; default 140mm.
         resume: Reuse solutions that an earlier run finished.
         json_: Print metrics.json and nothing else.
     """
@@ -113,10 +117,11 @@ def command(
             out=out or Path("out") / design.name,
             resume=resume,
             picture_formats=comma_list(pictures),
+            picture_width=None if width is None else _millimetres(width),
             options=given_options(
                 *(finger, physics, options, film),
                 **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
-                **{"reference": reference, "pictures": pictures},
+                **{"reference": reference, "pictures": pictures, "width": width},
             ),
         )
         try:
@@ -152,6 +157,14 @@ def command(
         say(f"error: {evaluation.solver} did not converge{'' if told else f': {evaluation.message}'}")
     done = not (comparison.failed or comparison.unconverged) and tolerance_reached(comparison.adaptation)
     return 0 if done else NOT_CONVERGED
+
+
+def _millimetres(text: str) -> float:
+    """A width in mm from a number with or without its unit."""
+    given = re.fullmatch(r"(\d+(?:\.\d+)?) *(mm|cm|in)?", text.strip())
+    if given is None:
+        raise UserError(f"--width {text}: give a number in mm, cm or in, such as 85mm")
+    return float(given[1]) * {"cm": 10.0, "in": 25.4}.get(given[2], 1.0)
 
 
 def _truth(name: str | None, measurements: str | None) -> str:

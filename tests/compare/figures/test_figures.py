@@ -12,13 +12,15 @@ from PIL import Image
 from pinnray.comparison.evaluation.certifier import with_certificates
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.figures import FORMATS, draw_all
+from pinnray.comparison.figures import FORMATS, draw_all, page_width
 from pinnray.comparison.figures.fields import QUANTITIES, draw_field
 from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
 from pinnray.comparison.figures.overlay import overlay_extent
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.errors import UserError
 from pinnray.runtime.figure import DPI, WIDTH
 from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Estimated, IdentifiedForce
 from tests.compare.figures.drawn_pages import Page, page_of
 
 pytestmark = pytest.mark.slow
@@ -47,7 +49,9 @@ LIKE_OTHERS = ("strain_xx", "strain_yy", "strain_principal")
 @pytest.fixture(scope="module")
 def drawings(comparison: Results) -> dict[str, Illustration]:
     """The pictures of the comparison, of the fields two; no network of it has losses to draw."""
-    drawings = {name: draw(comparison) for name, (_, draw) in GALLERY.items() if name not in LIKE_OTHERS}
+    drawings = {
+        name: draw(comparison, WIDTH) for name, (_, draw) in GALLERY.items() if name not in LIKE_OTHERS
+    }
     return {name: drawing for name, drawing in drawings.items() if drawing is not None}
 
 
@@ -85,7 +89,7 @@ ALL = (*("overlay", "marker_errors", *FIELDS, "force_displacement", "design", "m
 
 def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawings, tmp_path, monkeypatch):
     """Each is as wide as a page, and not blank; progress goes from none to all."""
-    drawn = {name: (title, lambda _, name=name: drawings.get(name)) for name, (title, _) in GALLERY.items()}
+    drawn = {name: (title, lambda *_, name=name: drawings.get(name)) for name, (title, _) in GALLERY.items()}
     monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", drawn)
     said: list[float] = []
     pictures = draw_all(tmp_path, comparison, lambda done, _: said.append(done))
@@ -118,6 +122,32 @@ def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
     for name in ("overlay", "marker_errors", "von_mises"):
         page = page_of(draw(eight, name).figure)
         assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
+
+
+@pytest.mark.parametrize("width", [85.0, 180.0])
+def test_pictures_for_a_journal_have_its_width_and_type_that_fits(comparison, failed, pinn, width, compared):
+    """Nine solvers of long names, most of them not converged, on a column of a journal and on its page."""
+    record = {"epoch": np.arange(1.0, 4.0), "PDE": np.ones(3), "BC": np.ones(3), "ASM": np.ones(3)}
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(36.0, 35.0, 37.5))
+    told = replace(failed, in_sample=True, left_out=failed.marker_displacement, identified=force)
+    more = [replace(told, solver=f"pinn-id-long-{n}", history=record) for n in range(3)]
+    more += [replace(pinn, solver=f"pinn-long-{n}") for n in range(3)]
+    nine = compared(*comparison.evaluations, *more, observations=comparison.observations)
+    nine = replace(nine, design=nine.design.replaced(name="default-rib_count-6-height-110-t_rib-1.25"))
+    for name in GALLERY:
+        page = page_of(draw(nine, name, page=page_width(width)).figure)
+        assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
+        assert page.figure.get_figwidth() * 25.4 == pytest.approx(width)
+        assert page.figure.get_figheight() < 11
+        assert 7 <= page.smallest <= page.largest <= 9
+    with pytest.raises(UserError, match="80 to 200 mm"):
+        page_width(40.0)
+
+
+def test_a_picture_as_pdf_is_as_wide_as_it_was_asked_for(comparison, tmp_path):
+    path = draw(comparison, "design", page=page_width(85.0)).figure.save(tmp_path / "design.pdf")
+    box = re.search(rb"/MediaBox \[ *0 0 ([\d.]+) ", path.read_bytes())
+    assert float(box[1]) * 25.4 / 72 == pytest.approx(85.0, abs=0.01)
 
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors", *FIELDS])
