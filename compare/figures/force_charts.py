@@ -87,7 +87,7 @@ def draw_force_displacement(
         )
         whole.set_ylabel(f"force for {depth:g} mm of depth, N")
         whole.spines["right"].set(visible=True, color=INK)
-        legend_above(axes)
+        legend_above(axes, page)
     return drawn
 
 

@@ -111,10 +111,10 @@ def legend_height(labels: Sequence[str], width: float = WIDTH) -> float:
     return LEGEND_LINE * -(-len(labels) // legend_columns(labels, width))
 
 
-def legend_above(axes: Axes) -> None:
-    """A legend above axes, at their left end, on a narrow page at that of the page."""
+def legend_above(axes: Axes, page: float = WIDTH) -> None:
+    """A legend above axes, at their left end or that of a narrow page; pages have a width in inches."""
     handles, labels = axes.get_legend_handles_labels()
-    page, place = axes.get_figure(root=True).get_figwidth(), axes.get_position()
+    place = axes.get_position()
     left = 0.0 if page > NARROW else (0.012 - place.x0) / place.width
     axes.legend(
         handles,

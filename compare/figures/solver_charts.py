@@ -63,7 +63,7 @@ def draw_losses(comparison: Results, page: float = WIDTH) -> Figure | None:
             axes.set_ylabel(rf"$\mathcal{{L}}_\mathrm{{{term}}}$, {units[term]}")
             axes.grid()
             if row == 0:
-                legend_above(axes)
+                legend_above(axes, page)
             if row < len(terms) - 1:
                 axes.tick_params(labelbottom=False)
         axes.set_xlabel("epoch")
