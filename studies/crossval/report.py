@@ -6,14 +6,8 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from pinnray.comparison.figures.style import (
-    SOLVER_COLOURS,
-    axes_at,
-    legend_above,
-    legend_height,
-    solver_colour,
-    write_heading,
-)
+from pinnray.comparison.figures.layout import axes_at, legend_above, legend_height, write_heading
+from pinnray.comparison.figures.solver_colours import SOLVER_COLOURS, solver_colour
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.content_hash import file_digest
 from pinnray.runtime.figure import WIDTH, Figure, figure

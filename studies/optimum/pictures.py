@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 
-from pinnray.comparison.figures.style import HALO, axes_at, write_heading
+from pinnray.comparison.figures.layout import HALO, axes_at, write_heading
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
