@@ -102,7 +102,6 @@ class CrossvalStudy:
             each draw chooses; the observations say so.
         measurements: Marker displacements from elsewhere; None for the virtual experiment.
         processes: Solvers run at a time.
-        picture_formats: Formats of the pictures besides PNG.
     """
 
     design: Finger
@@ -119,7 +118,6 @@ class CrossvalStudy:
     frame: Registration = FIXED
     measurements: Observations | None = None
     processes: int = field(default_factory=cores)
-    picture_formats: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", mesh_sizes(self.design, self.mesh, SIZES))

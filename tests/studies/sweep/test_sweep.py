@@ -119,7 +119,8 @@ def test_the_tables_have_a_row_for_each_sample(swept: Path) -> None:
 
 def test_the_page_has_pictures_and_every_quantity(swept: Path) -> None:
     page = (swept / "out" / "sweep.html").read_text(encoding="utf-8")
-    assert page.count("<img alt=") == 1  # six samples are too few for sensitivities
+    assert page.count("<img alt=") == 1
+    assert "Which parameter matters" in page
     assert "6 of 6 samples of a Sobol sequence were run; 6 have a converged result" in page
     assert "compliance_across" in page
 
