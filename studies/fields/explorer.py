@@ -70,7 +70,7 @@ def write_explorer(emulator: FieldEmulator, path: Path) -> Path:
 def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
     """Everything that the browser needs, with arrays' places in the packed numbers."""
     study, mesh, reader = emulator.study, emulator.mesh, emulator.reader
-    middle = _middle(emulator)
+    middle = {name: round(value, 9) for name, value in study.middle.items()}
     material, load = emulator.inputs.physics(middle)
     unit = material.model_copy(update={"young": 1.0}).lame
     shape = emulator.inputs.parameters(middle)
@@ -184,8 +184,3 @@ def _parameter(name: str, values: Range, middle: Value) -> dict[str, Any]:
         "factor": name in ("young", "depth"),
         "shape": name not in PHYSICS,
     }
-
-
-def _middle(emulator: FieldEmulator) -> dict[str, Value]:
-    """The finger in the middle of the ranges."""
-    return {name: round(sum(values.ends) / 2, 9) for name, values in emulator.study.varied.items()}

@@ -85,9 +85,7 @@ class Task:
 def field_base(study: Study, definition: Mapping[str, Any]) -> dict[str, Any]:
     """The definition of the finger in the middle of a study's ranges, whose mesh follows all others."""
     shape = {name: value for name, value in study.fixed.items() if name in Parameters.model_fields}
-    middle = {
-        name: sum(values.ends) / 2 for name, values in study.varied.items() if name in Parameters.model_fields
-    }
+    middle = {name: value for name, value in study.middle.items() if name in Parameters.model_fields}
     return {**definition, **shape, **LEAST_MARKERS, **middle, "name": study.name}
 
 

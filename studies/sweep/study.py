@@ -44,14 +44,12 @@ class Range(CheckedModel):
         low: Smallest value (`from` in the file).
         high: Largest value (`to`).
         step: Distance of the values, counted from `low`, such as that of a printer; None leaves any value.
-        count: Number of values on a grid, evenly spaced; None on no grid.
         values: The choices instead.
     """
 
     low: float | None = Field(default=None, alias="from")
     high: float | None = Field(default=None, alias="to")
     step: float | None = Field(default=None, gt=0)
-    count: int | None = bounded(None, 2, MOST, "", "", "Number of values on a grid")
     values: tuple[Value, ...] | None = Field(default=None, min_length=1)
 
     @property
@@ -64,7 +62,7 @@ class Range(CheckedModel):
     def _one_kind(self) -> Self:
         ends = (self.low, self.high)
         if self.values is not None:
-            if ends != (None, None) or self.count is not None or self.step is not None:
+            if ends != (None, None) or self.step is not None:
                 raise ValueError("give either values, or from and to")
             if len(set(map(repr, self.values))) < len(self.values):
                 raise ValueError("a value is given twice")
@@ -111,6 +109,20 @@ class Study(CheckedModel):
     seed: int = bounded(0, 0, 2**32 - 1, "", "", "Seed of the samples")
     fixed: dict[str, Value] = Field(default_factory=dict)
     varied: dict[str, Range]
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """The one in a TOML file.
+
+        Raises:
+            UserError: If it cannot be read, or something in it is wrong.
+        """
+        kind = cls.__name__.lower()
+        content = read_toml(path, kind)
+        try:
+            return cls(**{"name": path.stem, **content})
+        except UserError as error:
+            raise UserError(f"{kind} {path}: {error}") from None
 
     @model_validator(mode="before")
     @classmethod
@@ -164,6 +176,11 @@ class Study(CheckedModel):
             )
 
     @property
+    def middle(self) -> dict[str, float]:
+        """The middle of every range of numbers."""
+        return {name: sum(each.ends) / 2 for name, each in self.varied.items() if each.low is not None}
+
+    @property
     def settings_alone(self) -> bool:
         """Whether only settings of the solver are varied."""
         return len(self.settings_of(self.varied)) == len(self.varied)
@@ -179,19 +196,6 @@ class Study(CheckedModel):
         if Traits.of(solver).assimilates:
             raise UserError(f"solver {self.solver} needs measured markers, which a study does not have")
         return solver
-
-
-def load_study(path: Path) -> Study:
-    """The study in a TOML file.
-
-    Raises:
-        UserError: If it cannot be read, or something in it is wrong.
-    """
-    content = read_toml(path, "study")
-    try:
-        return Study(**{"name": path.stem, **content})
-    except UserError as error:
-        raise UserError(f"study {path}: {error}") from None
 
 
 def physics_of(values: Mapping[str, Any]) -> tuple[Material, Load]:
@@ -254,12 +258,8 @@ def _check_range(name: str, values: Range, sampling: str) -> None:
                 raise ValueError(
                     f"{name} = {end:g} is outside its range, {low:g} to {high:g} {unit_of(name)}"
                 )
-        if sampling == "grid" and not (values.count or values.step or name in WHOLE):
-            raise ValueError(f"{name}: a grid needs the number of values, such as count = 5")
-        if sampling != "grid" and values.count is not None:
-            raise ValueError(f"{name}: count belongs to sampling = 'grid'")
-        if sampling == "grid" and values.step is not None and values.count is not None:
-            raise ValueError(f"{name}: give either count or step")
+        if sampling == "grid" and not (values.step or name in WHOLE):
+            raise ValueError(f"{name}: a grid needs the distance of the values, such as step = 5")
         numbers = (values.low or 0, values.high or 0, values.step or 1)
         if name in WHOLE and not all(float(number).is_integer() for number in numbers):
             raise ValueError(f"{name} is a whole number; give whole ends and steps")

@@ -29,8 +29,7 @@ from pinnray.studies.crossval.cross_validation import cross_validate
 from pinnray.studies.crossval.folds import ONE
 from pinnray.studies.crossval.scores import HELD_OUT, SCORED
 from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant, solver_variants
-from pinnray.studies.sweep.store import opened
-from pinnray.studies.sweep.sweep import JOURNAL
+from pinnray.studies.sweep.store import JOURNAL, opened
 from pinnray.vision.measurements import write_measurements
 from tests.solvers.conftest import observed_at
 from tests.studies.crossval.conftest import NOISE

@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.pictures import SHOWN, draw_maps, draw_pairs
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.study import Range, Study, load_study
+from pinnray.studies.sweep.study import Range, Study
 from pinnray.studies.sweep.sweep import Sweep
 from pinnray.studies.sweep.tables import correlation_grid
 from tests.compare.figures.drawn_pages import page_of
@@ -18,7 +18,7 @@ from tests.studies.sweep.test_sweep import study_file
 
 def swept(folder: Path, count: int) -> Sweep:
     """A sweep of so many fingers with made-up numbers."""
-    study = load_study(study_file(folder, count))
+    study = Study.load(study_file(folder, count))
     drawn = samples(study)
     found = [Measurement(n, "done", "fine", 0.1, dict.fromkeys(SHOWN, 1.0 + n)) for n in range(len(drawn))]
     return Sweep(study, drawn, found)

@@ -20,9 +20,9 @@ from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement, measured
 from pinnray.studies.sweep.quantities import quantities
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.store import opened
-from pinnray.studies.sweep.study import load_study
-from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
+from pinnray.studies.sweep.store import JOURNAL, opened
+from pinnray.studies.sweep.study import Study
+from pinnray.studies.sweep.sweep import Sweep, load_sweep, run_sweep
 from pinnray.studies.sweep.tables import failure_grid, sample_table
 from tests.conftest import inline
 from tests.studies.sweep.workers import answered, die_at_one, hang_at_one
@@ -57,7 +57,7 @@ def test_a_sample_is_kept_once(tmp_path: Path) -> None:
 
 
 def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
-    study = load_study(study_file(tmp_path, 1))
+    study = Study.load(study_file(tmp_path, 1))
     job = StudyJob(study, tmp_path, tmp_path / "out")
     refused = measured(job.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
     assert (refused.state, refused.values) == ("refused", {})
@@ -87,7 +87,7 @@ def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("pinnray.studies.sweep.measurement.quantities", without_stress)
     sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
     found = measured(
-        StudyJob(load_study(study_file(tmp_path, 1)), tmp_path, tmp_path / "out").task(1, sample)
+        StudyJob(Study.load(study_file(tmp_path, 1)), tmp_path, tmp_path / "out").task(1, sample)
     )
     assert (found.state, found.message.partition(";")[0]) == ("not converged", "von_mises cannot be computed")
 
@@ -129,7 +129,7 @@ def test_a_second_start_goes_on_and_does_nothing_twice(swept, tmp_path, in_line)
     out = tmp_path / "out"
     shutil.copytree(swept / "out", out)
     before = load_sweep(out).measurements
-    study = load_study(study_file(tmp_path, 8))
+    study = Study.load(study_file(tmp_path, 8))
     study = study.model_copy(update={"name": "ribs"})
     after = run_sweep(StudyJob(study, tmp_path, out, 1)).measurements
     assert after[:6] == before
@@ -141,7 +141,7 @@ def test_another_name_or_marker_does_the_same_study(swept: Path, tmp_path: Path)
     """Nothing of a result depends on them."""
     out = tmp_path / "out"
     shutil.copytree(swept / "out", out)
-    study = load_study(study_file(tmp_path, 6))
+    study = Study.load(study_file(tmp_path, 6))
     fixed = {**study.fixed, "marker_diameter": 0.3, "marker_height": 0.2}
     study = study.model_copy(update={"name": "renamed", "fixed": fixed, "time_limit": 100.0})
     after = run_sweep(StudyJob(study, tmp_path, out, 1)).measurements
@@ -164,7 +164,7 @@ def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     monkeypatch.setattr("pinnray.studies.sweep.sweep.sampled", ending)
     monkeypatch.setattr("pinnray.studies.sweep.sweep.GRACE_S", 1.0)
     monkeypatch.setattr("pinnray.studies.sweep.sweep.DEATHS", 2)
-    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
+    study = Study.load(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
     sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", state, "done"]
     assert [(row[0], row[2]) for row in failure_grid(sweep).rows] == [(state, said)]
@@ -216,7 +216,7 @@ def test_drawings_are_samples_too(tmp_path: Path) -> None:
         "depth = {values = [10.0, 20.0]}\n",
         encoding="utf-8",
     )
-    study = load_study(path)
+    study = Study.load(path)
     job = StudyJob(study, tmp_path, tmp_path / "out")
     found = [measured(job.task(number, sample)) for number, sample in enumerate(samples(study))]
     assert [each.state for each in found] == ["done"] * 4

@@ -16,7 +16,7 @@ from pinnray.solvers.solver import TrainingDiverged
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import measured
 from pinnray.studies.sweep.quantities import training
-from pinnray.studies.sweep.study import load_study
+from pinnray.studies.sweep.study import Study
 from pinnray.studies.sweep.sweep import load_sweep
 
 STUDY = """
@@ -81,7 +81,7 @@ def test_a_run_without_a_solution_says_why(tmp_path, monkeypatch, error, state):
         raise error
 
     monkeypatch.setattr("pinnray.solvers.pinn.paper.solver.PaperPinnSolver.solve", refused)
-    job = StudyJob(load_study(study_file(tmp_path, "1.0")), tmp_path, tmp_path / "out")
+    job = StudyJob(Study.load(study_file(tmp_path, "1.0")), tmp_path, tmp_path / "out")
     ended = measured(job.task(0, {"pinn-std.learning_rate": 1e-2, "pinn-std.bc_weight": 1.0}))
     assert (ended.state, ended.message, ended.values) == (state, str(error), {})
 
