@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
@@ -46,7 +47,7 @@ def sweep(
     Args:
         study: The values of each parameter of finger, material or load that is varied: a list of them, or
             `{"from": LOW, "to": HIGH}` with `samples`; or the TOML file of a study, which says all the rest.
-        design: The finger from which they differ.
+        design: The finger from which they differ; of a drawn one only material and load can be varied.
         solver: Name of the solver.
         size: Largest element in walls and ribs, mm.
         samples: Number of samples between the ends of the ranges.
@@ -194,7 +195,7 @@ def _study(
             raise UserError(unknown_parameter(name, Parameters, Physics, besides=tuple(given)))
     if sampling is None:
         sampling = "grid" if all("values" in each for each in ranges.values()) else "sobol"
-    finger = design if isinstance(design, Design) else None
+    finger = design if isinstance(design, Design | DrawnFinger) else None
     if finger is None and not isinstance(design, str | Path):
         raise UserError(f"{design!r} is no design; give one that is made, the name of a preset or a file")
     named = {} if finger is not None else {"design": str(design)}

@@ -54,13 +54,13 @@ class Inputs:
         base: Parameters of the finger that the study does not vary.
 
     Raises:
-        UserError: If the study is of drawings.
+        UserError: If the study is of a drawing.
     """
 
     def __init__(self, study: Study, base: Mapping[str, Any]) -> None:
-        if "section" in {*study.fixed, *study.varied}:
+        if "section" in base:
             raise UserError(
-                f"the sweep {study.name} is of drawings, and an emulator needs the parameters of a design; "
+                f"the sweep {study.name} is of a drawing, and an emulator needs the parameters of a design; "
                 "sweep a design, or solve the drawing itself"
             )
         self.study = study

@@ -74,8 +74,6 @@ class Question(Study):
         for name in (*self.objectives, *self.constraints):
             if name not in QUANTITIES:
                 raise ValueError(f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}")
-        if "section" in {*self.fixed, *self.varied}:
-            raise ValueError("a drawing has no parameters to optimise; give a design")
         return self
 
     @property

@@ -24,9 +24,6 @@ from pinnray.solvers.solver import Solver, Traits
 PHYSICS = tuple(Physics.model_fields)
 """Parameters of material and load."""
 
-DRAWN = ("depth", "contact", "contact_width")
-"""Parameters of a drawing that a study can change."""
-
 WHOLE = tuple(name for name, field in Parameters.model_fields.items() if field.annotation is int)
 """Parameters of a design that are whole numbers."""
 
@@ -147,7 +144,7 @@ class Study(CheckedModel):
         settings = self.settings_of(self.varied)
         for name in (*self.fixed, *self.varied):
             if name.removeprefix(f"{self.solver}.") not in settings:
-                _check_name(name, drawn="section" in {*self.fixed, *self.varied})
+                _check_name(name)
         if both := sorted(self.fixed.keys() & self.varied.keys()):
             raise ValueError(f"{both[0]} is both fixed and varied; give it once")
         for name, values in self.varied.items():
@@ -235,14 +232,9 @@ def _range(name: str, entry: Any) -> Range:
         raise ValueError(f"varied.{name}: {error}") from None
 
 
-def _check_name(name: str, *, drawn: bool) -> None:
+def _check_name(name: str) -> None:
     """Refuse a parameter that the study cannot change."""
-    if name in PHYSICS or name == "section":
-        return
-    if drawn:
-        if name not in DRAWN:
-            raise ValueError(f"{name}: of a drawing a study changes {', '.join(DRAWN)}, material and load")
-    elif name not in Parameters.model_fields or name == "name":
+    if name not in (*PHYSICS, *Parameters.model_fields) or name == "name":
         hint = unknown_parameter(name, Parameters)
         raise ValueError(f"{hint}; of material and load there are {', '.join(PHYSICS)}")
 
@@ -250,7 +242,7 @@ def _check_name(name: str, *, drawn: bool) -> None:
 def _check_range(name: str, values: Range, sampling: str) -> None:
     """Refuse values that the parameter or the sampling does not have."""
     if values.values is None:
-        if name in ("plane", "law", "load", "slide", "section", "rib_reference", "marker_layout"):
+        if name in ("plane", "law", "load", "slide", "rib_reference", "marker_layout"):
             raise ValueError(f"{name} has no numbers between two others; give values = [...]")
         for end in () if "." in name else (values.low, values.high):
             low, high = parameter_limits(name)

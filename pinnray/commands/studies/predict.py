@@ -18,7 +18,7 @@ def command(sweep: Path, *, set: Repeated = ()) -> int:
     """Predict the quantities of a finger that a sweep did not solve, each with a 95 % interval.
 
     An emulator is fitted to the sweep's converged samples the first time, and again when there are more. It
-    takes numbers within their ranges and choices among those of the sweep; a sweep of drawings is refused.
+    takes numbers within their ranges and choices among those of the sweep; a sweep of a drawing is refused.
 
     Args:
         sweep: Folder of `pinnray sweep`.

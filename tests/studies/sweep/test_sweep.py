@@ -13,6 +13,7 @@ import pytest
 
 from pinnray.cli import main
 from pinnray.geometry.cache import cad_files
+from pinnray.geometry.drawing.load import finger_from_file
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.solution import Solution
@@ -206,20 +207,13 @@ def test_a_journal_of_others_removes_no_file(tmp_path: Path) -> None:
     assert mine.read_text() == "mine"
 
 
-def test_drawings_are_samples_too(tmp_path: Path) -> None:
-    for name, ribs in (("few", 2), ("many", 6)):
-        cad_files(Design(rib_count=ribs), tmp_path / name, formats=["dxf"])
-        (tmp_path / name / "section.dxf").rename(tmp_path / f"{name}.dxf")
-    path = tmp_path / "drawn.toml"
-    path.write_text(
-        'mesh_size = 2.0\nsampling = "grid"\n[varied]\nsection = {values = ["few.dxf", "many.dxf"]}\n'
-        "depth = {values = [10.0, 20.0]}\n",
-        encoding="utf-8",
-    )
-    study = Study.load(path)
-    job = StudyJob(study, tmp_path, tmp_path / "out")
-    found = [measured(job.task(number, sample)) for number, sample in enumerate(samples(study))]
-    assert [each.state for each in found] == ["done"] * 4
-    areas = [Design(rib_count=ribs).section.area for ribs in (2, 2, 6, 6)]
-    assert [each.values["area"] for each in found] == pytest.approx(areas, rel=1e-6)
-    assert found[1].values["force"] == pytest.approx(2 * found[0].values["force"], rel=1e-9)
+def test_material_and_load_of_a_drawn_finger_are_varied(tmp_path: Path) -> None:
+    cad_files(Design(), tmp_path, formats=["dxf"])
+    drawn = finger_from_file(tmp_path / "section.dxf")
+    study = Study(name="s", mesh_size=4.0, sampling="grid", varied={"young": {"values": [5.0, 10.0]}})
+    job = StudyJob(study, tmp_path, tmp_path / "out", finger=drawn)
+    soft, hard = (measured(job.task(number, sample)) for number, sample in enumerate(samples(study)))
+    assert soft.values["area"] == pytest.approx(Design().section.area, rel=1e-6)
+    assert hard.values["force"] == pytest.approx(2 * soft.values["force"], rel=1e-9)
+    with pytest.raises(UserError, match="of a drawn finger a study changes material and load, not depth"):
+        job.task(0, {"depth": 10.0})
