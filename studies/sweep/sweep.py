@@ -1,6 +1,6 @@
 """Run a study: every sample once, whatever happens to the workers or to the program."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -26,7 +26,7 @@ from pinnray.studies.sweep.study import Study, Value
 STUDY_FILE = "sweep.json"
 
 FEW = 5
-"""Samples that a remark names."""
+"""Samples that a remark or a row of a table names."""
 
 DEATHS = 8
 """Deaths of its worker after which a sample counts as failed, for any process may be killed by chance."""
@@ -63,9 +63,14 @@ class Sweep:
         for fault, advice in (*ADVICE.items(), (LOOKS_LIKE, "check the units of the study")):
             having = [each.number for each in self.measurements if fault in each.message]
             if having:
-                few = ", ".join(map(str, having[:FEW])) + (" ..." if having[FEW:] else "")
-                found.append(f"{len(having)} of {len(self.samples)} samples ({few}): {fault}; {advice}")
+                which = f"{len(having)} of {len(self.samples)} samples ({first_of(having)})"
+                found.append(f"{which}: {fault}; {advice}")
         return found
+
+
+def first_of(numbers: Sequence[int]) -> str:
+    """The first few numbers of samples."""
+    return ", ".join(map(str, numbers[:FEW])) + (" ..." if numbers[FEW:] else "")
 
 
 def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:

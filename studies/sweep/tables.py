@@ -14,10 +14,7 @@ from pinnray.solvers.finger_figures import QUANTITIES, Quantity, heading
 from pinnray.studies.sweep.quantities import TRAINING
 from pinnray.studies.sweep.sampling import places_of
 from pinnray.studies.sweep.study import title
-from pinnray.studies.sweep.sweep import Sweep
-
-FEW = 5
-"""Numbers of samples that the table of failures lists for a reason."""
+from pinnray.studies.sweep.sweep import Sweep, first_of
 
 
 def known_quantities(sweep: Sweep) -> dict[str, Quantity]:
@@ -88,8 +85,7 @@ def failure_grid(sweep: Sweep) -> TextTable:
             reasons.setdefault((each.state, _kind_of(each.message)), []).append(each.number)
     rows: list[tuple[str, ...]] = []
     for (state, reason), numbers in sorted(reasons.items(), key=lambda entry: -len(entry[1])):
-        few = ", ".join(map(str, numbers[:FEW])) + (" ..." if numbers[FEW:] else "")
-        rows.append((state, str(len(numbers)), reason, few))
+        rows.append((state, str(len(numbers)), reason, first_of(numbers)))
     headings = ("state", "samples", "reason", "numbers")
     return TextTable("Samples without a result", headings, rows, left=("state", "reason", "numbers"))
 
