@@ -164,12 +164,11 @@ class CrossvalStudy:
 
     def check(self) -> None:
         """Raise a `UserError` for a study that cannot be done, before anything is computed."""
-        if self.layouts and self.measurements:
-            raise UserError("layouts: markers that were measured are where they are; name no layouts")
-        if not self.frame.fixed and self.measurements:
-            raise UserError("frame: the file of the measurements says how well their pictures are known")
-        if tuple(self.truths) != (SLIDING.name,) and self.measurements:
-            raise UserError("a truth is for a simulated experiment; with measurements name none")
+        simulated = self.layouts or not self.frame.fixed or tuple(self.truths) != (SLIDING.name,)
+        if simulated and self.measurements:
+            raise UserError(
+                "truths, layouts and frame are of a simulated experiment; with measurements name none"
+            )
         check_truths(self.truth_names, self.design)
         _check_distinct("layouts: a layout", self.layouts)
         for layout, points in self.markers.items():
