@@ -19,6 +19,7 @@ from pinnray.studies.emulator.inputs import WIDE
 from pinnray.studies.fields.emulator import FieldEmulator
 from pinnray.studies.fields.gaussian_processes import Block
 from pinnray.studies.fields.reader import FIGURES
+from pinnray.studies.sweep.job import LEAST_MARKERS
 from pinnray.studies.sweep.study import PHYSICS, Range, Value, unit_of
 
 STEP = 2e-5
@@ -26,7 +27,7 @@ STEP = 2e-5
 strain of 4 %."""
 
 LARGEST = 0.75
-"""Stress of the last colour over the root mean square of the samples' largest one: few walls reach it."""
+"""Least stress of the last colour over the root mean square of the samples' largest one."""
 
 TITLES = {
     "force": "Grip force",
@@ -74,6 +75,8 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
     material, load = emulator.inputs.physics(middle)
     unit = material.model_copy(update={"young": 1.0}).lame
     shape = emulator.inputs.parameters(middle)
+    own = {name: value for name, value in study.fixed.items() if name in Parameters.model_fields}
+    own |= LEAST_MARKERS if emulator.inputs.moves else {}  # those of the design may not fit thin walls
     lower = np.tril_indices(emulator.field.landmarks)
     return {
         "name": study.name,
@@ -93,9 +96,9 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
             "contact_position": shape.contact_abscissa,
             "friction": load.friction,
             "poisson": material.poisson,
-            **{name: value for name, value in study.fixed.items() if name in Parameters.model_fields},
+            **own,
         },
-        "shapeNames": [name for name in (*study.varied, *study.fixed) if name in Parameters.model_fields],
+        "shapeNames": [*(name for name in study.varied if name in Parameters.model_fields), *own],
         "baseYoung": emulator.young,
         "lame": [unit.λ, unit.μ],
         "figures": [
