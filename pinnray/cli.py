@@ -16,6 +16,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 And so the sums have one order, whatever the number of cores. Read when NumPy and PETSc are loaded.
 """
 
+QUIET = "--quiet"
+"""Taken by the program, whatever its command."""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry of `pinnray`."""
@@ -23,8 +26,12 @@ def main(arguments: list[str] | None = None) -> int:
     with ending_at_once():
         from pinnray.commands.app import pinnray
         from pinnray.commands.launch import launched
+    given = sys.argv[1:] if arguments is None else arguments
+    words = [word for word in given if word != QUIET]
     with interruptible():
-        return launched(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
+        return launched(
+            lambda: pinnray(words, exit_on_error=False, print_error=False), quiet=len(words) < len(given)
+        )
 
 
 def compare_main(arguments: list[str] | None = None) -> int:

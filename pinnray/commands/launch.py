@@ -5,8 +5,9 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
-from io import TextIOWrapper
+from contextlib import redirect_stdout, suppress
+from functools import partial
+from io import StringIO, TextIOWrapper
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, TextIO
@@ -16,19 +17,28 @@ from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
 
-EXIT_CODES = (
+EPILOGUE = (
     "Exit codes: 0 all well; 1 a fault of the program; 2 bad input, with one line that says what and how to "
     "mend it; 3 done, but a solver failed or did not converge, or --adapt did not reach its tolerance; "
-    "130 interrupted; 141 the output went into a pipe that nobody reads any more."
+    "130 interrupted; 141 the output went into a pipe that nobody reads any more. "
+    "Every command takes --quiet: no progress and no results, only warnings and errors."
 )
 
 
-def launched(command: Callable[[], Any]) -> int:
-    """Run a command and return its exit code."""
+def launched(command: Callable[[], Any], *, quiet: bool = False) -> int:
+    """Run a command, which shows only warnings and errors if it is quiet, and return its exit code."""
     _write_any_letter()
     _give_libraries_a_cache()
     _leave_signals_alone()
-    return guarded(command)
+    return guarded(partial(_quietly, command) if quiet else command)
+
+
+def _quietly(command: Callable[[], Any]) -> Any:
+    """Run a command without its progress and its output."""
+    from pinnray.runtime.stages import quiet_stages
+
+    with redirect_stdout(StringIO()), quiet_stages():
+        return command()
 
 
 def guarded(command: Callable[[], Any]) -> int:

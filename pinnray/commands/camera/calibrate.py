@@ -5,7 +5,6 @@ from typing import Literal
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import Flag, OutputPath, Repeated
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
@@ -14,7 +13,6 @@ from pinnray.runtime.machine import package_versions
 VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
 
 
-@quietable
 def command(
     *images: Path,
     board: str,

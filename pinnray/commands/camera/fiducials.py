@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath
 from pinnray.runtime.exits import say
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),

@@ -4,12 +4,10 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pinnray.commands.camera.pick import read_numbers
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath
 from pinnray.runtime.errors import UserError
 
 
-@quietable
 def command(
     rest: Path,
     pressed: Path,

@@ -8,7 +8,6 @@ from cyclopts import Group, Parameter
 from rich.console import Console
 from rich.live import Live
 
-from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
 from pinnray.options.shared import FilmOptions, FingerOptions, Flag, OutputFlag, OutputPath
 from pinnray.runtime.errors import UserError
@@ -18,7 +17,6 @@ from pinnray.solvers.physics import Material
 FORCE = Group("Force", sort_key=5)
 
 
-@quietable
 def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     *,

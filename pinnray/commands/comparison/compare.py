@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
 from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
 from pinnray.options.shared import (
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from pinnray.film.measured_film import MeasuredFilm
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),

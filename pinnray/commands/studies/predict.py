@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OptionalOutputPath, Repeated, existing
 from pinnray.runtime.errors import UserError
 
@@ -15,7 +14,6 @@ if TYPE_CHECKING:
     from pinnray.studies.emulator.emulator import Emulator, Predictions
 
 
-@quietable
 def command(
     sweep: Path,
     *,
