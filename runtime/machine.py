@@ -55,11 +55,6 @@ def free_memory_gb() -> float:
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
 
 
-def peak_memory_gb(usage: resource.struct_rusage) -> float:
-    """Largest memory that a process ever had, GB; on Linux the parent's counts until a process takes more."""
-    return usage.ru_maxrss * 1024 / 1e9
-
-
 def limit_memory(more_gb: float) -> None:
     """Let this process take so much more memory, GB, and no more: then it runs out without its neighbours.
 
