@@ -61,6 +61,7 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
     """
     out = out.resolve()
     partial, previous = out.with_name(f"{out.name}.partial"), out.with_name(f".{out.name}.pinnray-previous")
+    missing = [folder for folder in partial.parents if not folder.exists()]
     try:
         partial.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -83,6 +84,8 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
                 with suppress(OSError):
                     _clear(partial, keep=())
                     shutil.rmtree(partial)  # the mark goes last, so that what a kill leaves is known
+                    for folder in missing:
+                        folder.rmdir()
             raise
         _take_place(partial, out, previous)
 
