@@ -1,6 +1,5 @@
 """Cache of meshes and CAD files, keyed by a hash of everything they depend on."""
 
-import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from pinnray.runtime.atomic import write_arrays, write_bytes
 from pinnray.runtime.cache import Result, cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_version
 from pinnray.runtime.processes.worker import Task, run_task
 
 TIMEOUT_S = 300.0
@@ -136,7 +136,7 @@ def cad_files(
 
 def cache_key(digest: str, asked: object) -> str:
     """SHA-256 over the digest of a finger or file, what is asked, package versions and the sources."""
-    versions = {package: _version(package) for package in MAKERS}
+    versions = {package: package_version(package) for package in MAKERS}
     parts = {"content": digest, "asked": asked, "versions": versions, "sources": sources_digest(__name__)}
     return content_hash(parts)
 
@@ -192,10 +192,3 @@ def _load_files(path: Path) -> dict[str, bytes]:
         if any(Path(name).name != name for name in archive.files):
             raise ValueError("a file of another folder")
         return {name: archive[name].tobytes() for name in archive.files}
-
-
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "unknown"

@@ -16,15 +16,15 @@ PACKAGES = (
 
 def package_versions() -> dict[str, str]:
     """Versions of all packages that affect the numbers or pictures."""
-    return {"python": platform.python_version()} | {package: _version(package) for package in PACKAGES}
+    return {"python": platform.python_version()} | {package: package_version(package) for package in PACKAGES}
 
 
 def program_version() -> str:
     """Version of pinn-ray, as it is installed."""
-    return _version("pinn-ray")
+    return package_version("pinn-ray")
 
 
-def _version(package: str) -> str:
+def package_version(package: str) -> str:
     """Version of a package; that of its module where it is not installed by pip."""
     try:
         return _installed_version(package)

@@ -234,6 +234,8 @@ class SolverOptions(CheckedModel):
                 raise UserError(
                     f"{text!r} is for {target!r}, which is not among the solvers {', '.join(names)}"
                 )
+            if key in given[target]:
+                raise UserError(f"{target}.{key} is set twice; set it once")
             given[target][key] = value
         return given
 

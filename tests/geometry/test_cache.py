@@ -78,7 +78,7 @@ def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPa
         return cache_key((design or Design()).digest, MeshSettings(**settings).model_dump())
 
     keys = {key(), key(Design(rib_angle=19)), key(size=0.3), key(corner_size=0.1)}
-    monkeypatch.setattr("pinnray.geometry.cache._version", lambda package: "0")
+    monkeypatch.setattr("pinnray.geometry.cache.package_version", lambda package: "0")
     keys.add(key())
     assert len(keys) == 5
     assert key(Design(name="x")) in keys
