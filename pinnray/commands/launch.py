@@ -8,12 +8,11 @@ from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
 from functools import partial
 from io import StringIO, TextIOWrapper
-from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any, TextIO
 
 from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 
+from pinnray.runtime.cache import share_cache
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
 
@@ -24,13 +23,22 @@ EPILOGUE = (
     "Every command takes --quiet: no progress and no results, only warnings and errors."
 )
 
+SIZES = range(20, 1001)
+"""Columns and lines that a terminal may have."""
+
 
 def launched(command: Callable[[], Any], *, quiet: bool = False) -> int:
     """Run a command, which shows only warnings and errors if it is quiet, and return its exit code."""
     _write_any_letter()
-    _give_libraries_a_cache()
+    _drop_impossible_sizes()
     _leave_signals_alone()
-    return guarded(partial(_quietly, command) if quiet else command)
+    return guarded(partial(_quietly if quiet else _loudly, command))
+
+
+def _loudly(command: Callable[[], Any]) -> Any:
+    """Run a command."""
+    share_cache()
+    return command()
 
 
 def _quietly(command: Callable[[], Any]) -> Any:
@@ -38,7 +46,7 @@ def _quietly(command: Callable[[], Any]) -> Any:
     from pinnray.runtime.stages import quiet_stages
 
     with redirect_stdout(StringIO()), quiet_stages():
-        return command()
+        return _loudly(command)
 
 
 def guarded(command: Callable[[], Any]) -> int:
@@ -112,18 +120,12 @@ def _write_any_letter() -> None:
             stream.reconfigure(errors="replace")
 
 
-def _give_libraries_a_cache() -> None:
-    """Let DOLFINx and matplotlib keep their files in `PINNRAY_CACHE` where the home cannot be written."""
-    cache, home = os.environ.get("PINNRAY_CACHE"), Path("~/.cache").expanduser()
-    if cache is None or "XDG_CACHE_HOME" in os.environ:
-        return
-    try:
-        home.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=home):
-            pass
-    except OSError:
-        os.environ["XDG_CACHE_HOME"] = cache
-        os.environ.setdefault("MPLCONFIGDIR", str(Path(cache) / "matplotlib"))
+def _drop_impossible_sizes() -> None:
+    """Forget a width or height of the terminal that none has, as COLUMNS=0 of `docker exec` and editors."""
+    for name in ("COLUMNS", "LINES"):
+        given = os.environ.get(name, "")
+        if not (given.isdecimal() and int(given) in SIZES):
+            os.environ.pop(name, None)
 
 
 def _leave_signals_alone() -> None:

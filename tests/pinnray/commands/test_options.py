@@ -53,6 +53,13 @@ def test_a_shell_completes_commands_and_options(tmp_path):
     assert all(word in text for word in (*NAMES, "--mesh-size", "--seed"))
 
 
+@pytest.mark.parametrize("columns", ["0", "-1", "1", "²", "1" * 9, ""])
+def test_a_width_that_no_terminal_has_does_not_count(columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", columns)
+    assert main(["design", "--help"]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) == 80
+
+
 def test_a_preset_and_a_material_give_what_no_option_gives() -> None:
     options = PhysicsOptions(material="tpu-95a", poisson=0.4)
     assert options.values("paper") == {"load": "point", "young": 26.0, "poisson": 0.4}
