@@ -25,6 +25,8 @@ SCHEMA = 1
 """Version of the form of `run.json`."""
 MARK = ".pinnray-unfinished"
 """File in a folder that a run works in or removes; another folder is never replaced."""
+WITHOUT_NUMBERS = ("pictures", "width", "yes")
+"""Options of a run that change no number."""
 SOLUTIONS = "solutions"
 TRAINING = "training"
 
@@ -45,6 +47,27 @@ def check_output(out: Path) -> None:
         raise UserError(
             f"{out} holds {foreign}, which no {RUN_FILE} there lists and which would be lost; move it, or "
             "name another output folder"
+        )
+
+
+def check_same_job(out: Path, options: Mapping[str, Any], usual: Mapping[str, Any]) -> None:
+    """Refuse a folder that holds the finished run of other options, where nobody has asked for that folder.
+
+    Args:
+        out: The folder.
+        options: Those of this run, by their names, as `run.json` has them.
+        usual: Values of those that are not given.
+
+    Raises:
+        UserError: With the options that differ.
+    """
+    before = {**usual, **_provenance(out).get("options", {})}
+    now = {**usual, **to_jsonable_python(options)}
+    names = sorted(name for name in before | now if before.get(name) != now.get(name))
+    if _written(out) and (names := [name for name in names if name not in WITHOUT_NUMBERS]):
+        raise UserError(
+            f"{out} holds the finished run of another job (other {', '.join(names)}); give --out with "
+            f"another folder, or --out {out} to replace it"
         )
 
 
@@ -134,10 +157,17 @@ def _take_place(partial: Path, out: Path, previous: Path) -> None:
 
 def _written(out: Path) -> set[str]:
     """The files that `run.json` lists, and itself; none if it is missing or damaged."""
+    files = _provenance(out).get("files_sha256")
+    return {RUN_FILE, *files} if isinstance(files, dict) else set()
+
+
+def _provenance(out: Path) -> dict[str, Any]:
+    """The content of `run.json`; nothing if it is missing or damaged."""
     try:
-        return {RUN_FILE, *json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["files_sha256"]}
-    except (OSError, ValueError, LookupError, TypeError):
-        return set()
+        content = json.loads((out / RUN_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
 def _is_whole(folder: Path) -> bool:

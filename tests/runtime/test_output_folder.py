@@ -13,6 +13,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.output_folder import (
     MARK,
     check_output,
+    check_same_job,
     locked,
     replaced_folder,
     take_training,
@@ -198,6 +199,17 @@ def test_the_folder_that_one_stands_in_is_not_pulled_away(out, monkeypatch, insi
     monkeypatch.chdir(out / inside)
     with pytest.raises(UserError, match="cannot run inside it"):
         check_output(out)
+
+
+def test_the_finished_run_of_another_job_is_not_replaced_unasked(out):
+    content = json.loads((out / "run.json").read_text())
+    (out / "run.json").write_text(json.dumps(content | {"options": {"stroke": 5.0, "set": ["N=4"]}}))
+    usual = {"design": "default", "set": []}
+    check_same_job(out, {"stroke": 5.0, "set": ("N=4",), "pictures": "pdf", "design": "default"}, usual)
+    check_same_job(out.with_name("absent"), {"stroke": 6.0}, usual)
+    for other, said in [({"stroke": 5.0}, "set"), ({"set": ["N=4"], "truth": "stvk"}, "stroke, truth")]:
+        with pytest.raises(UserError, match=rf"finished run of another job \(other {said}\); .*--out .*run "):
+            check_same_job(out, other, usual)
 
 
 class Killed(BaseException):

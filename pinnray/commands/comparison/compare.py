@@ -8,7 +8,14 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from pinnray.film.film import FilmSettings
-from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
+from pinnray.options.file import (
+    OPTION,
+    given_options,
+    note_inputs,
+    note_versions,
+    read_options_file,
+    usual_options,
+)
 from pinnray.options.shared import (
     OUTPUT,
     Adapt,
@@ -70,7 +77,7 @@ def command(
         reference: Solver that the others are compared with; default fem, else the first.
         from_: File with options that the command line leaves out: TOML or JSON with a table `options`, or the
             run.json of an earlier run, which is repeated so; default: none.
-        out: Output folder; default out/DESIGN.
+        out: Output folder; default out/DESIGN, unless that holds the finished run of another job.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         resume: Reuse solutions that an earlier run finished.
         json_: Print metrics.json and nothing else.
@@ -82,7 +89,7 @@ def command(
     from pinnray.comparison.report.tables import body_table, marker_table
     from pinnray.options.preset_jobs import job_defaults
     from pinnray.options.solver_choice import spare_solvers
-    from pinnray.runtime.output_folder import RUN_FILE
+    from pinnray.runtime.output_folder import RUN_FILE, check_same_job
     from pinnray.runtime.stages import Stages
 
     earlier = read_options_file(from_) if from_ else None
@@ -117,6 +124,8 @@ def command(
                 **{"reference": reference, "pictures": pictures},
             ),
         )
+        if out is None and not resume:
+            check_same_job(job.out, job.options, usual_options(finger, physics, options, film))
         try:
             with Stages(Console(stderr=True), quiet=json_) as stages:
                 comparison = run(job, stages, pool)
