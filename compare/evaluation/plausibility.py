@@ -10,7 +10,6 @@ from pinnray.geometry.observations import Observations
 from pinnray.geometry.section.thickness import wall_thickness
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import OutsideBodyError, UserError
-from pinnray.solvers.identification.contradiction import MUCH_NEARER, likely_order, order_words
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import MissingLibraryError, make_solver
 from pinnray.solvers.solver import NONE_SEEN
@@ -109,13 +108,6 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
         )
     if not moved.any():
         return [*remarks, "the measurements say that no marker moved"]
-    found = likeliest_order(points, points + moved)
-    if found.gain:
-        names = [str(number) for number in np.flatnonzero(seen) + 1]
-        remarks.append(
-            f"the markers' pressed places look mixed up: {order_text(found.order, names)} their "
-            "displacements would be smooth; see in which order they were clicked"
-        )
     try:
         expected = _expected(problem, points)
     except MissingLibraryError as error:
@@ -123,7 +115,9 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
     stroke = float(np.abs(problem.load.values).max())
     if float(np.sqrt((expected**2).sum(axis=1).mean())) < SMALL * stroke:
         return remarks
-    return [*remarks, *_compared(moved, expected, stroke, np.flatnonzero(seen) + 1, apart=apart)]
+    numbers = np.flatnonzero(seen) + 1
+    remarks += _compared(moved, expected, stroke, numbers, apart=apart)
+    return remarks + (_order_remarks(points, moved, expected, numbers) if apart else [])
 
 
 def _compared(
@@ -159,12 +153,23 @@ def _compared(
         )
     elif turned:
         remarks.append(f"u goes against that of fem; {CONVENTION}")
-    if apart and not turned and (order := likely_order(moved, expected, MUCH_NEARER)) is not None:
-        remarks.append(
-            f"the markers' displacements are much nearer to those of fem {order_words(order, numbers)}; see "
-            "how they are numbered"
-        )
     return remarks
+
+
+def _order_remarks(
+    points: FloatArray, moved: FloatArray, expected: FloatArray, numbers: IntArray
+) -> list[str]:
+    """A remark on markers whose displacements or pressed places much likelier are in another order."""
+    like = expected * float(np.linalg.norm(moved) / np.linalg.norm(expected))
+    found = {
+        "displacements": likeliest_order(points, moved, expected=like),
+        "pressed places": likeliest_order(points, points + moved, expected=points + like),
+    }
+    mixed = max(found, key=lambda each: found[each].gain)
+    if not found[mixed].gain:
+        return []
+    text = order_text(found[mixed].order, [str(number) for number in numbers])
+    return [f"the markers' {mixed} look mixed up: much likelier they are {text}; see how they are numbered"]
 
 
 def _expected(problem: Problem, points: FloatArray) -> FloatArray:
