@@ -143,7 +143,7 @@ def film_forces(
         with stages.stage("mesh"):
             mesh = finger_mesh(finger, settings=mesh_sizes(finger, usual=MESH))
         with stages.stage("force") as report:
-            tracker = force_tracker(mesh, elastic, seen.points, finger.marker_radius)
+            tracker = force_tracker(mesh, finger, elastic, seen.points)
             forces = forces_of(tracking, tracker, report)
     return pd.DataFrame([force_row(force, finger.depth) for force in forces]).fillna(np.nan)
 

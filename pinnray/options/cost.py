@@ -14,9 +14,6 @@ from pinnray.solvers.solver import Cost, Solver, Traits
 MESH, EXPERIMENT = Cost(per_triangle=40), Cost(per_triangle=300)
 """Time of making the mesh, and of a virtual experiment on it."""
 
-KILOBYTES = 30
-"""Largest memory of a run per triangle, from the same run; factors and error estimates take most of it."""
-
 MAX_SECONDS = 300.0
 """Time that needs no consent."""
 
@@ -46,8 +43,9 @@ class MeshCost:
 
     @property
     def memory_gb(self) -> float:
-        """Memory, GB, of the solvers."""
-        return 1e-6 * self.triangles * KILOBYTES if self.solvers or self.simulated else 0.0
+        """Memory, GB, of the solver that takes most."""
+        costs = [*[EXPERIMENT] * self.simulated, *(Traits.of(each).cost for each in self.solvers)]
+        return 1e-6 * self.triangles * max((cost.kilobytes for cost in costs), default=0.0)
 
     def fits(self, free_gb: float) -> bool:
         """Whether it needs no consent."""

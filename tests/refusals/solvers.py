@@ -23,7 +23,6 @@ from pinnray.solvers.elasticity import (
     stress_of,
 )
 from pinnray.solvers.fem.adaptive_refinement import adapted
-from pinnray.solvers.fem.solid import affordable
 from pinnray.solvers.finger_figures import figures_of
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.materials import TensileTest, fitted, preset, read_tensile_test

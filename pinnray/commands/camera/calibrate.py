@@ -35,7 +35,7 @@ def command(
         k3: Fit the third radial coefficient too.
         out: Camera file, .json.
     """
-    from pinnray.film.calibration_report import calibration_table, draw_calibration, view_table
+    from pinnray.film.calibration_report import calibration_table, draw_calibration
     from pinnray.vision.calibration.camera_calibration import calibrate_camera
     from pinnray.vision.calibration.camera_file import check_format, save_calibration
     from pinnray.vision.calibration.charuco import parse_board
@@ -48,17 +48,12 @@ def command(
     calibration = calibrate_camera(photographs(images), chosen, k3=k3)
     versions = package_versions()
     save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})
-    errors = calibration.view_errors
-    worst = max(errors, key=errors.__getitem__)
     picture = out.with_suffix(".png")
-    photograph = next(image for name, image in photographs(images) if name == worst)
-    draw_calibration(calibration, worst, photograph).save(picture)
+    draw_calibration(calibration).save(picture)
     for reason in dict.fromkeys(calibration.left_out.values()):
         names = [name for name, said in calibration.left_out.items() if said == reason]
         say(f"warning: left out {', '.join(names)}: {reason}")
-    console = Console()
-    console.print(calibration_table(calibration))
-    console.print(view_table(calibration))
+    Console().print(calibration_table(calibration))
     print(out)
     print(picture)
     return 0

@@ -76,3 +76,4 @@ def test_a_solver_says_what_it_costs_and_one_that_says_nothing_counts_as_fem():
     assert MeshCost(18_000, [Slow("slow")]).seconds - MeshCost(18_000).seconds == pytest.approx(18)
     assert Traits.of(Slow("slow")).cost.seconds(18_000) == pytest.approx(78)
     assert Traits.of(Ending("silent")).cost == Traits.of(make_solver("fem")).cost
+    assert not MeshCost(18_000, [make_solver("fem"), make_solver("fem-3d")]).fits(8.0)
