@@ -150,7 +150,7 @@ def solve(
     status, faults = DeformedBody(problem.mesh).status(solution)
     for remark in [*status.warnings, *remarks, *faults]:
         warnings.warn(remark, stacklevel=2)
-    return Solution.of(replace(solution, status=status))
+    return Solution.of(solution, status=status)
 
 
 def compare(

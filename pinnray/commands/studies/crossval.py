@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.text import Text
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -27,7 +26,6 @@ TEXTS = ("solver", "held out")
 """Headings of columns of words."""
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
