@@ -147,9 +147,8 @@ def _across(solid: cq.Solid) -> tuple[cq.Shape, Cut]:
             if abs(sum(face.Area() for face in cap) - cut.area) < 1e-7 * cut.area:
                 cut = cut._replace(faces=cap, offset=offset)
                 break
-        if _apart(turned, cut) <= SAME:
-            return turned, cut
-        found.append((round(abs(layer.volume / solid.Volume() - 1), 1), turned, cut))
+        apart, shown = _apart(turned, cut), abs(layer.volume / solid.Volume() - 1)
+        found.append((round(apart, 9) if apart <= SAME else 1 + round(shown, 1), turned, cut))
     if not found:
         raise UserError('the solid has no flat face; give depth, and the plane, such as plane = "z = 6"')
     _, turned, cut = min(found, key=lambda each: each[0])
