@@ -148,7 +148,7 @@ def _across(solid: cq.Solid) -> tuple[cq.Shape, Cut]:
                 cut = cut._replace(faces=cap, offset=offset)
                 break
         apart, shown = _apart(turned, cut), abs(layer.volume / solid.Volume() - 1)
-        found.append((round(apart, 9) if apart <= SAME else 1 + round(shown, 1), turned, cut))
+        found.append((round(apart, 7) if apart <= SAME else 1 + round(shown, 1), turned, cut))
     if not found:
         raise UserError('the solid has no flat face; give depth, and the plane, such as plane = "z = 6"')
     _, turned, cut = min(found, key=lambda each: each[0])
