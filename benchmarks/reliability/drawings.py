@@ -263,8 +263,9 @@ def outcome(path: Path, expected: Sketch, truth: Truth) -> tuple[str, str]:
         volume = found.area * (drawing.depth or 0.0)
         if truth.volume and abs(volume / truth.volume - 1) > LEFT_OUT:
             return "wrong", f"{volume:.6g} for {truth.volume:.6g} mm3; {drawing.note}"
-        if truth.volume and not len(expected.markers) and abs(volume / truth.volume - 1) < SAME:
-            return "read", said  # also across another direction, or with a hole
+        exact = abs(volume / truth.volume - 1) < SAME if truth.volume else False
+        if not len(expected.markers) and (exact or abs((drawing.depth or DEPTH) - DEPTH) > 0.01):
+            return "read", said  # with a hole, or across another direction, as of a bar
         if fault := _difference(found.area, drawing.markers, expected, truth.gap):
             return "wrong", f"{fault}; {drawing.note}"
         return ("read as proposed" if said else "read"), said
