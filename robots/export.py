@@ -140,8 +140,8 @@ def _gripper(pressed: PressedFinger, model: str) -> str:
     closed = min(stroke, 0.9 * pressed.radius)
     said = [
         f"Two fingers of {model}.xml around a free cylinder as dense as water, with MuJoCo's friction of 1.",
-        f"Controls left and right close them: 0 is open, {MM * (closed + CLEARANCE):g} is {closed:g} mm beyond "
-        "the touch.",
+        f"Controls left and right close them, from 0 to {MM * (closed + CLEARANCE):g}: {closed:g} mm beyond the "
+        "first touch.",
         "A time step above 1 ms makes the fingers unstable.",
     ]
     scene = gripper_mjcf("gripper", f"{model}.xml", place, pressed.radius, mesh.depth, closed)
@@ -160,8 +160,8 @@ def _header(pressed: PressedFinger, fit: str, settings: ExportSettings) -> Seque
         f"stroke of {stroke:g} mm, beyond which it is not known.",
         f"Plane strain: a force is N/mm times the depth of {problem.mesh.depth:g} mm. Gravity is off.",
         f"Damping is not fitted: a loss factor of {settings.loss_factor:g} is stated.",
-        "Attached to another model, whose time step holds, give that one at most 1 ms: MuJoCo's 2 ms make the "
-        "finger unstable.",
+        "Attached to another model, whose time step holds, give that one at most 1 ms: MuJoCo's 2 ms make it "
+        "unstable.",
     ]
 
 
