@@ -140,8 +140,8 @@ def _gripper(pressed: PressedFinger, model: str) -> str:
     closed = min(stroke, 0.9 * pressed.radius)
     said = [
         f"Two fingers of {model}.xml around a free cylinder as dense as water, with MuJoCo's friction of 1.",
-        f"Controls left and right close them, from 0 to {MM * (closed + CLEARANCE):g}: {closed:g} mm beyond the "
-        "first touch.",
+        f"Controls left and right close them: from 0 to {MM * (closed + CLEARANCE):g}, {closed:g} mm beyond "
+        "the first touch.",
         "A time step above 1 ms makes the fingers unstable.",
     ]
     scene = gripper_mjcf("gripper", f"{model}.xml", place, pressed.radius, mesh.depth, closed)

@@ -12,7 +12,7 @@ import cadquery as cq
 import numpy as np
 
 from pinnray.geometry.drawing.formats.closed_loops import closed_loops
-from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Scale
+from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, MarkerSize, Scale
 from pinnray.geometry.drawing.formats.pieces import Piece, arcs_along, line
 from pinnray.geometry.drawing.formats.planes import axes_across, plane_of, plane_text
 from pinnray.geometry.drawing.formats.step_parts import parts_of
@@ -101,16 +101,16 @@ def read_step(
         for piece in _pieces(edge, unit)
     ]
     discs = np.array([_disc(marker.moved(cut.frame.inverse)) for marker in markers]).reshape(-1, 4) * unit
-    depth = f"{cut.depth * unit:.6g} mm"
+    size, depth = MarkerSize.of(discs[:, 2]), f"{cut.depth * unit:.6g} mm"
     how = f"extruded by {depth}" if apart <= SAME else f"cut, {depth} across"
     how += f" but for {100 * apart:.2g} % of the volume" if 1e-6 < apart <= SAME else ""
     closed = closed_loops(pieces, scale=scale, tolerance=tolerance)
     return Drawing(
         loops=closed.loops,
         unit=unit,
-        note=f"STEP, {how}, at {cut.plane}{closed.note}",
+        note=f"STEP, {how}, at {cut.plane}{closed.note}{size.note}",
         markers=discs[:, :2],
-        marker_diameter=float(discs[:, 2].mean()) if markers else None,
+        marker_diameter=size.diameter,
         marker_height=float(discs[:, 3].mean()) if markers else None,
         depth=cut.depth * unit,
     )
