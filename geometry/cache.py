@@ -1,6 +1,5 @@
 """Cache of meshes and drawings, keyed by a hash of everything they depend on."""
 
-import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from pinnray.runtime.atomic import write_bytes
 from pinnray.runtime.cache import Result, cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_version
 from pinnray.runtime.processes.worker import Task, run_task
 
 TIMEOUT_S = 300.0
@@ -131,7 +131,7 @@ def cad_files(
 
 def cache_key(digest: str, asked: object) -> str:
     """SHA-256 over the digest of a finger or file, what is asked, package versions and the sources."""
-    versions = {package: _version(package) for package in MAKERS}
+    versions = {package: package_version(package) for package in MAKERS}
     parts = {"content": digest, "asked": asked, "versions": versions, "sources": sources_digest(__name__)}
     return content_hash(parts)
 
@@ -172,10 +172,3 @@ def _cad_writer() -> Callable[..., dict[str, bytes]]:
     from pinnray.geometry.drawing.drawn_finger import finger_from
 
     return lambda definition, formats: cad_contents(finger_from(definition), formats)
-
-
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "unknown"

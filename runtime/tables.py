@@ -210,28 +210,11 @@ def _with_point(cell: str) -> str:
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, Cell | None]]) -> None:
-    """Write rows with equal keys under a header, atomically; numbers keep all their digits, None is empty.
-
-    A text that a spreadsheet would take for a formula, as a file of others may be called, gets an apostrophe.
-    """
+    """Write rows with equal keys under a header, atomically; numbers keep all their digits, None is empty."""
     with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows({key: plain(cell) for key, cell in row.items()} for row in rows)
-
-
-def plain(cell: Cell | None) -> Cell | None:
-    """The cell, a text that begins like a formula with an apostrophe before it.
-
-    Source: OWASP, CSV Injection.
-    """
-    if not isinstance(cell, str) or not cell.startswith(("=", "+", "-", "@", "\t", "\r")):
-        return cell
-    try:
-        float(cell)
-    except ValueError:
-        return f"'{cell}"
-    return cell
+        writer.writerows(rows)
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,11 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pinnray.commands.camera.pick import read_numbers
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
 
 
-@quietable
 def command(
     rest: Path,
     pressed: Path,

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, comma_list
 from pinnray.runtime.errors import UserError
 
@@ -12,7 +11,6 @@ CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dx
 PICTURE = "design.png"
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),

@@ -5,13 +5,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
 from pinnray.robots.export_settings import ExportSettings, Kind
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
-@quietable
 def command(
     kind: Kind,
     *,

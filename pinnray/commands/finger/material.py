@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OutputPath
 from pinnray.runtime.errors import UserError
 
 
-@quietable
 def command(
     test: Path | None = None,
     *,

@@ -3,7 +3,6 @@
 from functools import partial
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     Adapt,
     FingerOptions,
@@ -17,7 +16,6 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
-@quietable
 def command(
     solver: str | None = None,
     *,

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.text import Text
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -20,14 +19,13 @@ from pinnray.options.shared import (
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 if TYPE_CHECKING:
-    from pinnray.solvers.physics import Material
+    from pinnray.solvers.material import Material
     from pinnray.studies.crossval.study import SolverVariant
 
 TEXTS = ("solver", "held out")
 """Headings of columns of words."""
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
@@ -66,7 +64,7 @@ def command(
         processes: Solvers run at a time; default: one per core.
         out: Output folder; default out/crossval-DESIGN.
     """
-    from pinnray.geometry.registration import Registration
+    from pinnray.geometry.picture_frame import Registration
     from pinnray.runtime.stages import Stages
     from pinnray.runtime.tables import terminal_table
     from pinnray.studies.crossval.cross_validation import cross_validate
