@@ -13,7 +13,7 @@ from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import write_csv
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
-from pinnray.solvers.solver import Solver, solved, with_law
+from pinnray.solvers.solver import Solver, check_law, solved, with_law
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.boards import board_poses, board_scene
 from pinnray.vision.rig.exposure import Exposure
@@ -38,6 +38,7 @@ def filmed_solution(problem: Problem, solver: Solver | None, stages: Stages) -> 
         with stages.stage("virtual experiment") as progress:
             solution = simulate(free, progress, max_step=LONGEST_STEP)
         return solution, experiment_source(free)
+    check_law([solver], problem.material)
     with stages.stage(solver.name) as progress:
         problem = replace(problem, material=with_law(problem.material, solver))
         solution = solved(solver, problem, progress)

@@ -22,6 +22,8 @@ UNIT = re.compile(r"|[(\[].{0,12}[)\]]|mm|mm/mm|px|%|[mk]?pa|n|s|-", re.I)
 DECIMAL_COMMA = re.compile(r"[-+]?(\d*|\d{1,3}(\.\d{3})+),\d+(e[-+]?\d+)?", re.I)
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(\.\d{3})+")
 """A whole number with points between its thousands, as it stands in a table with decimal commas."""
+EMPTY = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+"""Texts of a number that is not there, in lower case: as of pandas, R and spreadsheets."""
 MOST_TITLES = 12
 """Titles of a refused header that a message names."""
 Cell = str | int | float | bool
@@ -36,14 +38,33 @@ class ReadTable:
     """The wanted columns of a table in a file.
 
     Attributes:
+        path: The file.
         titles: Title of every wanted column that is there, by its name, with the unit from a line of units.
         rows: The number of the line of every row, and its cells by the names of their columns.
         comments: Lines that begin with #.
     """
 
+    path: Path
     titles: Mapping[str, str]
     rows: Sequence[tuple[int, Mapping[str, str]]]
     comments: Sequence[str]
+
+    def numbers(self, besides: Collection[str] = ()) -> list[list[float]]:
+        """The numbers of every row, NaN in a row that is empty `besides` some columns.
+
+        Raises:
+            UserError: If another cell holds no finite number.
+        """
+        numbers = []
+        for line, cells in self.rows:
+            numbers.append([read_number(cell) for cell in cells.values()])
+            empty = all(cell.lower() in EMPTY for name, cell in cells.items() if name not in besides)
+            for (name, cell), value in zip(cells.items(), numbers[-1], strict=True):
+                if not isfinite(value) and not (empty and name not in besides):
+                    raise UserError(
+                        f"{self.path}, line {line}: {self.titles[name]} is {cell!r}, no finite number"
+                    )
+        return numbers
 
 
 def read_table(
@@ -99,7 +120,7 @@ def read_table(
             )
         found = {name: cells[place] for name, place in places.items()}
         read.append((line, {name: _with_point(cell) for name, cell in found.items()} if commas else found))
-    return ReadTable({name: titles[place] for name, place in places.items()}, read, comments)
+    return ReadTable(path, {name: titles[place] for name, place in places.items()}, read, comments)
 
 
 def columns_of(
@@ -189,28 +210,11 @@ def _with_point(cell: str) -> str:
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, Cell | None]]) -> None:
-    """Write rows with equal keys under a header, atomically; numbers keep all their digits, None is empty.
-
-    A text that a spreadsheet would take for a formula, as a file of others may be called, gets an apostrophe.
-    """
+    """Write rows with equal keys under a header, atomically; numbers keep all their digits, None is empty."""
     with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows({key: plain(cell) for key, cell in row.items()} for row in rows)
-
-
-def plain(cell: Cell | None) -> Cell | None:
-    """The cell, a text that begins like a formula with an apostrophe before it.
-
-    Source: OWASP, CSV Injection.
-    """
-    if not isinstance(cell, str) or not cell.startswith(("=", "+", "-", "@", "\t", "\r")):
-        return cell
-    try:
-        float(cell)
-    except ValueError:
-        return f"'{cell}"
-    return cell
+        writer.writerows(rows)
 
 
 @dataclass(frozen=True)

@@ -41,14 +41,6 @@ class SmoothField(DisplacementField, Protocol):
 
 
 @runtime_checkable
-class NetworkField(DisplacementField, Protocol):
-    """A displacement that costs little more where its gradient is found, too."""
-
-    def displacement_and_gradient(self, location: LocatedPoints) -> tuple[FloatArray, FloatArray]:
-        """`displacement`, shape (n, 2), mm, and `gradient`, shape (n, 2, 2), at `location.points`."""
-
-
-@runtime_checkable
 class MovedWallsField(DisplacementField, Protocol):
     """A displacement from a solver that finds that the walls are not as drawn."""
 
@@ -250,13 +242,6 @@ class Solution:
         gradient = self.field.solid_gradient if isinstance(self.field, SolidField) else self.field.gradient
         state = State.from_gradient(gradient(location), self.problem, location.cells)
         return State(**{name: values[0] for name, values in vars(state).items()}) if alone else state
-
-    def displacement_and_state(self, location: LocatedPoints) -> "tuple[FloatArray, State]":
-        """`displacement` and `state` at n points."""
-        if not isinstance(self.field, NetworkField):
-            return self.displacement(location), self.state(location)
-        displacement, gradient = self.field.displacement_and_gradient(location)
-        return displacement, State.from_gradient(gradient, self.problem, location.cells)
 
     def _repr_html_(self) -> str:
         """Status, energy, reaction, unknowns and time, in a notebook."""

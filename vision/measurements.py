@@ -14,7 +14,7 @@ from pinnray.geometry.registration import FIXED, HAND_HELD, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import atomic_path
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.tables import read_number, read_table
+from pinnray.runtime.tables import EMPTY, read_number, read_table
 
 POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")
@@ -24,8 +24,6 @@ TITLES = {name: name for name in REQUIRED}, {name: name for name in OPTIONAL}
 """Titles of the columns that must and that may be there, by their names."""
 WORDS = {"true": "1", "false": "0", "yes": "1", "no": "0"}
 """Other ways to write `visible`, in lower case."""
-EMPTY = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
-"""Texts of a number that is not there, in lower case: as of pandas, R and spreadsheets."""
 CLICKED = 0.05
 """Median standard deviation, mm, from which points were set by hand: fixed cameras do better."""
 SMALLEST_DISTANCE = 1e-3

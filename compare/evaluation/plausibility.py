@@ -15,6 +15,7 @@ from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import MissingLibraryError, make_solver
 from pinnray.solvers.solver import NONE_SEEN
 from pinnray.vision.measurements import SMALLEST_DISTANCE
+from pinnray.vision.point_order import likeliest_order, order_text
 
 UNITS = (1000.0, 25.4, 10.0)
 """Millimetres in a metre, an inch and a centimetre."""
@@ -111,6 +112,13 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
         )
     if not moved.any():
         return [*remarks, "the measurements say that no marker moved"]
+    found = likeliest_order(points, points + moved)
+    if found.gain:
+        names = [str(number) for number in np.flatnonzero(seen) + 1]
+        remarks.append(
+            f"the markers' pressed places look mixed up: {order_text(found.order, names)} their "
+            "displacements would be smooth; see in which order they were clicked"
+        )
     try:
         expected = _expected(problem, points)
     except MissingLibraryError as error:

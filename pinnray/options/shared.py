@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +16,6 @@ from pinnray.geometry.finger.parameters import CheckedModel
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import errors_of_interruption, say
 from pinnray.runtime.machine import cores
-from pinnray.runtime.text_files import parse_toml
 from pinnray.solvers.physics import LoadKind, Material, Physics
 
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
@@ -130,7 +130,7 @@ class FingerOptions(CheckedModel):
 def toml_value(text: str) -> str:
     """The text as a value of TOML: a number, list or quoted text as it is, any other in quotes."""
     try:
-        parse_toml(f"value = {text}")
+        tomllib.loads(f"value = {text}")
     except ValueError:
         return json.dumps(text)
     return text
@@ -185,12 +185,6 @@ class PhysicsOptions(Physics, MaterialOptions):
 
         usual = {"load": usual_load or job_defaults(preset).load} | self._usual
         return usual | self.model_dump(exclude_unset=True, exclude={"material"})
-
-    def check_law(self, solvers: "Sequence[Solver]") -> None:
-        """Raise a `UserError` if none of the solvers has the law that is given."""
-        if "law" in self.model_fields_set and not any(self.law in solver.laws for solver in solvers):
-            known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
-            raise UserError(f"--law {self.law}: none of the solvers has it ({known})")
 
 
 @Parameter(name="*", group=TRAINING)

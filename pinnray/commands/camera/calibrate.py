@@ -4,7 +4,6 @@ from pathlib import Path
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import Flag, OutputPath
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
@@ -13,7 +12,6 @@ from pinnray.runtime.machine import package_versions
 VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
 
 
-@quietable
 def command(
     *images: Path,
     board: str,

@@ -2,11 +2,9 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),

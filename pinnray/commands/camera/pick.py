@@ -5,12 +5,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OutputPath
 from pinnray.runtime.errors import UserError
 
 
-@quietable
 def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     *,

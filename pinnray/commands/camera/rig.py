@@ -5,7 +5,6 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
-from pinnray.commands.quiet import quietable
 from pinnray.film.rig_settings import RigSettings
 from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
 from pinnray.runtime.errors import UserError
@@ -17,7 +16,6 @@ EXPOSURE = Parameter(name="*", group=Group("Exposure", sort_key=5))
 MOTION = Parameter(name="*", group=Group("Motion", sort_key=6))
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),

@@ -6,7 +6,6 @@ from typing import Annotated
 from cyclopts import Group, Parameter
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
 from pinnray.options.shared import (
     FilmOptions,
@@ -22,7 +21,6 @@ from pinnray.runtime.exits import say
 FORCE = Group("Force", sort_key=5)
 
 
-@quietable
 def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     *,
