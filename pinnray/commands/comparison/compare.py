@@ -1,7 +1,6 @@
 """The main job: solve one finger with several solvers and compare them."""
 
 import re
-from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,9 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
-from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
+from pinnray.options.file import (
+    OPTION,
+    given_options,
+    note_inputs,
+    note_versions,
+    read_options_file,
+    usual_options,
+)
 from pinnray.options.shared import (
     OUTPUT,
     Adapt,
@@ -29,10 +34,9 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 from pinnray.runtime.machine import cores
 
 if TYPE_CHECKING:
-    from pinnray.film.measured_film import MeasuredFilm
+    from pinnray.film.film import Film
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
@@ -76,7 +80,7 @@ def command(
         from_: File with options that the command line leaves out: TOML or JSON with a table `options`, or the
             run.json of an earlier run, which is repeated so; default: none.
         out: Output folder; default out/DESIGN, or out/DESIGN-MEASUREMENTS with the name of their file, unless
-            it holds a finished run with other options.
+            that holds the finished run of another job.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         width: Width of the pictures, such as 85mm (a journal's column) or 180mm (its page), whose type has 8
             to 9 points; default 140mm.
@@ -90,7 +94,7 @@ def command(
     from pinnray.comparison.report.tables import body_table, marker_table
     from pinnray.options.preset_jobs import job_defaults
     from pinnray.options.solver_choice import spare_solvers
-    from pinnray.runtime.output_folder import RUN_FILE
+    from pinnray.runtime.output_folder import RUN_FILE, check_same_job
     from pinnray.runtime.stages import Stages
 
     earlier = read_options_file(from_) if from_ else None
@@ -106,12 +110,11 @@ def command(
     )
     folder = out or _own_folder(design.name, measurements)
     if out is None and not resume:
-        _check_same_job(folder, given)
+        check_same_job(folder, given, usual_options(finger, physics, options, film))
     with nullcontext() if cores() < 2 else second_process(comma_list(names)) as pool:
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
         made, set_up = options.read(names), {text.partition(".")[0] for text in options.solver_set}
-        physics.check_law(made)
         finger.check_cost(design, mesh, made, simulated=measurements is None)
         job = Job(
             design=design,
@@ -173,31 +176,6 @@ def _own_folder(name: str, measurements: str | None) -> Path:
     return Path("out") / f"{name}-{source or 'measurements'}"
 
 
-SHOWN_ONLY = {"pictures", "width", "yes"}
-"""Options that change no number of a run."""
-
-
-def _check_same_job(folder: Path, given: Mapping[str, object]) -> None:
-    """Refuse to replace the finished run of a job with other options in a folder that nobody has named."""
-    from pinnray.runtime.output_folder import RUN_FILE
-
-    if not (folder / RUN_FILE).exists():
-        return
-    earlier = read_options_file(folder / RUN_FILE)["options"]
-    usual = {
-        name.replace("_", "-"): value
-        for group in (FingerOptions(), PhysicsOptions(), SolverOptions(), FilmSettings())
-        for name, value in group.model_dump(mode="json").items()
-    }
-    then, now = usual | earlier, usual | dict(given)
-    names = sorted(name for name in {*then, *now} - SHOWN_ONLY if then.get(name) != now.get(name))
-    if names:
-        raise UserError(
-            f"{folder} holds the finished run of another job (other {', '.join(names)}); give --out with a "
-            f"new folder, or --out {folder} to replace it"
-        )
-
-
 def _millimetres(text: str) -> float:
     """A width in mm from a number with or without its unit."""
     given = re.fullmatch(r"(\d+(?:\.\d+)?) *(mm|cm|in)?", text.strip())
@@ -215,12 +193,10 @@ def _truth(name: str | None, measurements: str | None) -> str:
     return SLIDING.name if name is None else name
 
 
-def _measurements(source: str | None, options: FilmSettings) -> "Path | MeasuredFilm | None":
+def _measurements(source: str | None, options: FilmSettings) -> "Path | Film | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
         if source is None and options.model_fields_set:
             raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
-        from pinnray.film.measured_film import MeasuredFilm
-
-        return None if source is None else MeasuredFilm(options.of(source))
+        return None if source is None else options.of(source)
     return existing(Path(source))

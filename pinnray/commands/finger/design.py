@@ -2,22 +2,20 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, comma_list
 from pinnray.runtime.errors import UserError
 
 STEP = "finger"
 """Name of the STEP file, beside which its clamp and contact lie."""
-CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf", "section.svg")
+CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf")
 PICTURE = "design.png"
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
     out: OutputPath = Path("out/cad"),
-    formats: str = "step,stl,dxf,svg",
+    formats: str = "step,stl,dxf",
 ) -> int:
     """Draw the finger: CAD files of the body and its markers, and a picture to scale.
 
@@ -26,7 +24,7 @@ def command(
 
     Args:
         out: Output folder.
-        formats: File formats, separated by commas: step, stl, dxf, svg.
+        formats: File formats, separated by commas: step, stl, dxf.
     """
     from pinnray.geometry.cache import cad_files
     from pinnray.geometry.drawing.drawn_finger import DrawnFinger, description_lines
