@@ -222,14 +222,14 @@ def test_the_report_can_be_cited_as_the_citation_file_says(content: Results) -> 
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     text = report_html(content, [], {})
     bibtex = text[text.index("@software") : text.index("</pre>")]
-    plain = bibtex.replace("{", "").replace("}", "")
+    plain = " ".join(bibtex.replace("{", "").replace("}", "").split())
     paper = cited["references"][0]
-    assert f"title   = {cited['title']}," in plain
+    assert f"title = {cited['title']}," in plain
     assert f"version = {cited['version']}," in plain
-    assert f"year    = {str(cited['date-released'])[:4]}" in plain
-    assert f"author  = {cited['authors'][0]['name']}," in plain
-    assert f"title  = {paper['title']}," in plain
-    assert f"year   = {paper['year']}," in plain
+    assert f"year = {str(cited['date-released'])[:4]}" in plain
+    assert f"author = {cited['authors'][0]['name']}," in plain
+    assert f"title = {paper['title']}," in plain
+    assert f"year = {paper['year']}," in plain
     assert " and ".join(each["name"] for each in paper["authors"]) in plain
     assert paper["url"].endswith("2407.08222")
     assert bibtex.count("{") == bibtex.count("}")
