@@ -63,7 +63,7 @@ class Results:
             failed=self.failed,
             reference=self.reference.solver,
             solvers={
-                each.solver: solver_scores(each, given, self.reference, self.truth)
+                each.solver: solver_scores(each, given, self.reference, self.truth, self.load.values)
                 for each in self.evaluations
             },
         )

@@ -150,6 +150,8 @@ class SolverScores(Numbers):
     to_truth: TruthDifferences | None  #: None where the markers were measured: nobody knows a real field.
     force_to_truth_rel: Number  #: Relative error of the size of the indenter's force; NaN likewise.
 
+    grip_to_truth_rel: Number = nan  #: The same of its component along the travel, which a gripper feels.
+
     @property
     def converged(self) -> bool:
         """By the solver's own criterion and, where there is a certificate, its limits."""
