@@ -7,7 +7,7 @@ from matplotlib.patches import Circle
 
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.canvas import Extent
-from pinnray.comparison.figures.style import HALO, axes_at, write_heading
+from pinnray.comparison.figures.layout import HALO, axes_at, write_heading
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.runtime.figure import CONTACT, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES

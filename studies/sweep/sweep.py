@@ -11,7 +11,6 @@ from typing import Any
 from pinnray.comparison.evaluation.deformed_body import ADVICE
 from pinnray.comparison.evaluation.plausibility import LOOKS_LIKE
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.output_folder import check_links
 from pinnray.runtime.processes.child import ProcessFailed
 from pinnray.runtime.processes.pool import Input, Pool
 from pinnray.runtime.stages import Stages
@@ -178,7 +177,6 @@ def load_sweep(folder: Path) -> Sweep:
     if not (folder / JOURNAL).is_file():
         raise UserError(f"{folder} holds no sweep; make one by `pinnray sweep STUDY.toml`")
     study = _study_in(folder)
-    check_links(folder)
     every = samples(study)
     with opened(folder / JOURNAL) as journal:
         found = [each for each in journal.measurements() if each.number < len(every)]

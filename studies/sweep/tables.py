@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pinnray.runtime.atomic import write_bytes, write_text
-from pinnray.runtime.tables import NONE, TextTable, plain
+from pinnray.runtime.tables import NONE, TextTable
 from pinnray.solvers.finger_figures import QUANTITIES, Quantity, heading
 from pinnray.studies.sweep.quantities import TRAINING
 from pinnray.studies.sweep.sampling import places_of
@@ -43,7 +43,7 @@ def write_frame(frame: pd.DataFrame, path: Path) -> list[Path]:
     frame.to_parquet(buffer, engine="pyarrow", index=False)
     files = [path.with_suffix(".parquet"), path.with_suffix(".csv")]
     write_bytes(files[0], buffer.getvalue())
-    write_text(files[1], frame.map(plain).to_csv(index=False, lineterminator="\n"))
+    write_text(files[1], frame.to_csv(index=False, lineterminator="\n"))
     return files
 
 

@@ -52,12 +52,11 @@ FILES: dict[str, str | bytes] = {
     "head.msh": "$MeshFormat",
     "broken.toml": "height = = 3",
     "utf-16.toml": b"\xff\xfeh\x00",
-    "beyond float.toml": "height = " + "9" * 400,
+    "beyond-float.toml": "height = " + "9" * 400,
     "beyond python.toml": "height = " + "9" * 5000,
     "nested.toml": "height = " + "[" * 3000 + "]" * 3000,
     "cut.json": '{"a": [',
     "nested.json": '{"a": ' + "[" * 100_000 + "]" * 100_000 + "}",
-    "beyond float.json": '{"a": ' + "9" * 400 + "}",
 }
 
 read_workspace, read_settings = partial(read_json, what="workspace"), partial(read_toml, what="settings")

@@ -33,15 +33,6 @@ def test_a_folder_with_files_of_others_is_refused(tmp_path):
         check_resumable_folder(tmp_path / "sweep.json", {"schema": 1}, job="sweep")
 
 
-def test_a_folder_with_a_link_to_another_is_refused(tmp_path):
-    """Somebody else may have made it: checkpoints, journal and designs would be written there."""
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "sweep.json").write_text(json.dumps({"schema": 1}))
-    (tmp_path / "out" / "runs").symlink_to(tmp_path, target_is_directory=True)
-    with pytest.raises(UserError, match=r"out/runs is a link, which no run has made"):
-        check_resumable_folder(tmp_path / "out" / "sweep.json", {"schema": 1}, job="sweep")
-
-
 def test_a_sweep_killed_before_its_definition_is_there_leaves_no_file(tmp_path, monkeypatch):
     """A journal without a definition would bar the folder for good."""
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.text import Text
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -27,7 +26,6 @@ TEXTS = ("solver", "held out")
 """Headings of columns of words."""
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
@@ -95,7 +93,6 @@ def command(
         processes=read_processes(processes),
     )
     made = [variant.solver for variant in study.variants]
-    physics.check_law(made)
     finger.check_cost(design, mesh, made, simulated=True)
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")

@@ -4,11 +4,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 
 
-@quietable
 def command(
     question: Path,
     *,

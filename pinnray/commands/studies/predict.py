@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import Repeated
 from pinnray.runtime.errors import UserError
 
@@ -13,7 +12,6 @@ if TYPE_CHECKING:
     from pinnray.studies.emulator.emulator import Emulator, Predictions
 
 
-@quietable
 def command(sweep: Path, *, set: Repeated = ()) -> int:
     """Predict the quantities of a finger that a sweep did not solve, each with a 95 % interval.
 

@@ -4,12 +4,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
-@quietable
 def command(
     study: Path,
     *,
