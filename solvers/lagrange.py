@@ -58,6 +58,10 @@ class LagrangeSpace:
         """Components that symmetry holds at zero: none, mask of shape (N, 2)."""
         return np.zeros((len(self.nodes), 2), dtype=bool)
 
+    def extruded(self, values: FloatArray) -> FloatArray:
+        """The nodal values themselves, shape (N, 2)."""
+        return np.asarray(values)
+
     @cached_property
     def cell_nodes(self) -> IntArray:
         """Nodes of every element, shape (t, 3) or (t, 6)."""

@@ -215,4 +215,4 @@ class Physics(Travel, Material):
     def parts(self) -> tuple[Material, Load]:
         """Material and load."""
         load = Load(self.load, displacement=self.displacement, radius=self.radius, friction=self.friction)
-        return Material(**self.model_dump(include=set(Material.model_fields))), load
+        return Material(**self.model_dump(include=set(Material.model_fields), exclude_unset=True)), load

@@ -64,6 +64,9 @@ class ForceScore(Numbers):
 
     size: Interval  #: N/mm.
     position: Interval | None  #: Abscissa where it acts, mm; None where it was no unknown.
+    along: Interval | None = None  #: Its component along the travel, N/mm.
+    shares: Mapping[str, Number] = {}  #: Of the variance of `along`, by what they come from.
+    advice: str = ""  #: A sentence on the largest share, and on what would narrow the interval.
 
 
 class FigureScores(Numbers):

@@ -34,11 +34,11 @@ def draw_force_displacement(
     labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
     true_label = [_end_label(truth, "truth, simulated")] if truth else []
     found = {
-        number: (each, each.identified)
+        number: (each, each.identified.along or each.identified.size)
         for number, each in (identified or {}).items()
         if each.identified is not None
     }
-    more = [f"{each.label}, {force.size.value:.3g} N/mm, identified" for each, force in found.values()]
+    more = [f"{each.label}, {along.value:.3g} N/mm, identified" for each, along in found.values()]
     top, height, left = 0.3 + legend_height([*labels, *true_label, *more]), 2.4, 0.75  # inches
     with figure(top + height + 0.45) as drawn:
         write_heading(drawn, "Force of the indenter along its travel")
@@ -65,7 +65,7 @@ def draw_force_displacement(
             axes.plot(truth.travel, truth.force, color=MEASURED, lw=1.3, zorder=3)
         reach = (truth or curves[0]).travel[-1]
         for place, (number, label) in enumerate(zip(found, more, strict=True)):
-            value, low, high = found[number][1].size
+            value, low, high = found[number][1]
             # Beside each other: the intervals of several solvers would hide each other.
             x, apart = reach * (1 - 0.02 * (place + 1)), [[value - low], [high - value]]
             style: dict[str, Any] = {
@@ -79,7 +79,7 @@ def draw_force_displacement(
         every = [*curves, truth] if truth else curves
         axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))
         forces = np.concatenate(
-            [curve.force for curve in every] + [np.array(force.size) for _, force in found.values()]
+            [curve.force for curve in every] + [np.array(along) for _, along in found.values()]
         )
         axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
         axes.set_xlabel("travel of the indenter, mm")

@@ -17,7 +17,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.fem.adaptive_refinement import check_adaptable
 from pinnray.solvers.problem import Load, Material
-from pinnray.solvers.solver import Solver, check_name
+from pinnray.solvers.solver import Solver, check_law, check_name
 from pinnray.vision.measurements import read_measurements
 
 
@@ -101,6 +101,7 @@ def checked(job: Job) -> Job:
     check_formats(job.picture_formats)
     check_truths([job.truth], job.design)
     check_walls(TRUTHS[job.truth])
+    check_law(job.solvers, job.material)
     supported_solvers(job.solvers, job.spare, job.material, job.load)
     if isinstance(job.measurements, Path):
         radius = job.design.marker_radius

@@ -245,11 +245,11 @@ def _force_interval(name: str, own: SolverScores, scores: Scores) -> str:
         said += f" at x = {middle} mm ({start} to {end} mm)"
     said += f" from the {source} markers"
     true = hypot(*own.reaction) / (1 + own.force_to_truth_rel)
-    if not isfinite(true):
-        return f"{said}."
-    where = "inside" if low <= true <= high else "outside"
-    placed = f", {where} it" if isfinite(low + high) else ""
-    return f"{said}; that of the simulated finger is {number(true, 3)}{placed}."
+    if isfinite(true):
+        where = "inside" if low <= true <= high else "outside"
+        placed = f", {where} it" if isfinite(low + high) else ""
+        said += f"; that of the simulated finger is {number(true, 3)}{placed}"
+    return f"{said}. {own.force.advice}".rstrip()
 
 
 def _convergence(scores: Scores) -> RunAnswer:

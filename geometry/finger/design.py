@@ -19,7 +19,7 @@ from pinnray.geometry.finger.section import finger_section
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.notebook import fact_table
+from pinnray.runtime.notebook import fact_table, png_image
 
 if TYPE_CHECKING:
     from pinnray.runtime.figure import Figure
@@ -84,14 +84,12 @@ class Design(Parameters):
 
     def _repr_html_(self) -> str:
         """The section and the paper's nine parameters, in a notebook."""
-        from pinnray.geometry.finger.svg import section_svg
-
         facts = {
             f"{name} ({symbol})": with_unit(getattr(self, name), name) for symbol, name in SYMBOLS.items()
         }
         if self.small_markers:
             facts["markers"] = f"of {self.marker_diameter:g} mm: {self.small_markers}"
-        return fact_table(f"Design “{self.name}”", facts, section_svg(self).partition("?>")[2])
+        return fact_table(f"Design “{self.name}”", facts, png_image(self.plot()._repr_png_()))
 
     def __repr__(self) -> str:
         """The name, the paper's nine parameters and what else differs from its default, in one line."""

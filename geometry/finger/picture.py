@@ -7,13 +7,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withTickedStroke
 
 from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
-from pinnray.geometry.section.thickness import inner_normals
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, SMALL, Figure, body_figure
+
+HATCHED = (withTickedStroke(angle=-120, spacing=4, length=1.5),)
+"""Strokes on the outer side of a line."""
 
 
 def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], FloatArray]) -> Figure:
@@ -32,8 +34,9 @@ def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], 
     with body_figure(shown, f"Finger “{finger.name}”") as (drawn, axes):
         draw_section(axes, section)
         for loop, which in section.named("base"):
-            axes.plot(*loop.along(which, np.linspace(0, 1, 60)).T, color=INK, lw=2.2, zorder=3)
-            axes.plot(*_hatches(loop, which, extent / 40), color=INK, lw=0.6, zorder=2)
+            clamped = loop.along(which, np.linspace(0, 1, 60))
+            axes.plot(*clamped.T, color=INK, lw=2.2, zorder=3)
+            axes.plot(*clamped.T, color=INK, lw=0.6, zorder=2, path_effects=HATCHED)
         front = np.linspace(*finger.contact_ends, 30)
         touched = place(np.array([finger.section.front_point(x) for x in front]))
         axes.plot(*touched.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=4)
@@ -64,13 +67,3 @@ def _not_tall(points: FloatArray) -> FloatArray:
     half = max(right - left, (top - bottom) / 0.8) / 2
     middle = 0.5 * (left + right)
     return np.concatenate([points, [[middle - half, bottom], [middle + half, top]]])
-
-
-def _hatches(loop: Loop, which: int, step: float) -> FloatArray:
-    """Short strokes on the outer side of a piece, as coordinates (2, k) with gaps."""
-    count = max(int(loop.lengths[which] / step), 2)
-    share = (np.arange(count) + 0.5) / count
-    start, outward = loop.along(which, share), -inner_normals(loop, which, share)
-    turned = outward @ np.array([[1.0, 0.6], [-0.6, 1.0]])
-    strokes = np.stack([start, start + 0.9 * step * turned, np.full_like(start, np.nan)], axis=1)
-    return np.asarray(strokes.reshape(-1, 2).T)

@@ -13,9 +13,6 @@ from pinnray.solvers.solver import Cost, Solver, Traits
 MESH, EXPERIMENT = Cost(per_triangle=40), Cost(per_triangle=300)
 """Time of making the mesh, and of a virtual experiment on it."""
 
-KILOBYTES = 30
-"""Largest memory of a run per triangle, from the same run; factors and error estimates take most of it."""
-
 MAX_SECONDS = 300.0
 """Time that needs no consent."""
 
@@ -23,16 +20,19 @@ USABLE = 0.8
 """Share of the free memory that needs no consent."""
 
 
-def mesh_seconds(triangles: int, solvers: Sequence[Solver] = (), *, simulated: bool = False) -> float:
-    """Time of a mesh and of what is done on it, s, as far as a coarser mesh takes less.
+def mesh_price(
+    triangles: int, solvers: Sequence[Solver] = (), *, simulated: bool = False
+) -> tuple[float, float]:
+    """Time of a mesh and of what is done on it, s, as far as a coarser mesh takes less, and memory, GB.
 
     Args:
         triangles: Number of triangles.
         solvers: What it is made for.
         simulated: Whether it is for a virtual experiment as well.
     """
-    costs = [MESH, *[EXPERIMENT] * simulated, *(Traits.of(each).cost for each in solvers)]
-    return sum(cost.of_mesh(triangles) for cost in costs)
+    costs = [*[EXPERIMENT] * simulated, *(Traits.of(each).cost for each in solvers)]
+    seconds = sum(cost.of_mesh(triangles) for cost in [MESH, *costs])
+    return seconds, 1e-6 * triangles * max((cost.kilobytes for cost in costs), default=0.0)
 
 
 def check_mesh_cost(
@@ -56,8 +56,7 @@ def check_mesh_cost(
     if (settings := mesh_sizes(finger, settings)) is None:
         return
     triangles, free = estimated_triangles(finger, settings), free_memory_gb()
-    seconds = mesh_seconds(triangles, solvers, simulated=simulated)
-    memory = 1e-6 * triangles * KILOBYTES if solvers or simulated else 0.0
+    seconds, memory = mesh_price(triangles, solvers, simulated=simulated)
     if seconds > MAX_SECONDS or memory > USABLE * free:
         raise UserError(
             f"--mesh-size {settings.size:g} gives about {triangles:,} triangles, which take about "

@@ -8,13 +8,11 @@ solution without its two springs and, where that does not converge, from rest.
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pinnray.geometry.observations import Observations
-from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerForces, residual_phrase
 from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
@@ -41,11 +39,6 @@ class MarkerCompliance:
     # The 2 m displacements of the markers as functionals, and the nodal displacements under their unit
     # forces, while base and load hold at zero
     markers: ConstrainedElimination
-
-    def of_markers(self, chosen: BoolArray) -> "MarkerCompliance":
-        """Subset of the markers selected by a mask of shape (m,)."""
-        both, markers = np.repeat(chosen, 2), self.markers
-        return replace(self, markers=ConstrainedElimination(markers.rows[both], markers.responses[both]))
 
     def forces(self, misfit: Misfit) -> MarkerForces:
         """The minimisers of energy plus misfit, in terms of the forces at the markers."""
@@ -78,15 +71,17 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve for the minimiser; see `Solver`. Without markers it is `fem` or `fem-nonlinear`."""
         check_problem(self, problem)
+        linear = problem.material.law in FemSolver.laws
         if self.weighting.misfit(problem) is not None:
-            return self._solve(problem, progress)
-        said = "without markers, or with weights of zero, this is"
-        if problem.material.law in FemSolver.laws:
-            plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
-            return replace(plain, solver=self.name, status=Status(True, f"{said} fem"))
-        plain = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
-        status = Status(plain.status.converged, f"{said} fem-nonlinear: {plain.status.message}")
-        return replace(plain, solver=self.name, status=status)
+            return self._minimiser(problem, progress) if linear else self._stationary(problem, progress)
+        alone = (
+            FemSolver(degree=self.degree, estimate=False)
+            if linear
+            else FemNonlinearSolver(degree=self.degree)
+        )
+        plain = alone.solve(problem, progress)
+        said = f"without markers, or with weights of zero, this is {plain.solver}: {plain.status.message}"
+        return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
     def _misfit(self, problem: Problem) -> Misfit:
         if (misfit := self.weighting.misfit(problem)) is None:
@@ -98,60 +93,31 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
         """The weights of the markers and the choice of their factor."""
         return MarkerWeighting.of(self)
 
-    def prepare(self, problem: Problem) -> tuple[MarkerCompliance, Misfit]:
-        """Factorise, and solve for the problem and for every component of a marker.
-
-        Further weights and markers cost no solve. Without markers that weigh anything it is a `UserError`.
-        """
+    def _compliance(self, problem: Problem) -> MarkerCompliance:
+        """Factorise, and solve for the problem and for every component of a marker."""
         misfit, space = self._misfit(problem), LagrangeSpace(problem.mesh, self.degree)
         constraints = DisplacementConstraints.of(problem, space, self.weighting.slack)
         equilibrium = DiscreteEquilibrium(problem, space, constraints)
         rows = DisplacementConstraints.springs(misfit, space).functionals
         markers = ConstrainedElimination(rows, equilibrium.responses(rows))
-        return MarkerCompliance(equilibrium, equilibrium.linear_guess(1.0).nodal, markers), misfit
+        return MarkerCompliance(equilibrium, equilibrium.linear_guess(1.0).nodal, markers)
 
-    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """See `Refittable`; one factorisation for all observations if the law is linear."""
-        whole: list[tuple[MarkerCompliance, Misfit]] = []
-
-        def refit(observations: Observations) -> Solution:
-            own, every = (
-                replace(problem, observations=replace(observations, visible=seen))
-                for seen in (observations.visible, np.ones_like(observations.visible))
-            )
-            misfit = self.weighting.misfit(own)
-            if misfit is None or problem.material.law not in FemSolver.laws:
-                return self.solve(own)
-            if not whole:
-                whole.append(self.prepare(every))
-            finger, markers = whole[0]
-            if misfit.radius != markers.radius or not np.array_equal(markers.points, observations.points):
-                return self.solve(own)
-            return self._framed(own, finger.of_markers(observations.visible), misfit)
-
-        return refit
-
-    def _solve(self, problem: Problem, progress: Progress) -> Solution:
-        if problem.material.law not in FemSolver.laws:
-            return self._stationary(problem, progress)
-        started = time.perf_counter()
-        finger, misfit = self.prepare(problem)
+    def _minimiser(self, problem: Problem, progress: Progress) -> Solution:
+        """For the linear law: the minimiser over displacement and unknown frames of the pictures."""
+        started, observations = time.perf_counter(), problem.observations
+        finger = self._compliance(problem)
         progress(0.9, "solved for the forces at the markers")
-        solution = self._framed(problem, finger, misfit)
+        if observations is None or not (pictures := FreePictures.of(observations)).parameters:
+            solution = self._fitted(problem, finger)
+        else:
+            found = pictures.by_forces(finger.forces(self._misfit(problem)), self.weighting)
+            straight = replace(problem, observations=pictures.straightened(observations, found.z))
+            solution = pictures.framed(self._fitted(straight, finger), problem, found)
         finger.equilibrium.factors.destroy()
         return replace(solution, stats={**solution.stats, "seconds": time.perf_counter() - started})
 
-    def _framed(self, problem: Problem, finger: MarkerCompliance, misfit: Misfit) -> Solution:
-        """The minimiser over displacement and unknown frames of the pictures."""
-        observations = problem.observations
-        if observations is None or not (pictures := FreePictures.of(observations)).parameters:
-            return self._fitted(problem, finger, misfit)
-        found = pictures.by_forces(finger.forces(misfit), self.weighting)
-        straight = replace(problem, observations=pictures.straightened(observations, found.z))
-        return pictures.framed(self._fitted(straight, finger, self._misfit(straight)), problem, found)
-
-    def _fitted(self, problem: Problem, finger: MarkerCompliance, misfit: Misfit) -> Solution:
-        started = time.perf_counter()
+    def _fitted(self, problem: Problem, finger: MarkerCompliance) -> Solution:
+        misfit = self._misfit(problem)
         forces = finger.forces(misfit)
         factor = self.weighting.factor(forces)
         fit = forces.fit(factor)
@@ -165,7 +131,6 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
             reaction=reaction_by_residual_work(space, residual) - fit.forces.sum(axis=0),
             status=Status(True, f"the minimiser on this mesh; {fit.phrase}"),
             stats={
-                "seconds": time.perf_counter() - started,
                 "unknowns": nodal.size,
                 "triangles": len(problem.mesh.triangles),
                 "degree": self.degree,
@@ -196,7 +161,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
             advice = "let the contact slide, give it a contact_deviation or take smaller weights"
             status = Status(False, f"{phrase}: load and markers contradict each other; {advice}")
         else:
-            missed = _left_out(path, solver, problem, springs, progress)
+            missed = _left_out(path, solver, springs, progress)
             found, lost = missed[np.isfinite(missed)], int(np.isnan(missed[:, 0]).sum())
             said = f"energy plus misfit is stationary: {phrase}; {residual_phrase(residual, found)}"
             if lost:
@@ -226,14 +191,11 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
 
 
 def _left_out(
-    path: LoadPath,
-    solver: FemNonlinearSolver,
-    problem: Problem,
-    springs: DisplacementConstraints,
-    progress: Progress,
+    path: LoadPath, solver: FemNonlinearSolver, springs: DisplacementConstraints, progress: Progress
 ) -> FloatArray:
     """Residual of each marker without it, shape (m, 2), mm; NaN where no equilibrium is found."""
-    count, constraints = len(springs.targets) // 2, path.equilibrium.constraints
+    problem, constraints = path.equilibrium.problem, path.equilibrium.constraints
+    count = len(springs.targets) // 2
     first = len(constraints.targets) - 2 * count
     missed = np.full((count, 2), np.nan)
     for marker in range(count):
@@ -241,8 +203,7 @@ def _left_out(
         own = slice(2 * marker, 2 * marker + 2)
         kept = np.ones(first + 2 * count, dtype=bool)
         kept[first:][own] = False
-        point = path.relaxed(kept)
-        if point is None:
+        if (point := path.relaxed(kept)) is None:
             again = solver.path(problem, LagrangeSpace(problem.mesh, solver.degree), constraints.only(kept))
             again.follow(silent)
             again.close()

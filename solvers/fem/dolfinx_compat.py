@@ -5,7 +5,6 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import chdir, suppress
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from time import time
 from typing import Any, Generic, TypeVar
@@ -102,30 +101,22 @@ Built = TypeVar("Built")
 def _compiled(build: Callable[[], Built]) -> Built:
     """The result of a call of DOLFINx, without the build log that distutils prints through the root logger.
 
-    An interruption leaves nothing half compiled, for which later runs would wait and fail. A kill does; what
-    is older than `ABANDONED_S` is compiled again.
+    An interruption leaves nothing half compiled, for which later runs would wait. A kill does: FFCx waits for
+    it, and what is older than `ABANDONED_S` then is compiled again.
     """
     before, began = logging.root.manager.disable, time() - CLOCK_STEP_S
     logging.disable(logging.INFO)
     try:
-        _forget_abandoned()
         while True:
             try:
                 return build()
             except TimeoutError:  # of FFCx, which has waited
-                _forget_abandoned.cache_clear()
-                _forget_abandoned()
+                _forget_half_compiled(lambda changed: changed < time() - ABANDONED_S)
     except KeyboardInterrupt:  # of other exceptions FFCx takes care
         _forget_half_compiled(lambda changed: changed >= began)
         raise
     finally:
         logging.disable(before)
-
-
-@cache
-def _forget_abandoned() -> None:
-    """Delete what killed processes have left, once: looking for it takes as long as a form that is there."""
-    _forget_half_compiled(lambda changed: changed < time() - ABANDONED_S)
 
 
 def _forget_half_compiled(chosen: Callable[[float], bool]) -> None:

@@ -23,44 +23,36 @@ class MaterialPreset(NamedTuple):
     source: str
 
 
-def _filament(young: float, density: float, strain_at_break: float, source: str) -> MaterialPreset:
-    """A thermoplastic elastomer whose sheet gives the tensile modulus, MPa."""
-    return MaterialPreset(
-        Material(young=young, poisson=0.45, law="neo-hookean"), density, strain_at_break, source
-    )
-
-
-def _silicone(stress: float, density: float, strain_at_break: float, source: str) -> MaterialPreset:
-    """A rubber whose sheet gives the nominal stress at 100 % strain, MPa: E = 3 σ / (λ - λ⁻²)."""
-    young = round(3 * stress / STRETCH, 4)
-    return MaterialPreset(
-        Material(young=young, poisson=0.49, law="neo-hookean"), density, strain_at_break, source
-    )
+def _young(stress: float) -> float:
+    """Young's modulus, MPa, from the nominal stress at 100 % strain, MPa: E = 3 σ / (λ - λ⁻²)."""
+    return round(3 * stress / STRETCH, 4)
 
 
 SMOOTH_ON = "Smooth-On, technical bulletin, 100 % modulus (ASTM D412)"
-_SHEETS = {
-    "tpu-85a": _filament(12.0, 1.19, 6.6, "NinjaTek, NinjaFlex 85A, technical specifications (ASTM D638)"),
-    "tpu-95a": _filament(26.0, 1.22, 5.8, "NinjaTek, Cheetah 95A, technical specifications (ASTM D638)"),
-    "ecoflex-00-30": _silicone(0.0690, 1.07, 9.0, f"{SMOOTH_ON}, Ecoflex 00-30, 10 psi"),
-    "ecoflex-00-50": _silicone(0.0827, 1.07, 9.8, f"{SMOOTH_ON}, Ecoflex 00-50, 12 psi"),
-    "dragon-skin-10": _silicone(0.1517, 1.07, 10.0, f"{SMOOTH_ON}, Dragon Skin 10, 22 psi"),
-    "dragon-skin-20": _silicone(0.3378, 1.08, 6.2, f"{SMOOTH_ON}, Dragon Skin 20, 49 psi"),
-    "dragon-skin-30": _silicone(0.5929, 1.08, 3.64, f"{SMOOTH_ON}, Dragon Skin 30, 86 psi"),
-    "sylgard-184": MaterialPreset(
-        Material(young=1.8, poisson=0.49, law="neo-hookean"),
-        1.03,
-        1.0,
+_SHEETS = (
+    ("tpu-85a", 12.0, 0.45, 1.19, 6.6, "NinjaTek, NinjaFlex 85A, technical specifications (ASTM D638)"),
+    ("tpu-95a", 26.0, 0.45, 1.22, 5.8, "NinjaTek, Cheetah 95A, technical specifications (ASTM D638)"),
+    ("ecoflex-00-30", _young(0.0690), 0.49, 1.07, 9.0, f"{SMOOTH_ON}, Ecoflex 00-30, 10 psi"),
+    ("ecoflex-00-50", _young(0.0827), 0.49, 1.07, 9.8, f"{SMOOTH_ON}, Ecoflex 00-50, 12 psi"),
+    ("dragon-skin-10", _young(0.1517), 0.49, 1.07, 10.0, f"{SMOOTH_ON}, Dragon Skin 10, 22 psi"),
+    ("dragon-skin-20", _young(0.3378), 0.49, 1.08, 6.2, f"{SMOOTH_ON}, Dragon Skin 20, 49 psi"),
+    ("dragon-skin-30", _young(0.5929), 0.49, 1.08, 3.64, f"{SMOOTH_ON}, Dragon Skin 30, 86 psi"),
+    (
+        *("sylgard-184", 1.8, 0.49, 1.03, 1.0),
         "I. D. Johnston et al., J. Micromech. Microeng. 24 (2014) 035017: 1.32 to 2.97 MPa, cured at 25 to "
         "200 degrees; density and strain of Dow's data sheet",
     ),
-}
+)
+"""Name, Young's modulus, MPa, Poisson's ratio, density, g/cm^3, nominal strain at break, and source."""
 
 MATERIALS: Mapping[str, MaterialPreset] = {
-    name: known._replace(
-        material=known.material.made_of(Substance(name, known.density, known.strain_at_break))
+    name: MaterialPreset(
+        Material(young=young, poisson=poisson, law="neo-hookean").made_of(Substance(name, density, strain)),
+        density,
+        strain,
+        source,
     )
-    for name, known in _SHEETS.items()
+    for name, young, poisson, density, strain, source in _SHEETS
 }
 """The presets by name; Poisson's ratios are assumed, 0.45 of filaments and 0.49 of silicones."""
 

@@ -20,7 +20,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.problem import Load, Material
-from pinnray.solvers.solver import Solver, check_load, check_name, with_law
+from pinnray.solvers.solver import Solver, check_law, check_load, check_name, with_law
 from pinnray.studies.crossval.folds import ALL, SCHEMES
 
 SIZES = MeshSettings(size=0.5)
@@ -61,9 +61,9 @@ def changed(solver: Solver, **changes: object) -> Solver:
 def solver_variants(
     solvers: Sequence[Solver], material: Material, *, fixed: Sequence[str] = ()
 ) -> list[SolverVariant]:
-    """A variant for each solver, and two more for one that can choose the weight of the markers in a fold.
+    """A variant for each solver, and one more for one that can choose the weight of the markers in a fold.
 
-    Those choose it from the markers that are given: by leave-one-out errors, or by the evidence.
+    That one chooses it by the leave-one-out errors of the markers that are given.
 
     Args:
         solvers: The solvers.
@@ -75,9 +75,8 @@ def solver_variants(
         variants.append(SolverVariant(solver.name, solver))
         chooses = isinstance(solver, MarkerSettings)
         if chooses and solver.name not in fixed and with_law(material, solver).law == "linear":
-            for choice in ("left-out", "evidence"):
-                chosen = changed(solver, weights="precision", choose=choice)
-                variants.append(SolverVariant(f"{solver.name} {choice}", chosen))
+            chosen = changed(solver, weights="precision", choose="left-out")
+            variants.append(SolverVariant(f"{solver.name} left-out", chosen))
     return variants
 
 
@@ -195,6 +194,7 @@ class CrossvalStudy:
             raise UserError(
                 f"noise {self.noise:g}: give a standard deviation of zero or more, at most 100 mm"
             )
+        check_law([variant.solver for variant in self.variants], self.material)
         for variant in self.variants:
             solver = variant.solver
             check_name(solver.name)

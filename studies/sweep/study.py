@@ -19,7 +19,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_toml
 from pinnray.solvers.problem import Load, Material, Physics
 from pinnray.solvers.registry import make_solver
-from pinnray.solvers.solver import Solver, Traits
+from pinnray.solvers.solver import Solver, Traits, check_law
 
 PHYSICS = tuple(Physics.model_fields)
 """Parameters of material and load."""
@@ -148,7 +148,10 @@ class Study(CheckedModel):
         if self.strokes is not None:
             self._check_fields()
         ends = {name: (values.values or (values.low,))[0] for name, values in settings.items()}
-        self.made_solver({name: value for name, value in ends.items() if value is not None})
+        solver = self.made_solver({name: value for name, value in ends.items() if value is not None})
+        laws = self.varied["law"].values if "law" in self.varied else None
+        for law in laws or [self.fixed[name] for name in self.fixed if name == "law"]:
+            check_law([solver], physics_of({"law": law})[0])
         return self
 
     def _check_fields(self) -> None:

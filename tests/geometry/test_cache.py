@@ -3,12 +3,11 @@
 import os
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
 
-from pinnray.geometry import Design, MeshSettings, UserError, cache, cad_files, finger_mesh
+from pinnray.geometry import Design, MeshSettings, UserError, cache, finger_mesh
 from pinnray.geometry.cache import cache_key, drawn_finger
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -165,26 +164,6 @@ def test_cache_folder(variables: dict[str, str], expected: str, tmp_path: Path, 
     for name, value in variables.items():
         monkeypatch.setenv(name, str(tmp_path / value))
     assert cache_folder() == tmp_path / expected
-
-
-def test_cad_files_come_from_the_cache_the_second_time(tmp_path, monkeypatch):
-    first = cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
-    monkeypatch.setattr("pinnray.geometry.cache.run_task", None)
-    second = cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
-    assert sorted(path.name for path in (tmp_path / "two").iterdir()) == ["section.svg"]
-
-
-@pytest.mark.parametrize("name", ["../up", "/tmp/up", "a/b"])
-def test_cad_files_of_a_foreign_cache_stay_in_the_output_folder(name: str, tmp_path: Path) -> None:
-    cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
-    (entry,) = (tmp_path / "cache").glob("*.npz")
-    with zipfile.ZipFile(entry, "a") as archive:
-        archive.writestr(f"{name}.npy", "written")
-    with pytest.warns(RuntimeWarning, match="the cached file is damaged"):
-        cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
-    assert not (tmp_path / "up").exists()
-    assert [path.name for path in (tmp_path / "two").rglob("*")] == ["section.svg"]
 
 
 def test_import_needs_neither_cadquery_nor_gmsh() -> None:

@@ -23,7 +23,6 @@ from pinnray.solvers.elasticity import (
     stress_of,
 )
 from pinnray.solvers.fem.adaptive_refinement import adapted
-from pinnray.solvers.fem.solid import affordable
 from pinnray.solvers.finger_figures import figures_of
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.materials import TensileTest, fitted, preset, read_tensile_test
@@ -43,6 +42,10 @@ FILES = {
     "text.csv": "strain,stress_MPa\n0.1,1\n0.2,x\n0.3,2\n",
     "short.csv": "strain,stress_MPa\n0,0\n0.2,1\n",
     "empty.csv": "",
+    "true.csv": "True strain,stress_MPa\n0.1,1\n",
+    "unit.csv": "strain,stress\n0.1,1\n0.2,2\n0.3,3\n",
+    "percent.csv": "strain,stress_MPa\n10,1\n20,2\n30,3\n",
+    "longer.csv": "strain,stress_MPa\n0.1,1,23\n",
 }
 
 

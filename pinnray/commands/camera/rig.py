@@ -36,7 +36,7 @@ def command(
 
     - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
     - pinnray rig --boards 20 --board 9x6 --square 8
-    - pinnray rig --moving 0 --cover 5=0.4 --codec mjpg --frame 640x480
+    - pinnray rig --moving 0 --codec mjpg --frame 640x480
 
     Args:
         solver: Solver of the filmed displacements; default: the finite-strain simulation of `compare`.

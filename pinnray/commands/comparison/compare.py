@@ -33,7 +33,7 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 from pinnray.runtime.machine import cores
 
 if TYPE_CHECKING:
-    from pinnray.film.measured_film import MeasuredFilm
+    from pinnray.film.film import Film
 
 
 def command(
@@ -102,7 +102,6 @@ def command(
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
         made, set_up = options.read(names), {text.partition(".")[0] for text in options.solver_set}
-        physics.check_law(made)
         finger.check_cost(design, mesh, made, simulated=measurements is None)
         job = Job(
             design=design,
@@ -170,12 +169,10 @@ def _truth(name: str | None, measurements: str | None) -> str:
     return SLIDING.name if name is None else name
 
 
-def _measurements(source: str | None, options: FilmSettings) -> "Path | MeasuredFilm | None":
+def _measurements(source: str | None, options: FilmSettings) -> "Path | Film | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
         if source is None and options.model_fields_set:
             raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
-        from pinnray.film.measured_film import MeasuredFilm
-
-        return None if source is None else MeasuredFilm(options.of(source))
+        return None if source is None else options.of(source)
     return existing(Path(source))

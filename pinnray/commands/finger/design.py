@@ -7,7 +7,7 @@ from pinnray.runtime.errors import UserError
 
 STEP = "finger"
 """Name of the STEP file, beside which its clamp and contact lie."""
-CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf", "section.svg")
+CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf")
 PICTURE = "design.png"
 
 
@@ -15,7 +15,7 @@ def command(
     *,
     finger: FingerOptions = FingerOptions(),
     out: OutputPath = Path("out/cad"),
-    formats: str = "step,stl,dxf,svg",
+    formats: str = "step,stl,dxf",
 ) -> int:
     """Draw the finger: CAD files of the body and its markers, and a dimensioned picture.
 
@@ -24,7 +24,7 @@ def command(
 
     Args:
         out: Output folder.
-        formats: File formats, separated by commas: step, stl, dxf, svg.
+        formats: File formats, separated by commas: step, stl, dxf.
     """
     from pinnray.comparison.figures.design_drawing import draw_design
     from pinnray.geometry.cache import cad_files

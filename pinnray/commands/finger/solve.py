@@ -53,7 +53,7 @@ def command(
     from pinnray.solvers.finger_figures import break_warning
     from pinnray.solvers.problem import Problem
     from pinnray.solvers.registry import unknown_solver
-    from pinnray.solvers.solver import Traits, solved, with_law
+    from pinnray.solvers.solver import check_asked, solved, with_law
     from pinnray.vision.measurements import read_measurements
 
     if not solver:
@@ -68,14 +68,12 @@ def command(
     chosen_solvers = options.read(solver)
     if len(chosen_solvers) != 1:
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
-    physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
-    finger.check_cost(chosen, settings, [made])
     given = None
     if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)
-    if given and not Traits.of(made).assimilates:
-        raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
+    check_asked(made, material, given)
+    finger.check_cost(chosen, settings, [made])
     with Stages() as stages:
         triangles, adaptation = shared_mesh(
             chosen,
@@ -113,6 +111,8 @@ def command(
         print("\n".join(figures_lines(figures, grip)))
         if said := break_warning(figures.strain_over_break):
             say(f"warning: {said[:1].lower()}{said[1:-1]}")
+    if solution.identified:
+        print(solution.identified.advice)
     for path in written:
         print(path)
     return 0 if evaluation.converged and tolerance_reached(adaptation) else NOT_CONVERGED

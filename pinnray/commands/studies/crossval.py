@@ -97,7 +97,6 @@ def command(
         picture_formats=read_formats(pictures),
     )
     made = [variant.solver for variant in study.variants]
-    physics.check_law(made)
     finger.check_cost(design, mesh, made, simulated=True)
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")

@@ -1,9 +1,7 @@
 """The load path from rest to the full load, in adaptive steps."""
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -34,6 +32,17 @@ Newton's method where the cylinder recedes by its force over that stiffness: of 
 nanometres, so that nodes would come and go for ever. A finger whose walls bend as solids has 10^3 to 10^4."""
 
 
+@dataclass(frozen=True)
+class LoadSteps:
+    """Settings of a load path."""
+
+    first_step: float = 0.05  # First fraction of the load
+    max_step: float = 0.2  # Largest fraction of the load in one step
+    min_step: float = 1e-3  # Fraction of the load below which the solver gives up
+    tolerance: float = 1e-8  # Largest residual force over the largest internal force
+    max_iterations: int = 12  # Newton iterations in one step
+
+
 class LoadPath:
     """Equilibria of a problem as its load grows: `points`, from rest.
 
@@ -44,10 +53,8 @@ class LoadPath:
         problem: With the full load.
         space: The elements.
         constraints: Their targets grow with the load; the load's own if None.
-        guide: States of a simpler model at fractions of the load: each step starts from the last state plus
-            the guide's change.
-        exact_from: Fraction of the load before which the equilibria need be near only. The rest are settings
-            of `FemNonlinearSolver`.
+        steps: Their sizes and Newton's method.
+        exact_from: Fraction of the load before which the equilibria need be near only.
     """
 
     def __init__(
@@ -56,24 +63,16 @@ class LoadPath:
         space: NodalSpace,
         constraints: DisplacementConstraints | None = None,
         *,
-        guide: Callable[[float], LoadState] | None = None,
+        steps: LoadSteps,
         exact_from: float = 0.0,
-        first_step: float,
-        max_step: float,
-        min_step: float,
-        tolerance: float,
-        max_iterations: int,
     ) -> None:
-        self._first_step, self._min_step, self.space, self._guide = first_step, min_step, space, guide
+        self._steps, self.space = steps, space
         self.equilibrium = DiscreteEquilibrium(problem, space, constraints)
-        self._begin = partial(
-            ConstrainedNewton, self.equilibrium, tolerance=tolerance, max_iterations=max_iterations
-        )
         self._newton, self._exact_from = self._begin(), exact_from
-        rough = self._begin(tolerance=max(tolerance, ROUGH_TOLERANCE)) if exact_from > 0 else None
+        rough = self._begin(tolerance=max(steps.tolerance, ROUGH_TOLERANCE)) if exact_from > 0 else None
         self._rough = rough  # For equilibria that need be near only
         contact = self.equilibrium.contact
-        self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
+        self._max_step = steps.max_step if contact is None else min(steps.max_step, contact.longest_step)
         self._softer: list[float] | None = [] if contact is None else None  # Until it is needed
         self.points = [self.equilibrium.rest]
         self.left = 0  # Number of unstable equilibria that were left for a stable one
@@ -81,6 +80,11 @@ class LoadPath:
         self._tangent = False  # Whether the tangent of the last equilibrium stands factorised
         self._weights: csr_matrix | None = None  # Of coarser nodes at this path's
         self._reason = ""  # Why the last failed step failed, for Newton's method in PETSc's word
+
+    def _begin(self, **settings: float) -> ConstrainedNewton:
+        """Newton's method, with other settings than those of the steps."""
+        usual = {"tolerance": self._steps.tolerance, "max_iterations": self._steps.max_iterations}
+        return ConstrainedNewton(self.equilibrium, **(usual | settings))
 
     def close(self) -> None:
         """Free what PETSc holds."""
@@ -91,7 +95,7 @@ class LoadPath:
 
     def follow(self, progress: Progress) -> None:
         """Go to the full load, or as far as equilibria are found."""
-        step = min(self._first_step, self._max_step)
+        step = min(self._steps.first_step, self._max_step)
         while (rest := 1 - self.points[-1].fraction) > 0:
             fraction = 1 - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the end
             before = self._iterations
@@ -99,7 +103,7 @@ class LoadPath:
             if point is None:
                 self._halved += 1
                 step /= 2
-                if step < self._min_step:
+                if step < self._steps.min_step:
                     return
                 progress(
                     self.points[-1].fraction, f"{fraction:.1%} of the load, for which no equilibrium is found"
@@ -149,12 +153,11 @@ class LoadPath:
         return True
 
     def interpolated(self, way: "LoadPath", nodal: FloatArray) -> FloatArray:
-        """Displacements of this path's nodes, shape (N, 2), mm, from those of coarser elements."""
+        """Displacements of this path's nodes, shape (N, d), mm, from those of coarser plane elements."""
         if self._weights is None:
-            coarse = way.space
-            at_nodes = self.space.mesh.locate_on(coarse.mesh, self.space.nodes)
-            self._weights = coarse.section.shape_functions(at_nodes)
-        return np.asarray(self._weights @ nodal)
+            own, coarse = self.space.section, way.space.section
+            self._weights = coarse.shape_functions(own.mesh.locate_on(coarse.mesh, own.nodes))
+        return self.space.extruded(self._weights @ nodal)
 
     def _carried_contact(self, way: "LoadPath", last: LoadState) -> FloatArray:
         """Forces on the nodes of the front, N/mm, of the pressure on coarser elements."""
@@ -163,7 +166,7 @@ class LoadPath:
             return self.equilibrium.rest.contact
         pressure = last.contact / coarse.lengths(last.nodal)
         at = np.interp(own.positions[:, 0], coarse.positions[:, 0], pressure)
-        return np.asarray(at * own.lengths(self.interpolated(way, last.nodal)))
+        return np.outer(own.shares, at * own.lengths(self.interpolated(way, last.nodal))).ravel()
 
     def relaxed(self, kept: BoolArray) -> LoadState | None:
         """Equilibrium near the last one under the constraints of a mask alone; None if none is found."""
@@ -253,16 +256,11 @@ class LoadPath:
         return softer
 
     def _guess(self, fraction: float) -> LoadState:
-        """The state at a fraction of the load, by the guide or by extrapolation of the last ones."""
+        """The state at a fraction of the load by extrapolation of the last ones."""
         last, contact = self.points[-1], self.equilibrium.contact
-        friction = None if contact is None else contact.started(last)
-        if self._guide is not None:
-            before, after = self._guide(last.fraction), self._guide(fraction)
-            nodal, forces = after.nodal - before.nodal, after.forces - before.forces
-            forces = last.forces + forces
-            return LoadState(fraction, last.nodal + nodal, after.contact, forces, friction=friction)
         if len(self.points) == 1:
             return self.equilibrium.linear_guess(fraction)
+        friction = None if contact is None else contact.started(last)
         known = self.points[-3:]
         at = np.array([point.fraction for point in known])
         shares = [np.prod((fraction - (rest := np.delete(at, k))) / (at[k] - rest)) for k in range(len(at))]
@@ -288,14 +286,27 @@ class LoadPath:
         }
 
     def history(self) -> dict[str, FloatArray]:
-        """Fraction of the load, energy, N mm/mm, and reaction, N/mm, at every equilibrium."""
+        """Fraction of the load, energy, N mm/mm, and reaction, N/mm, at every equilibrium.
+
+        With the force's abscissa, mm, where there is a force, and width and pressure of a cylinder's contact.
+        A state without a force, such as rest, has the abscissa of the next one.
+        """
         reactions = np.array([self.reaction(point) for point in self.points])
-        return {
+        columns = {
             "load_fraction": np.array([point.fraction for point in self.points]),
             "energy": np.array([self.equilibrium.energy(point.nodal) for point in self.points]),
             "reaction_x": reactions[:, 0],
             "reaction_y": reactions[:, 1],
         }
+        places = np.array([self.force_abscissa(point) for point in self.points], dtype=np.float64)
+        if len(known := np.flatnonzero(np.isfinite(places))):
+            following = np.searchsorted(known, np.arange(len(places))).clip(max=len(known) - 1)
+            columns["force_abscissa_mm"] = places[known[following]]
+        if self.equilibrium.contact is not None:
+            touched = [region.stats() if region else {} for region in self.regions()]
+            for name in ("contact_width_mm", "contact_pressure_MPa"):
+                columns[name] = np.array([stats.get(name, 0.0) for stats in touched])
+        return columns
 
     def reaction(self, point: LoadState) -> FloatArray:
         """Force of the indenter on the finger, shape (2,), N/mm."""
@@ -315,15 +326,7 @@ class LoadPath:
         """Displacements of the nodes at every equilibrium, each of shape (N, d), mm."""
         return [point.nodal for point in self.points]
 
-    def abscissae(self) -> list[float | None]:
-        """`force_abscissa` of every equilibrium."""
-        return [self.force_abscissa(point) for point in self.points]
-
-    def region(self, point: LoadState) -> ContactRegion | None:
-        """The contact region; None without contact or without a cylinder."""
-        contact = self.equilibrium.contact
-        return None if contact is None else ContactRegion.of(contact, point)
-
     def regions(self) -> list[ContactRegion | None]:
-        """The contact region of every equilibrium."""
-        return [self.region(point) for point in self.points]
+        """The contact region of every equilibrium; None without contact or without a cylinder."""
+        contact = self.equilibrium.contact
+        return [None if contact is None else ContactRegion.of(contact, point) for point in self.points]

@@ -1,4 +1,4 @@
-"""A load path on coarse elements that ends on fine ones: a part of the work of one on fine ones alone."""
+"""A load path on coarse elements that ends on fine or solid ones: a part of the work of one on these."""
 
 from dataclasses import replace
 
@@ -9,8 +9,10 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import ContactRegion
+from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import Progress
 
 COARSE, ACROSS, FINE = 1.0, 2, 3000
 """Size of coarse elements, mm; their least number through a wall; triangles from which on they are used."""
@@ -39,7 +41,7 @@ def coarser(problem: Problem, most: float = 0.5) -> Problem | None:
 
 
 class NestedPath:
-    """The equilibria of a way on coarse elements up to the full load, and the last one on fine elements.
+    """The equilibria of a way on coarse elements up to the full load, and the last one on fine or solid ones.
 
     Energies and forces on the way are scaled by what the fine elements change of the last ones: the error of
     coarse elements is nearly the same share of every one.
@@ -53,7 +55,7 @@ class NestedPath:
         self._path, self._way = path, way
 
     def history(self) -> dict[str, FloatArray]:
-        """Fraction of the load, energy, N mm/mm, and reaction, N/mm, at every equilibrium."""
+        """See `LoadPath`."""
         coarse, fine = self._way.history(), self._path.history()
         size = {
             name: float(np.hypot(each["reaction_x"][-1], each["reaction_y"][-1]))
@@ -61,17 +63,16 @@ class NestedPath:
         }
         force = size["fine"] / size["coarse"] if size["coarse"] else 1.0
         energy = float(fine["energy"][-1] / coarse["energy"][-1]) if coarse["energy"][-1] else 1.0
-        scales = {"load_fraction": 1.0, "energy": energy, "reaction_x": force, "reaction_y": force}
-        return {name: np.append(scale * coarse[name][:-1], fine[name][-1]) for name, scale in scales.items()}
+        scales = {"energy": energy, "reaction_x": force, "reaction_y": force}
+        return {
+            name: np.append(scales.get(name, 1.0) * column[:-1], fine[name][-1])
+            for name, column in coarse.items()
+        }
 
     def states(self) -> list[FloatArray]:
-        """Displacements of the fine nodes at every equilibrium, each of shape (N, 2), mm."""
+        """Displacements of the fine nodes at every equilibrium, each of shape (N, d), mm."""
         before = [self._path.interpolated(self._way, nodal) for nodal in self._way.states()[:-1]]
         return [*before, self._path.points[-1].nodal]
-
-    def abscissae(self) -> list[float | None]:
-        """See `LoadPath`."""
-        return [*self._way.abscissae()[:-1], self._path.abscissae()[-1]]
 
     def regions(self) -> list[ContactRegion | None]:
         """See `LoadPath`."""
@@ -80,8 +81,10 @@ class NestedPath:
     @property
     def phrase(self) -> str:
         """The steps taken, in words."""
-        more = self._path.stats["newton_iterations"]
-        return f"{self._way.phrase}, on elements of {COARSE:g} mm; {more} more on the given ones"
+        coarse, fine = f"on elements of {COARSE:g} mm", "on the given ones"
+        if isinstance(self._path.space, ExtrudedSpace):
+            coarse, fine = "in plane strain", "in three dimensions"
+        return f"{self._way.phrase}, {coarse}; {self._path.stats['newton_iterations']} more {fine}"
 
     @property
     def stats(self) -> dict[str, float | int | str]:
@@ -92,3 +95,14 @@ class NestedPath:
         """Free what PETSc holds."""
         self._path.close()
         self._way.close()
+
+
+def followed(path: LoadPath, way: LoadPath | None, progress: Progress) -> LoadPath | NestedPath:
+    """A path to the full load: by a way on coarser elements as far as that leads, else on its own."""
+    if way is not None:
+        way.follow(progress)
+        if path.take_over(way):
+            return NestedPath(path, way)
+        way.close()
+    path.follow(progress)
+    return path

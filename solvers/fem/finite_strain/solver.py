@@ -11,8 +11,8 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
 from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from pinnray.solvers.fem.finite_strain.load_path import LoadPath
-from pinnray.solvers.fem.finite_strain.nested_path import NestedPath, coarser
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps
+from pinnray.solvers.fem.finite_strain.nested_path import coarser, followed
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
@@ -25,18 +25,13 @@ ITERATIONS = 40
 
 
 @dataclass(frozen=True)
-class FemNonlinearSolver(ElementSettings):
+class FemNonlinearSolver(LoadSteps, ElementSettings):
     """Plane strain by Newton's method, the load applied in adaptive steps; see `LoadPath`.
 
     A `patch` whose tangential component is free slides. A `cylinder` may have friction: its load
     steps are small, because friction depends on the way there.
     """
 
-    first_step: float = 0.05  # First fraction of the load
-    max_step: float = 0.2  # Largest fraction of the load in one step
-    min_step: float = 1e-3  # Fraction of the load below which the solver gives up
-    tolerance: float = 1e-8  # Largest residual force over the largest internal force
-    max_iterations: int = 12  # Newton iterations in one step
     name = "fem-nonlinear"
     family = "finite elements"
     laws = ("neo-hookean", "st-venant-kirchhoff", "gent")
@@ -74,47 +69,23 @@ class FemNonlinearSolver(ElementSettings):
         rough: bool = False,
     ) -> LoadPath:
         """The load path, not yet followed; for the arguments see `LoadPath`."""
-        return LoadPath(
-            problem,
-            space,
-            constraints,
-            exact_from=np.inf if rough else self.exact_from(problem),
-            first_step=self.first_step,
-            max_step=self.max_step,
-            min_step=self.min_step,
-            tolerance=self.tolerance,
-            max_iterations=self.max_iterations,
-        )
-
-    def followed(self, coarse: Problem | None, path: LoadPath, progress: Progress) -> LoadPath | NestedPath:
-        """The path to the full load: on coarse elements as far as that leads, else on the given ones."""
-        if coarse is not None:
-            way = self.path(coarse, LagrangeSpace(coarse.mesh, self.degree), rough=True)
-            way.follow(progress)
-            if path.take_over(way):
-                return NestedPath(path, way)
-            way.close()
-        path.follow(progress)
-        return path
+        exact_from = np.inf if rough else self.exact_from(problem)
+        return LoadPath(problem, space, constraints, steps=self, exact_from=exact_from)
 
     def _solve(self, coarse: Problem | None, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         path = self.path(problem, space)
-        followed = self.followed(coarse, path, progress)
-        last, history, regions = path.points[-1], followed.history(), followed.regions()
+        way = coarse and self.path(coarse, LagrangeSpace(coarse.mesh, self.degree), rough=True)
+        whole = followed(path, way, progress)
+        last, history, regions = path.points[-1], whole.history(), whole.regions()
         abscissa = path.force_abscissa(last)
-        if followed is path:  # else the tangent there has just been factorised
+        if whole is path:  # else the tangent there has just been factorised
             path.equilibrium.factorise(last)
         unstable = path.equilibrium.unstable
-        abscissae = followed.abscissae()
         solved = time.perf_counter()
         error = _error(path, problem, space)
-        followed.close()
-        names = () if path.equilibrium.contact is None else ("contact_width_mm", "contact_pressure_MPa")
-        pressed = {
-            name: np.array([region.stats()[name] if region else 0.0 for region in regions]) for name in names
-        }
+        whole.close()
         remarks = [
             f"error of the discretisation {error.phrase}" if error else "",
             locking_advice(self.degree, problem.material),
@@ -125,20 +96,20 @@ class FemNonlinearSolver(ElementSettings):
             field=LagrangeField(space, last.nodal),
             energy=float(history["energy"][-1]),
             reaction=np.array([history[name][-1] for name in ("reaction_x", "reaction_y")]),
-            status=_status(path, followed.phrase, regions, unstable, "; ".join(filter(None, remarks))),
+            status=_status(path, whole.phrase, regions, unstable, "; ".join(filter(None, remarks))),
             stats={
                 "seconds": solved - started,
                 "estimate_seconds": time.perf_counter() - solved,
                 "unknowns": last.nodal.size,
-                **followed.stats,
+                **whole.stats,
                 "unstable_directions": unstable,
                 "left_unstable": path.left,
                 "degree": self.degree,
                 **({} if abscissa is None else {"force_abscissa_mm": abscissa}),
                 **(regions[-1].stats() if regions[-1] else {}),
             },
-            history={**history, **_place_history(abscissae), **pressed},
-            states=[LagrangeField(space, nodal) for nodal in followed.states()],
+            history=history,
+            states=[LagrangeField(space, nodal) for nodal in whole.states()],
             error=error,
             contact=contact_of(problem, abscissa, regions[-1]),
         )
@@ -216,12 +187,3 @@ def _status(
         if region.points.friction.any():
             taken += f", of {region.width:.3g} mm {region.sticking:.3g} mm stick"
     return Status(True, "; ".join(filter(None, [taken, remarks])))
-
-
-def _place_history(found: Sequence[float | None]) -> dict[str, FloatArray]:
-    """The force's abscissa, mm; a state without a force, such as rest, has the next one's."""
-    known = [number for number, abscissa in enumerate(found) if abscissa is not None]
-    if not known:
-        return {}
-    nearest = np.array(known)[np.searchsorted(known, np.arange(len(found))).clip(max=len(known) - 1)]
-    return {"force_abscissa_mm": np.array([found[number] for number in nearest], dtype=np.float64)}

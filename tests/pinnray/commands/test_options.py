@@ -26,7 +26,7 @@ def test_the_help_of_every_command_says_that_it_can_be_quiet(name):
 @pytest.mark.parametrize(
     ("command", "files"),
     [
-        ("design --formats svg --out x", {"section.svg", "finger.toml", "design.png"}),
+        ("design --formats dxf --out x", {"section.dxf", "finger.toml", "design.png"}),
         ("mesh --mesh-size 2 --out x", {"mesh.npz", "mesh.png", "mesh.vtu"}),
         ("solve fem --mesh-size 2 --out x/fem.vtu", {"fem.vtu"}),
     ],

@@ -17,10 +17,6 @@ from tests.solvers.conftest import observed_at
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}
 PRECISE = {"preset": "local", "weights": "precision"}
 SOLVERS: dict[str, dict[str, object]] = {
-    "fem-asm": {"degree": 1},
-    "fem-asm, weights chosen": {"degree": 1, "weights": "precision", "choose": "left-out"},
-    "fem-asm, without weight": {"degree": 1, "asm_weight": 0.0},
-    "fem-asm, a soft contact": {"degree": 1, "weights": "precision", "contact_deviation": 1.0},
     "gp": {},
     "statfem": {"degree": 1},
     "pinn-asm": QUICK,
@@ -61,7 +57,7 @@ def test_a_refit_is_a_solution(coarse_mesh, observed, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["fem-asm", "pinn-asm"])
+@pytest.mark.parametrize("name", ["pinn-asm"])
 @pytest.mark.parametrize("change", ["points", "marker_radius"])
 def test_other_markers_are_solved_afresh(coarse_mesh, observed, name, change):
     solver = make_solver(name, **SOLVERS[name])

@@ -254,15 +254,15 @@ def test_a_class_of_the_calling_script_is_judged_beside_solvers_in_processes(tmp
     assert samples_of(tmp_path / "out")["solver"].unique().tolist() == ["gp", "fem"]
 
 
-def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
+def test_a_solver_that_chooses_its_weights_is_there_in_two_ways():
     from pinnray.commands.studies.crossval import read_variants
     from pinnray.options.shared import SolverOptions
 
     variants = read_variants(SolverOptions(), "fem,fem-asm", Material())
-    labels = ["fem", "fem-asm", "fem-asm left-out", "fem-asm evidence"]
+    labels = ["fem", "fem-asm", "fem-asm left-out"]
     assert [variant.label for variant in variants] == labels
     chosen = [variant.solver.settings().get("choose") for variant in variants]
-    assert chosen == [None, "given", "left-out", "evidence"]
+    assert chosen == [None, "given", "left-out"]
     fixed = SolverOptions(solver_set=("fem-asm.choose=left-out",))
     assert [variant.label for variant in read_variants(fixed, "fem-asm", Material())] == ["fem-asm"]
     stiff = Material(law="neo-hookean")  # for which there is nothing to choose

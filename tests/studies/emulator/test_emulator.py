@@ -157,7 +157,7 @@ def test_choices_are_learnt_apart(tmp_path: Path) -> None:
         ({"rib_count": 9}, "rib_count = 9 is outside the sweep: a whole number from 2 to 8"),
         ({"rib_count": 2.5}, "rib_count = 2.5 is outside the sweep: a whole number"),
         ({"depth": 20.0}, "depth is not varied in this sweep, which varies height, base_width"),
-        ({"rib_count": 8, "rib_angle": -19.0}, "first rib runs into the base wall"),
+        ({"rib_count": 8, "rib_angle": -19.0}, "between base wall and first rib"),
     ],
 )
 def test_what_it_cannot_predict_is_told(emulator: Emulator, change: dict[str, Value], words: str) -> None:
