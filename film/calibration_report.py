@@ -9,7 +9,7 @@ from matplotlib.patches import Polygon
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.comparison.figures.layout import axes_at, write_heading
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
 from pinnray.vision.calibration.camera import INTRINSICS

@@ -279,5 +279,5 @@ def crossval(
         return cross_validate(job, stages)
 
 
-SEVERAL = {"truths", "layouts", "schemes", "picture_formats"}
+SEVERAL = {"truths", "layouts", "schemes"}
 """Attributes of a cross-validation that are lists of names, of which one may stand alone."""

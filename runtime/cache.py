@@ -2,15 +2,16 @@
 
 import atexit
 import os
+import pickle
 import shutil
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile, mkdtemp
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from pinnray.runtime.atomic import remove_partials
+from pinnray.runtime.atomic import remove_partials, write_bytes
 
 Result = TypeVar("Result")
 
@@ -73,14 +74,24 @@ def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
         )
 
 
+def _unpickled(entry: Path) -> Any:
+    return pickle.loads(entry.read_bytes())
+
+
+def _pickled(made: object, entry: Path) -> None:
+    write_bytes(entry, pickle.dumps(made))
+
+
 def cached(
     entry: Path,
     what: str,
     make: Callable[[], Result],
-    load: Callable[[Path], Result],
-    save: Callable[[Result, Path], None] | None,
+    load: Callable[[Path], Result] = _unpickled,
+    save: Callable[[Result, Path], None] | None = _pickled,
 ) -> Result:
     """Load a result; make it first if it is missing or cannot be read.
+
+    A pickled entry can run code: its name must tell versions and sources, and the cache be the user's own.
 
     Args:
         entry: Its file in the cache.

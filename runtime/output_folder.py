@@ -212,7 +212,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 def check_resumable_folder(
     file: Path, definition: Mapping[str, Any], *, job: str, free: Collection[str] = ()
-) -> None:
+) -> dict[str, Any]:
     """Refuse a folder that holds a job with another definition, or something else.
 
     Args:
@@ -220,12 +220,15 @@ def check_resumable_folder(
         definition: The definition of this job.
         job: The kind of job, such as "grid search".
         free: Entries that may differ, such as `study.samples`.
+
+    Returns:
+        The entries of the definition in the folder; none if it is new.
     """
     out = file.parent
     if out.exists() and not out.is_dir():
         raise UserError(f"{out} is a file; name an output folder")
     if not out.exists() or all(is_partial(path) for path in out.iterdir()):
-        return
+        return {}
     try:
         before = _flat(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError):
@@ -237,6 +240,7 @@ def check_resumable_folder(
             f"{out} holds a {job} with other settings ({', '.join(names)}); "
             "name another output folder, or remove that one"
         )
+    return before
 
 
 def _flat(content: Mapping[str, Any]) -> dict[str, Any]:

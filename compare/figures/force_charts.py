@@ -7,13 +7,8 @@ import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.force_curves import ForceCurve, follows_load
-from pinnray.comparison.figures.style import (
-    axes_at,
-    legend_above,
-    legend_height,
-    solver_colour,
-    write_heading,
-)
+from pinnray.comparison.figures.layout import axes_at, legend_above, legend_height, write_heading
+from pinnray.comparison.figures.solver_colours import solver_colour
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
 
@@ -24,6 +19,7 @@ def draw_force_displacement(
     depth: float,
     truth: ForceCurve | None = None,
     identified: Mapping[int, Evaluation] | None = None,
+    page: float = WIDTH,
 ) -> Figure:
     """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
 
@@ -39,10 +35,10 @@ def draw_force_displacement(
         if each.identified is not None
     }
     more = [f"{each.label}, {along.value:.3g} N/mm, identified" for each, along in found.values()]
-    top, height, left = 0.3 + legend_height([*labels, *true_label, *more]), 2.4, 0.75  # inches
-    with figure(top + height + 0.45) as drawn:
+    top, height, left = 0.3 + legend_height([*labels, *true_label, *more], page), 2.4, 0.75  # inches
+    with figure(top + height + 0.45, page) as drawn:
         write_heading(drawn, "Force of the indenter along its travel")
-        axes = axes_at(drawn, (left, top, WIDTH - left - 0.65, height))
+        axes = axes_at(drawn, (left, top, page - left - 0.65, height))
         straight = sum(not follows_load(curve.evaluation) for curve in curves)
         for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
             followed = follows_load(curve.evaluation)
@@ -91,12 +87,12 @@ def draw_force_displacement(
         )
         whole.set_ylabel(f"force for {depth:g} mm of depth, N")
         whole.spines["right"].set(visible=True, color=INK)
-        legend_above(axes)
+        legend_above(axes, page)
     return drawn
 
 
 def _end_label(curve: ForceCurve, name: str) -> str:
-    return f"{name}, {curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
+    return f"{name}, {curve.force[-1]:.3g} N/mm"
 
 
 def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, *, depth: float) -> Figure:

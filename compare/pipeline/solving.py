@@ -11,7 +11,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.certifier import with_certificates
 from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated
 from pinnray.comparison.pipeline.job import Job
 from pinnray.geometry.cache import expected_triangles

@@ -101,7 +101,6 @@ class CrossvalStudy:
             each draw chooses; the observations say so.
         measurements: Marker displacements from elsewhere; None for the virtual experiment.
         processes: Solvers run at a time.
-        picture_formats: Formats of the pictures besides PNG.
     """
 
     design: Finger
@@ -118,7 +117,6 @@ class CrossvalStudy:
     frame: Registration = FIXED
     measurements: Observations | None = None
     processes: int = field(default_factory=cores)
-    picture_formats: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", mesh_sizes(self.design, self.mesh, SIZES))
@@ -165,12 +163,11 @@ class CrossvalStudy:
 
     def check(self) -> None:
         """Raise a `UserError` for a study that cannot be done, before anything is computed."""
-        if self.layouts and self.measurements:
-            raise UserError("layouts: markers that were measured are where they are; name no layouts")
-        if not self.frame.fixed and self.measurements:
-            raise UserError("frame: the file of the measurements says how well their pictures are known")
-        if tuple(self.truths) != (SLIDING.name,) and self.measurements:
-            raise UserError("a truth is for a simulated experiment; with measurements name none")
+        simulated = self.layouts or not self.frame.fixed or tuple(self.truths) != (SLIDING.name,)
+        if simulated and self.measurements:
+            raise UserError(
+                "truths, layouts and frame are of a simulated experiment; with measurements name none"
+            )
         check_truths(self.truth_names, self.design)
         _check_distinct("layouts: a layout", self.layouts)
         for layout, points in self.markers.items():

@@ -195,8 +195,7 @@ class FieldEmulator:
     @property
     def young(self) -> float:
         """Young's modulus of which `numbers` are, MPa."""
-        middle = {name: sum(values.ends) / 2 for name, values in self.study.varied.items() if name == "young"}
-        return self.inputs.physics(middle)[0].young
+        return self.inputs.physics(self.study.middle)[0].young
 
     @cached_property
     def law(self) -> LawName:

@@ -7,7 +7,7 @@ import pytest
 from pinnray.runtime.atomic import atomic_path
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.output_folder import check_resumable_folder
-from pinnray.studies.sweep import sweep
+from pinnray.studies.sweep import store
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.study import Range, Study
 from pinnray.studies.sweep.sweep import run_sweep
@@ -40,7 +40,7 @@ def test_a_sweep_killed_before_its_definition_is_there_leaves_no_file(tmp_path, 
         raise Killed
 
     study = Study(name="ribs", samples=2, varied={"rib_angle": Range(**{"from": 0, "to": 10})})
-    monkeypatch.setattr(sweep, "write_json", killed)
+    monkeypatch.setattr(store, "write_json", killed)
     with pytest.raises(Killed):
         run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert list((tmp_path / "out").iterdir()) == []

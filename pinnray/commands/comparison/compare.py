@@ -1,5 +1,6 @@
 """The main job: solve one finger with several solvers and compare them."""
 
+import re
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -50,6 +51,7 @@ def command(
     from_: Annotated[Path | None, Parameter(name=OPTION)] = None,
     out: OptionalOutputPath = None,
     pictures: Annotated[str, Parameter(group=OUTPUT)] = "",
+    width: Annotated[str | None, Parameter(group=OUTPUT)] = None,
     resume: OutputFlag = False,
     json_: Annotated[bool, Parameter(name="--json", group=OUTPUT)] = False,
 ) -> int:
@@ -77,8 +79,11 @@ def command(
         reference: Solver that the others are compared with; default fem, else the first.
         from_: File with options that the command line leaves out: TOML or JSON with a table `options`, or the
             run.json of an earlier run, which is repeated so; default: none.
-        out: Output folder; default out/DESIGN, unless that holds the finished run of another job.
+        out: Output folder; default out/DESIGN, or out/DESIGN-MEASUREMENTS with the name of their file, unless
+            that holds the finished run of another job.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
+        width: Width of the pictures, such as 85mm (a journal's column) or 180mm (its page), whose type has 8
+            to 9 points; default 140mm.
         resume: Reuse solutions that an earlier run finished.
         json_: Print metrics.json and nothing else.
     """
@@ -98,6 +103,14 @@ def command(
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
     names = job_defaults(options.preset).solvers if solvers is None else solvers
+    given = given_options(
+        *(finger, physics, options, film),
+        **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
+        **{"reference": reference, "pictures": pictures, "width": width},
+    )
+    folder = out or _own_folder(design.name, measurements)
+    if out is None and not resume:
+        check_same_job(folder, given, usual_options(finger, physics, options, film))
     with nullcontext() if cores() < 2 else second_process(comma_list(names)) as pool:
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
@@ -114,17 +127,12 @@ def command(
             truth=_truth(truth, measurements),
             measurements=_measurements(measurements, film),
             reference=reference,
-            out=out or Path("out") / design.name,
+            out=folder,
             resume=resume,
             picture_formats=comma_list(pictures),
-            options=given_options(
-                *(finger, physics, options, film),
-                **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
-                **{"reference": reference, "pictures": pictures},
-            ),
+            picture_width=None if width is None else _millimetres(width),
+            options=given,
         )
-        if out is None and not resume:
-            check_same_job(job.out, job.options, usual_options(finger, physics, options, film))
         try:
             with Stages(Console(stderr=True), quiet=json_) as stages:
                 comparison = run(job, stages, pool)
@@ -158,6 +166,22 @@ def command(
         say(f"error: {evaluation.solver} did not converge{'' if told else f': {evaluation.message}'}")
     done = not (comparison.failed or comparison.unconverged) and tolerance_reached(comparison.adaptation)
     return 0 if done else NOT_CONVERGED
+
+
+def _own_folder(name: str, measurements: str | None) -> Path:
+    """The output folder of a job that names none: that of its finger and its measurements."""
+    if measurements is None:
+        return Path("out") / name
+    source = re.sub(r"[^A-Za-z0-9._-]+", "-", Path(measurements).stem).strip("-.")
+    return Path("out") / f"{name}-{source or 'measurements'}"
+
+
+def _millimetres(text: str) -> float:
+    """A width in mm from a number with or without its unit."""
+    given = re.fullmatch(r"(\d+(?:\.\d+)?) *(mm|cm|in)?", text.strip())
+    if given is None:
+        raise UserError(f"--width {text}: give a number in mm, cm or in, such as 85mm")
+    return float(given[1]) * {"cm": 10.0, "in": 25.4}.get(given[2], 1.0)
 
 
 def _truth(name: str | None, measurements: str | None) -> str:

@@ -36,7 +36,7 @@ def command(
         strokes: Strokes at which to print the force, mm, separated by commas; default: the full one.
         out: VTU file of the fields.
     """
-    from pinnray.comparison.evaluation.certification import with_certificates
+    from pinnray.comparison.evaluation.certifier import with_certificates
     from pinnray.comparison.evaluation.deformed_body import with_body_checks
     from pinnray.comparison.evaluation.evaluation import evaluated
     from pinnray.comparison.evaluation.force_curves import force_curves, write_force_displacement

@@ -14,7 +14,6 @@ from pinnray.options.shared import (
     comma_list,
     existing_table,
     going_on_from,
-    read_formats,
     read_processes,
 )
 from pinnray.runtime.exits import NOT_CONVERGED, say
@@ -41,7 +40,6 @@ def command(
     frame: str = "fixed",
     measurements: Path | None = None,
     processes: int | None = None,
-    pictures: str = "",
     out: OptionalOutputPath = None,
 ) -> int:
     """Score solvers on markers, loads and fields that they were not given.
@@ -64,7 +62,6 @@ def command(
             "turn 3 deg, shift 0.3 mm, scale 1 %".
         measurements: CSV file of marker displacements; default: simulated.
         processes: Solvers run at a time; default: one per core.
-        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/crossval-DESIGN.
     """
     from pinnray.geometry.registration import Registration
@@ -94,7 +91,6 @@ def command(
         measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
         out=out or Path("out") / f"crossval-{design.name}",
         processes=read_processes(processes),
-        picture_formats=read_formats(pictures),
     )
     made = [variant.solver for variant in study.variants]
     finger.check_cost(design, mesh, made, simulated=True)
