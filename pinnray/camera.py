@@ -14,7 +14,8 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.measurements import load_measurements
 from pinnray.runtime.text_files import as_path
-from pinnray.solvers.physics import Load, LoadKind, Material
+from pinnray.solvers.load import Load, LoadKind
+from pinnray.solvers.material import Material
 from pinnray.solvers.solver import Solver
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.runtime.text_files import as_path
-from pinnray.solvers.physics import Physics
+from pinnray.solvers.load import Physics
 
 if TYPE_CHECKING:
     import pandas as pd

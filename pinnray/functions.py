@@ -23,7 +23,8 @@ from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import as_path
 from pinnray.solution import Solution
-from pinnray.solvers.physics import Load, LoadKind, Material
+from pinnray.solvers.load import Load, LoadKind
+from pinnray.solvers.material import Material
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Solver, Traits, check_asked, solved, with_law

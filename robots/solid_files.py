@@ -8,7 +8,7 @@ import pyvista
 
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.runtime.atomic import atomic_path, write_json
-from pinnray.solvers.physics import Material
+from pinnray.solvers.material import Material
 
 
 def write_solid(out: Path, body: SolidMesh) -> tuple[Path, Path]:

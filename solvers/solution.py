@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
-from pinnray.geometry.registration import Pictures
+from pinnray.geometry.picture_frame import Pictures
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.runtime.notebook import brief, fact_table
 from pinnray.solvers.elasticity import energy_density_of, strain_of, stress_of, von_mises

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import HAND_HELD, Homography, nearest_similarity
+from pinnray.geometry.picture_frame import HAND_HELD, Homography, nearest_similarity
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import read_table

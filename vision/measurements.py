@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, HAND_HELD, Registration
+from pinnray.geometry.picture_frame import FIXED, HAND_HELD, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import atomic_path
 from pinnray.runtime.errors import UserError

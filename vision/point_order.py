@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pinnray.geometry.registration import FREE
+from pinnray.geometry.picture_frame import FREE
 from pinnray.runtime.arrays import FloatArray, IntArray
 
 SMOOTH = 0.5

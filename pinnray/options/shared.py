@@ -16,13 +16,14 @@ from pinnray.geometry.finger.parameters import CheckedModel
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import errors_of_interruption, say
 from pinnray.runtime.machine import cores
-from pinnray.solvers.physics import LoadKind, Material, Physics
+from pinnray.solvers.load import LoadKind, Physics
+from pinnray.solvers.material import Material
 
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
     from pinnray.geometry.finger.design import Design
     from pinnray.geometry.finger.finger import Finger
     from pinnray.geometry.mesh.settings import MeshSettings
-    from pinnray.solvers.physics import Load
+    from pinnray.solvers.load import Load
     from pinnray.solvers.solver import Solver
     from pinnray.studies.sweep.job import S, StudyJob
 

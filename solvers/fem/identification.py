@@ -12,7 +12,7 @@ import ufl
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import Registration
+from pinnray.geometry.picture_frame import Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import COST_CHANGE

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.wall_motion import WallMotion
-from pinnray.geometry.registration import Pictures
+from pinnray.geometry.picture_frame import Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import deformation_jacobian
 from pinnray.solvers.identification.body import Body

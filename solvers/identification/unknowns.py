@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pinnray.geometry.mesh.wall_motion import WallMotion
-from pinnray.geometry.registration import PARTS, Pictures
+from pinnray.geometry.picture_frame import PARTS, Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Parameter
-from pinnray.solvers.assimilation.pictures import picture_parameters, pictures_of
+from pinnray.solvers.assimilation.picture_frames import picture_parameters, pictures_of
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
 from pinnray.solvers.identification.boundary import Feet, FrontTraction
 from pinnray.solvers.problem import Material, Problem, contact_ends

@@ -14,7 +14,7 @@ from pinnray.comparison.evaluation.truths import experiment_source
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED
+from pinnray.geometry.picture_frame import FIXED
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.content_hash import content_hash, has_source, sources_digest
 from pinnray.runtime.errors import UserError

@@ -14,7 +14,7 @@ from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, PARTS, Homography, Registration
+from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores

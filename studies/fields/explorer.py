@@ -14,7 +14,7 @@ from pinnray.runtime.html import Packed
 from pinnray.runtime.machine import package_versions
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.lagrange import LagrangeSpace
-from pinnray.solvers.physics import Physics
+from pinnray.solvers.load import Physics
 from pinnray.studies.emulator.inputs import WIDE
 from pinnray.studies.fields.emulator import FieldEmulator
 from pinnray.studies.fields.gaussian_processes import Block

@@ -16,7 +16,7 @@ from pinnray.comparison.figures.fields import VIEWED
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.solution import FieldName
 from pinnray.solvers.finger_figures import figures_of
-from pinnray.solvers.physics import Physics
+from pinnray.solvers.load import Physics
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_once")
 

@@ -21,7 +21,7 @@ from pinnray.geometry.drawing.formats.msh import _numbers as msh_numbers
 from pinnray.geometry.drawing.formats.planes import plane_of
 from pinnray.geometry.drawing.load import finger_from_file, read_drawing
 from pinnray.geometry.mesh.quadrature import triangle_rule
-from pinnray.geometry.registration import Registration
+from pinnray.geometry.picture_frame import Registration
 from pinnray.runtime.text_files import read_json, read_toml
 from tests.geometry.drawing.files import (
     BEAM,

@@ -25,8 +25,8 @@ from pinnray.solvers.elasticity import (
 from pinnray.solvers.fem.adaptive_refinement import adapted
 from pinnray.solvers.finger_figures import figures_of
 from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.load import Physics
 from pinnray.solvers.materials import TensileTest, fitted, preset, read_tensile_test
-from pinnray.solvers.physics import Physics
 from pinnray.solvers.pinn.finite_basis.energy import piola_stress_and_tangent
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver

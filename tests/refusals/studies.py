@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pinnray.geometry.finger.design import Design
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material
 from pinnray.studies.crossval.folds import load_cases_of

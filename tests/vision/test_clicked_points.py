@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.runtime.errors import UserError
 from pinnray.vision.clicked_points import Clicks, clicked_points, read_clicks
 

@@ -19,7 +19,7 @@ from pinnray.options.shared import (
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 if TYPE_CHECKING:
-    from pinnray.solvers.physics import Material
+    from pinnray.solvers.material import Material
     from pinnray.studies.crossval.study import SolverVariant
 
 TEXTS = ("solver", "held out")
@@ -64,7 +64,7 @@ def command(
         processes: Solvers run at a time; default: one per core.
         out: Output folder; default out/crossval-DESIGN.
     """
-    from pinnray.geometry.registration import Registration
+    from pinnray.geometry.picture_frame import Registration
     from pinnray.runtime.stages import Stages
     from pinnray.runtime.tables import terminal_table
     from pinnray.studies.crossval.cross_validation import cross_validate

@@ -7,7 +7,7 @@ import pytest
 
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.quadrature import body_quadrature
-from pinnray.geometry.registration import HAND_HELD, Homography, Registration
+from pinnray.geometry.picture_frame import HAND_HELD, Homography, Registration
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver

@@ -17,7 +17,7 @@ import pytest
 from pinnray.cli import main
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Material, Problem

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
+from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Pictures, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Parameter, values_of
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
