@@ -53,6 +53,11 @@ def test_a_silicone_has_the_stress_of_its_sheet_at_twice_its_length():
         preset("tpu")
 
 
+@pytest.mark.parametrize("name", ["TPU-85A", "TPU 85A", "tpu_85a"])
+def test_a_material_is_known_as_its_maker_writes_it(name):
+    assert preset(name) is preset("tpu-85a")
+
+
 def test_a_test_is_read_with_the_units_of_its_columns(tmp_path):
     file = tmp_path / "strip.csv"
     file.write_text("# of a strip\nstrain_percent;stress_kPa\n0;0\n10;50\n20;100\n50;220\n")
