@@ -34,7 +34,7 @@ WATCHED = (OUT, f".{OUT}", CACHE)
 """Folders whose changes count."""
 
 FEM = "compare --design default --mesh-size 4 --solvers fem"
-RIG = "rig --mesh-size 4 --frame 320x240 --rest 4 --moving 2 --held 4 --codec png"
+RIG = "rig --mesh-size 4 --size 320x240 --rest 4 --moving 2 --held 4 --codec png"
 TRACK = "track FOLDER/film/frames --camera FOLDER/film/camera.json"
 JOBS = {
     "compare": (FEM,),
