@@ -124,7 +124,7 @@ def command(
             adapt=adapt,
             material=material,
             load=load,
-            truth=_truth(truth, measurements),
+            truth=truth,
             measurements=_measurements(measurements, film),
             reference=reference,
             out=folder,
@@ -182,15 +182,6 @@ def _millimetres(text: str) -> float:
     if given is None:
         raise UserError(f"--width {text}: give a number in mm, cm or in, such as 85mm")
     return float(given[1]) * {"cm": 10.0, "in": 25.4}.get(given[2], 1.0)
-
-
-def _truth(name: str | None, measurements: str | None) -> str:
-    """The name of what is simulated; nothing is where there are measurements."""
-    from pinnray.comparison.evaluation.truths import SLIDING
-
-    if name is not None and measurements is not None:
-        raise UserError("--truth is for a simulated experiment; with --measurements leave it out")
-    return SLIDING.name if name is None else name
 
 
 def _measurements(source: str | None, options: FilmSettings) -> "Path | Film | None":
