@@ -68,6 +68,8 @@ class Fem3dSolver(FieldSettings):
     layers: int = 4  # Layers of elements in half of the depth
     grading: float = 0.25  # Thickness of the layer at the side face over that at the middle plane
     sides: Literal["free", "held"] = "free"  # Side faces that are "held" do not move along z: plane strain
+    # Fractions of the load at which a step ends; with any, no step is that of the plane
+    stops: tuple[float, ...] = ()
     name = "fem-3d"
     family = "finite elements"
     laws = ("linear", "neo-hookean", "st-venant-kirchhoff")
@@ -96,9 +98,9 @@ class Fem3dSolver(FieldSettings):
         started = time.perf_counter()
         space, linear = self.space(problem), problem.material.law == "linear"
         way = None
-        if not (linear or problem.load.friction):  # friction depends on the way
+        if not (linear or problem.load.friction or self.stops):  # friction depends on the way
             way = FemNonlinearSolver().path(problem, space.section, rough=True)
-        path = LoadPath(problem, space, steps=LINEAR if linear else LoadSteps())
+        path = LoadPath(problem, space, steps=LINEAR if linear else LoadSteps(stops=self.stops))
         whole = followed(path, way, progress)
         last, history, region = path.points[-1], whole.history(), whole.regions()[-1]
         unstable = 0 if linear else path.equilibrium.unstable
@@ -131,7 +133,7 @@ class Fem3dSolver(FieldSettings):
 def _status(path: LoadPath, taken: str, region: ContactRegion | None, unstable: int) -> Status:
     """Success at the full load, or advice."""
     if path.points[-1].fraction < 1:
-        return Status(False, f"{taken}; take a finer mesh, a wider contact or a smaller stroke")
+        return Status(False, f"{taken}; {path.advice}")
     if region and region.at_end:
         return Status(False, CONTACT_AT_END)
     if unstable:
