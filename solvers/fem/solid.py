@@ -1,7 +1,7 @@
 """`fem-3d`: linear and finite-strain elasticity of the extruded finger with DOLFINx."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -19,7 +19,8 @@ from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status, unstable_phrase
 from pinnray.solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
 
-LINEAR = LoadSteps(first_step=1.0, max_step=1.0)
+STEPS = LoadSteps(first_step=1.0, max_step=1.0, min_step=0.01, max_iterations=20)
+"""In small ones the friction of a solid hardly settles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +101,7 @@ class Fem3dSolver(FieldSettings):
         way = None
         if not (linear or problem.load.friction or self.stops):  # friction depends on the way
             way = FemNonlinearSolver().path(problem, space.section, rough=True)
-        path = LoadPath(problem, space, steps=LINEAR if linear else LoadSteps(stops=self.stops))
+        path = LoadPath(problem, space, steps=replace(STEPS, stops=self.stops))
         whole = followed(path, way, progress)
         last, history, region = path.points[-1], whole.history(), whole.regions()[-1]
         unstable = 0 if linear else path.equilibrium.unstable
