@@ -9,4 +9,4 @@ import os
 
 from pinnray.geometry import cache
 
-cache._version = json.loads(os.environ["MAKERS"]).__getitem__
+cache.package_version = json.loads(os.environ["MAKERS"]).__getitem__

@@ -1,23 +1,21 @@
-"""A calibration to check: tables of intrinsics and errors, a picture of residuals, coverage, undistortion."""
+"""A calibration to check: tables of intrinsics and errors, a picture of residuals and coverage."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.comparison.figures.layout import axes_at, write_heading
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
-from pinnray.vision.calibration.camera import Camera
+from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
+from pinnray.vision.calibration.camera import INTRINSICS
 from pinnray.vision.calibration.camera_calibration import Calibration
 
-MARGIN, GAP, HEAD, TITLE = 0.12, 0.14, 0.56, 0.2
+MARGIN, HEAD = 0.12, 0.56
 LONGEST = 0.05
 """Drawn length of the 95th percentile of the residuals, in image widths."""
 COVERED = "#56b4e9"
@@ -27,8 +25,8 @@ def calibration_table(calibration: Calibration) -> Table:
     """The intrinsics with standard deviations, and the reprojection errors."""
     camera = calibration.camera
     table = Table("camera", "value", "±", "unit", box=SIMPLE_HEAD)
-    deviations = camera.standard_deviations or (0.0,) * len(camera.intrinsic_names)
-    for name, value, deviation in zip(camera.intrinsic_names, camera.intrinsics, deviations, strict=True):
+    deviations = camera.standard_deviations or (0.0,) * len(INTRINSICS)
+    for name, value, deviation in zip(INTRINSICS, camera.intrinsics, deviations, strict=True):
         digits, unit = (5, "") if name[0] in "kp" else (2, "px")
         table.add_row(name, f"{value:.{digits}f}", f"{deviation:.{digits}f}" if deviation else "fixed", unit)
     seen = len(calibration.view_errors)
@@ -39,33 +37,14 @@ def calibration_table(calibration: Calibration) -> Table:
     return table
 
 
-def view_table(calibration: Calibration, *, most: int = 15) -> Table:
-    """The reprojection errors of the photographs, largest first."""
-    table = Table("photograph", "corners", "rms error, px", box=SIMPLE_HEAD)
-    errors = sorted(calibration.view_errors.items(), key=lambda entry: -entry[1])
-    for name, error in errors[:most]:
-        seen = np.isfinite(calibration.views[name][:, 0]).sum()
-        table.add_row(name, f"{seen}", f"{error:.3f}")
-    if len(errors) > most:
-        table.add_row(f"and {len(errors) - most} with smaller errors", "", "")
-    return table
-
-
-def draw_calibration(calibration: Calibration, name: str, photograph: NDArray[np.uint8]) -> Figure:
-    """Draw the residuals of all photographs, and one photograph before and after undistortion.
-
-    Args:
-        calibration: The calibration.
-        name: Name of the photograph.
-        photograph: Its grey levels, shape (height, width).
-    """
+def draw_calibration(calibration: Calibration) -> Figure:
+    """Draw the residuals of all photographs, and the part of the image that they cover."""
     camera = calibration.camera
-    shape = camera.height / camera.width
-    wide, half = WIDTH - 2 * MARGIN, (WIDTH - 2 * MARGIN - GAP) / 2
-    below = HEAD + wide * shape + GAP + TITLE
+    wide = WIDTH - 2 * MARGIN
+    high = wide * camera.height / camera.width
     longest = np.nanquantile(np.linalg.norm(_all(calibration.residuals.values()), axis=1), 0.95)
     factor = _round(LONGEST * camera.width / max(longest, 1e-9))
-    with figure(below + half * shape + MARGIN) as drawn:
+    with figure(HEAD + high + MARGIN) as drawn:
         write_heading(
             drawn,
             f"Calibration from {len(calibration.views)} photographs",
@@ -73,25 +52,11 @@ def draw_calibration(calibration: Calibration, name: str, photograph: NDArray[np
             f"{calibration.rms:.3f} px, held out {calibration.held_out_rms:.3f} px.\n"
             f"Blue: inside a board at least once, {100 * calibration.coverage:.0f} % of the image.",
         )
-        _residuals(_image(axes_at(drawn, (MARGIN, HEAD, wide, wide * shape)), camera), calibration, factor)
-        seen = calibration.views[name][np.isfinite(calibration.views[name]).all(axis=1)]
-        taken = ("as photographed", photograph, seen)
-        straight = ("undistorted", undistorted(photograph, camera), camera.undistort(seen))
-        for number, (title, image, corners) in enumerate((taken, straight)):
-            axes = axes_at(drawn, (MARGIN + number * (half + GAP), below, half, half * shape))
-            _image(axes, camera).imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="antialiased")
-            axes.plot(*corners.T, ".", ms=1.5, color=MEASURED)
-            axes.set_title(f"{Path(name).name} {title}", size=SMALL, color=MUTED, pad=3)
+        axes = axes_at(drawn, (MARGIN, HEAD, wide, high))
+        axes.set(xlim=(-0.5, camera.width - 0.5), ylim=(camera.height - 0.5, -0.5), xticks=[], yticks=[])
+        axes.spines[:].set_visible(True)
+        _residuals(axes, calibration, factor)
     return drawn
-
-
-def undistorted(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
-    """The image of a pinhole camera with the same matrix, to look at, not to measure in."""
-    height, width = image.shape[:2]
-    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
-    places = camera.distort(pixels).astype(np.float32).reshape(height, width, 2)
-    straight = cv2.remap(image, places, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
-    return np.asarray(straight, dtype=np.uint8)
 
 
 def _residuals(axes: Axes, calibration: Calibration, factor: float) -> None:
@@ -103,13 +68,6 @@ def _residuals(axes: Axes, calibration: Calibration, factor: float) -> None:
     lines = np.stack([corners, ends, np.full_like(ends, np.nan)], axis=1).reshape(-1, 2)
     axes.plot(*lines.T, color=INK, lw=0.5)
     axes.plot(*corners.T, ".", ms=1.2, color=MEASURED)
-
-
-def _image(axes: Axes, camera: Camera) -> Axes:
-    """Axes in pixels, y down, with a frame only."""
-    axes.set(xlim=(-0.5, camera.width - 0.5), ylim=(camera.height - 0.5, -0.5), xticks=[], yticks=[])
-    axes.spines[:].set_visible(True)
-    return axes
 
 
 def _all(arrays: Iterable[FloatArray]) -> FloatArray:

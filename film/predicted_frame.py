@@ -13,9 +13,9 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.figures.gallery import each_of
+from pinnray.comparison.figures.layout import axes_at, legend_below_heading, write_heading
 from pinnray.comparison.figures.overlay import errors_note
-from pinnray.comparison.figures.style import axes_at, legend_below_heading, write_heading
-from pinnray.geometry.registration import nearest_similarity
+from pinnray.geometry.picture_frame import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
 from pinnray.vision.frames.frame import Image

@@ -1,4 +1,4 @@
-"""Settings of the virtual rig besides finger, load, exposure and motion: camera, markers, cables, boards."""
+"""Settings of the virtual rig besides finger, load, exposure and motion: camera, markers, boards."""
 
 import re
 from pathlib import Path
@@ -20,7 +20,7 @@ MOST_PIXELS = 4_000_000
 
 
 class RigSettings(CheckedModel):
-    """Camera, markers, cables and calibration boards of the virtual rig."""
+    """Camera, markers and calibration boards of the virtual rig."""
 
     frame: str = Field(default="1280x720", description="Width and height of the frames, pixels")
     camera: Path | None = Field(default=None, description="Camera file; none: a camera of that size")
@@ -36,32 +36,10 @@ class RigSettings(CheckedModel):
         0.0, 0, 0.1, "", "", "Deviation of the markers' outlines from circles, rms over the radius"
     )
     marker_plane: float = bounded(0.0, -1000, 1000, "mm", "", "Height of the markers above the fiducials")
-    cover: tuple[str, ...] = Field(
-        default=(),
-        description="Cover a share of a marker's diameter with a cable, such as 5=0.4; may be repeated",
-    )
-    cover_paint: Literal["dark", "light"] = Field(default="dark", description="Colour of the cables")
-    cover_during: Literal["all", "rest", "moving", "held"] = Field(
-        default="all", description="Part of the film that shows the cables"
-    )
     boards: int = bounded(0, 0, 1000, "", "", "Number of photographs of a calibration board")
     board: str = Field(default="9x6", description="Board as for `pinnray calibrate`: 9x6, charuco:8x6")
     square: float = Field(default=8.0, description="Side of a square of the board [mm]")
     marker: float | None = Field(default=None, description="Side of a marker of a ChArUco board [mm]")
-
-    @property
-    def covered(self) -> dict[int, float]:
-        """The covered shares of the diameters by the numbers of the markers.
-
-        Raises:
-            UserError: If a text cannot be read.
-        """
-        shares = {}
-        for text in self.cover:
-            if not (found := re.fullmatch(r"(\d+)=(\d*\.?\d+)", text.strip())):
-                raise UserError(f"cover {text}: write marker=share, such as 5=0.4")
-            shares[int(found[1])] = float(found[2])
-        return shares
 
     def sheet(self) -> "Board":
         """The calibration board.

@@ -1,7 +1,7 @@
 """Tracks a film and writes the displacements, the trajectories and pictures to check them by eye."""
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import NONE, Cell, significant, terminal_table, write_csv
 from pinnray.solvers.solver import Progress
-from pinnray.vision.frames.frame import DEFAULT_RATE, RIG_MARK, Frame, Frames, Image
+from pinnray.vision.frames.frame import DEFAULT_RATE, RIG_MARK, Frame, Image
 from pinnray.vision.frames.pictures import write_picture
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.frames.video import video_writer
@@ -42,8 +42,7 @@ def track_film(
     report: Progress,
     *,
     video: bool = True,
-    record: Path | None = None,
-    watch: Callable[[Frame, FrameDetections], None] | None = None,
+    watch: Callable[[Frame, FrameDetections], str | None] | None = None,
 ) -> tuple[Tracking, Observations]:
     """Track a film and write `observations.csv`, `tracks.csv`, `track.json` and pictures into a folder.
 
@@ -53,9 +52,7 @@ def track_film(
         folder: An existing folder.
         report: Called with the fraction done and a short text.
         video: Whether to write the annotated video too.
-        record: Video of all frames that were seen, also of a film that is refused in the end; for a camera or
-            a pipe, which show them once.
-        watch: Called with every frame and its detections.
+        watch: Called with every frame and its detections; the words that it returns are reported.
 
     Raises:
         UserError: If the film cannot be read or tracked.
@@ -67,8 +64,6 @@ def track_film(
             raise UserError(
                 f"fps {film.fps:g}: {frames.name} says {frames.rate:g} frames a second itself; leave it out"
             )
-        if record is not None:
-            stack.enter_context(recorded(frames, record))
         write = None
         if video:
             write = stack.enter_context(
@@ -88,10 +83,9 @@ def track_film(
             if write is not None:
                 lines = [f"frame {frame.number}, {frame.time:.3f} s", status]
                 write(annotated(frame.image, detections, lines))
-            if watch is not None:
-                watch(frame, detections)
+            said = watch(frame, detections) if watch is not None else None
             share = (frame.number + 1) / frames.count if frames.count else 0.0
-            report(min(share, 1.0), f"frame {frame.number + 1}, {status}")
+            report(min(share, 1.0), f"frame {frame.number + 1}, {said or status}")
 
         tracking = track(frames, scene, see)
         if not frames.timed and len(tracking.times) > BEFORE_AND_AFTER:
@@ -106,35 +100,6 @@ def track_film(
     write_csv(folder / "tracks.csv", track_rows(tracking))
     write_json(folder / "track.json", track_summary(tracking, observations) | film.provenance())
     return tracking, observations
-
-
-@contextmanager
-def recorded(frames: Frames, path: Path) -> Iterator[None]:
-    """Write the frames that are iterated in the block into a video, also if the block raises a `UserError`.
-
-    Raises:
-        UserError: If the frames are those of a file, which exists, or the video cannot be written.
-    """
-    if frames.count is not None:
-        raise UserError(f"{frames.name} is a file; a recording keeps the frames of a camera or a pipe")
-    refusal: UserError | None = None
-    with video_writer(path, frames.size, frames.rate, comment=RIG_MARK if frames.simulated else "") as write:
-        seen = 0
-
-        def keep(image: Image) -> None:
-            nonlocal seen
-            write(image)
-            seen += 1
-
-        frames.keep(keep)
-        try:
-            yield
-        except UserError as error:
-            if not seen:
-                raise
-            refusal = error
-    if refusal is not None:
-        raise refusal
 
 
 def _sentence(film: Film, tracking: Tracking) -> str:

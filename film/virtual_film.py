@@ -13,12 +13,11 @@ from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import write_csv
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
-from pinnray.solvers.solver import Solver, solved, with_law
+from pinnray.solvers.solver import Solver, check_law, solved, with_law
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.boards import board_poses, board_scene
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
-from pinnray.vision.rig.occluders import cables, check_covers
 from pinnray.vision.rig.recording import Recording
 from pinnray.vision.rig.recording_files import photograph, record
 
@@ -39,6 +38,7 @@ def filmed_solution(problem: Problem, solver: Solver | None, stages: Stages) -> 
         with stages.stage("virtual experiment") as progress:
             solution = simulate(free, progress, max_step=LONGEST_STEP)
         return solution, experiment_source(free)
+    check_law([solver], problem.material)
     with stages.stage(solver.name) as progress:
         problem = replace(problem, material=with_law(problem.material, solver))
         solution = solved(solver, problem, progress)
@@ -66,7 +66,7 @@ def film_finger(
         solver: See `filmed_solution`.
         out: The folder, which is replaced.
         stages: Shows the progress.
-        rig: Camera, markers, cables and board.
+        rig: Camera, markers and board.
         exposure: Light, lens and sensor.
         motion: Numbers of frames at rest, moving and held.
         codec: Of the video.
@@ -79,8 +79,7 @@ def film_finger(
     if finger is None:
         raise UserError("a film is of a finger")
     workspace, camera, pose = rig.view(finger)
-    board, covered = rig.sheet(), rig.covered
-    check_covers(covered, len(mesh.marker_nodes))
+    board = rig.sheet()
     bench = Bench(mesh, finger, workspace, rig.paint, rig.irregular)
     solution, source = filmed_solution(problem, solver, stages)
     course = filmed_course(solution)
@@ -91,7 +90,6 @@ def film_finger(
         pose=pose,
         exposure=exposure,
         motion=motion,
-        occluders=cables(bench, course, motion, covered, rig.cover_during, paint=rig.cover_paint),
         seed=seed,
         course=course,
     )

@@ -1,28 +1,26 @@
-"""Cache of meshes and CAD files, keyed by a hash of everything they depend on."""
+"""Cache of meshes and drawings, keyed by a hash of everything they depend on."""
 
-import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.atomic import write_arrays, write_bytes
+from pinnray.runtime.atomic import write_bytes
 from pinnray.runtime.cache import Result, cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_version
 from pinnray.runtime.processes.worker import Task, run_task
 
 TIMEOUT_S = 300.0
 """Time limit of a process that meshes, reads or writes."""
 
-CAD_FORMATS = ("step", "stl", "dxf", "svg")
+CAD_FORMATS = ("step", "stl", "dxf")
 
 MAKERS = ("cadquery", "cadquery-ocp", "ezdxf", "gmsh", "numpy", "svgelements")
 """Packages on whose versions the results depend."""
@@ -56,8 +54,8 @@ def finger_mesh(
     settings = settings or MeshSettings()
     sizes = settings.model_dump()
     task = Task(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))
-    entry = _entry("mesh", finger.digest, (sizes, across), ".npz", cache_dir)
-    return _made(entry, task, TriangleMesh.load, TriangleMesh.save if keep else None)
+    entry = (cache_dir or cache_folder()) / f"mesh-{cache_key(finger.digest, (sizes, across))}.npz"
+    return _cached(entry, task, TriangleMesh.load, TriangleMesh.save if keep else None)
 
 
 def mesh_sizes(
@@ -97,8 +95,8 @@ def drawn_finger(
         raise UserError(f"there is no drawing {file}")
     lines = description.model_dump(mode="json")
     task = Task(f"reading {file.name}", _reader, (file.absolute(), lines))  # the child has its own folder
-    entry = _entry("drawing", file_digest(file), (file.name, lines), ".json", cache_dir)
-    return _made(entry, task, DrawnFinger.load, DrawnFinger.save)
+    entry = (cache_dir or cache_folder()) / f"drawing-{cache_key(file_digest(file), (file.name, lines))}.json"
+    return _cached(entry, task, DrawnFinger.load, DrawnFinger.save)
 
 
 def cad_files(
@@ -106,15 +104,13 @@ def cad_files(
     folder: Path,
     *,
     formats: Sequence[str] = CAD_FORMATS,
-    cache_dir: Path | None = None,
 ) -> list[Path]:
-    """Write a finger's CAD files: solid as STEP and STL (body and markers), section as DXF and SVG.
+    """Write a finger's CAD files: solid as STEP and STL (body and markers), section as DXF.
 
     Args:
         finger: The finger.
         folder: Output folder; made if it does not exist.
         formats: Some of `CAD_FORMATS`.
-        cache_dir: Folder of the cache; by default `cache_folder()`.
 
     Returns:
         The files written.
@@ -127,8 +123,7 @@ def cad_files(
         raise UserError(f"unknown CAD format {unknown[0]!r}; there are {', '.join(CAD_FORMATS)}")
     wanted = sorted(set(formats))
     task = Task(f"CAD of design {finger.name!r}", _cad_writer, (finger.definition(), wanted))
-    entry = _entry("cad", finger.digest, wanted, ".npz", cache_dir)
-    contents = _made(entry, task, _load_files, _save_files)
+    contents: dict[str, bytes] = run_task(task, TIMEOUT_S)
     for name, content in contents.items():
         write_bytes(folder / name, content)
     return [folder / name for name in contents]
@@ -136,16 +131,12 @@ def cad_files(
 
 def cache_key(digest: str, asked: object) -> str:
     """SHA-256 over the digest of a finger or file, what is asked, package versions and the sources."""
-    versions = {package: _version(package) for package in MAKERS}
+    versions = {package: package_version(package) for package in MAKERS}
     parts = {"content": digest, "asked": asked, "versions": versions, "sources": sources_digest(__name__)}
     return content_hash(parts)
 
 
-def _entry(kind: str, digest: str, asked: object, suffix: str, cache_dir: Path | None) -> Path:
-    return (cache_dir or cache_folder()) / f"{kind}-{cache_key(digest, asked)}{suffix}"
-
-
-def _made(
+def _cached(
     entry: Path,
     task: Task,
     load: Callable[[Path], Result],
@@ -181,21 +172,3 @@ def _cad_writer() -> Callable[..., dict[str, bytes]]:
     from pinnray.geometry.drawing.drawn_finger import finger_from
 
     return lambda definition, formats: cad_contents(finger_from(definition), formats)
-
-
-def _save_files(contents: dict[str, bytes], path: Path) -> None:
-    write_arrays(path, {name: np.frombuffer(content, np.uint8) for name, content in contents.items()})
-
-
-def _load_files(path: Path) -> dict[str, bytes]:
-    with np.load(path) as archive:
-        if any(Path(name).name != name for name in archive.files):
-            raise ValueError("a file of another folder")
-        return {name: archive[name].tobytes() for name in archive.files}
-
-
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "unknown"

@@ -12,7 +12,6 @@ import cadquery as cq
 from cadquery.occ_impl.exporters.dxf import DxfDocument
 
 from pinnray.geometry.finger.finger import Finger, outline_with_contact
-from pinnray.geometry.finger.svg import section_svg
 from pinnray.geometry.section.loop import Loop
 from pinnray.runtime.arrays import FloatArray
 
@@ -88,18 +87,10 @@ def write_dxf(finger: Finger, folder: Path) -> list[Path]:
     return [path]
 
 
-def write_svg(finger: Finger, folder: Path) -> list[Path]:
-    """The section as SVG in true scale."""
-    path = folder / "section.svg"
-    path.write_text(section_svg(finger), encoding="utf-8")
-    return [path]
-
-
 WRITERS: Mapping[str, Callable[[Finger, Path], list[Path]]] = {
     "step": write_step,
     "stl": write_stl,
     "dxf": write_dxf,
-    "svg": write_svg,
 }
 """The writer of each format, into a folder."""
 
@@ -117,7 +108,7 @@ def _whole(path: Path) -> bytes:
     if path.suffix == ".stl":  # a head, whose last number counts the triangles, and 50 bytes for each
         whole = len(content) == 84 + 50 * int.from_bytes(content[80:84], "little")
     else:
-        end = {".step": b"END-ISO-10303-21;", ".dxf": b"EOF", ".svg": b"</svg>"}[path.suffix]
+        end = {".step": b"END-ISO-10303-21;", ".dxf": b"EOF"}[path.suffix]
         whole = content.rstrip().endswith(end)
     if not whole:
         raise OSError(EIO, "a part was not written; is the disk full?", str(path))

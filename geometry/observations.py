@@ -7,7 +7,7 @@ from textwrap import shorten
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.registration import FIXED, Registration
+from pinnray.geometry.picture_frame import FIXED, Registration
 from pinnray.runtime.arrays import BoolArray, FloatArray, frozen_array
 from pinnray.runtime.errors import ShapeError, UserError
 

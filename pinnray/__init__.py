@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from pinnray.runtime.errors import UserError as UserError
     from pinnray.simulators import export as export
     from pinnray.solution import Solution as Solution
+    from pinnray.solvers.load import Load as Load
+    from pinnray.solvers.material import Material as Material
     from pinnray.solvers.materials.presets import MATERIALS as MATERIALS
-    from pinnray.solvers.physics import Load as Load
-    from pinnray.solvers.physics import Material as Material
     from pinnray.solvers.problem import Problem as Problem
     from pinnray.solvers.registry import solver_names as solver_names
     from pinnray.studies.crossval.result import CrossvalResult as CrossvalResult

@@ -17,8 +17,9 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.solver_choice import made_solvers
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import as_path
+from pinnray.solvers.load import Load, LoadKind, Physics
+from pinnray.solvers.material import Material
 from pinnray.solvers.materials.presets import preset
-from pinnray.solvers.physics import Load, LoadKind, Material, Physics
 from pinnray.solvers.registry import PRESETS
 from pinnray.solvers.solver import Solver
 

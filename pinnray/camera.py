@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from pinnray.arguments import MATERIAL, mesh_settings, read_finger, read_job, read_solver, taken
 from pinnray.film.film import FilmSettings
@@ -14,7 +14,8 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.measurements import load_measurements
 from pinnray.runtime.text_files import as_path
-from pinnray.solvers.physics import Load, LoadKind, Material
+from pinnray.solvers.load import Load, LoadKind
+from pinnray.solvers.material import Material
 from pinnray.solvers.solver import Solver
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ def calibrate(
     square: float,
     marker: float | None = None,
     dictionary: str = "5X5_100",
-    model: Literal["brown", "fisheye"] = "brown",
     k3: bool = False,
     out: str | Path | None = None,
 ) -> "Calibration":
@@ -44,7 +44,6 @@ def calibrate(
         square: Side of a square, mm.
         marker: Side of a marker of a ChArUco board, mm.
         dictionary: ArUco dictionary of a ChArUco board.
-        model: Lens model: `brown` up to about 100 degrees of view, `fisheye` beyond.
         k3: Whether to fit the third radial coefficient too.
         out: Camera file, .json, that `track` takes; nothing is written if None.
 
@@ -54,7 +53,6 @@ def calibrate(
     from pinnray.vision.calibration.camera_calibration import calibrate_camera
     from pinnray.vision.calibration.camera_file import check_format, save_calibration
     from pinnray.vision.calibration.charuco import parse_board
-    from pinnray.vision.calibration.lens_fit import LensChoice
     from pinnray.vision.frames.sources import photographs
 
     given = [images] if isinstance(images, str | Path) or not isinstance(images, Iterable) else images
@@ -63,7 +61,7 @@ def calibrate(
     if file is not None:
         check_format(file)
     chosen = parse_board(str(board), square, marker=marker, dictionary=dictionary)
-    found = calibrate_camera(photographs(sources), chosen, lens=LensChoice(model, k3))
+    found = calibrate_camera(photographs(sources), chosen, k3=k3)
     if file is not None:
         save_calibration(file, found)
     return found
@@ -146,7 +144,7 @@ def film_forces(
         with stages.stage("mesh"):
             mesh = finger_mesh(finger, settings=mesh_sizes(finger, usual=MESH))
         with stages.stage("force") as report:
-            tracker = force_tracker(mesh, elastic, seen.points, finger.marker_radius)
+            tracker = force_tracker(mesh, finger, elastic, seen.points)
             forces = forces_of(tracking, tracker, report)
     return pd.DataFrame([force_row(force, finger.depth) for force in forces]).fillna(np.nan)
 
@@ -180,7 +178,7 @@ def rig(
         material: The elastic constants, or the name of a material.
         load: Motion of the indenter, or its kind alone.
         progress: Whether to show the stages; if None in a notebook only.
-        given: Camera, markers, cables and calibration boards by the words of
+        given: Camera, markers and calibration boards by the words of
             `pinnray.film.rig_settings.RigSettings`, such as `frame`, `tilt`, `paint`, `boards`; parameters of
             finger, material and load, as for `solve`.
 
@@ -205,11 +203,7 @@ def rig(
     settings = RigSettings(**taken(given, RigSettings))
     words = ("size", "material", "load", *RigSettings.model_fields)
     finger, elastic, moved = read_job(design, material, load, given, besides=words)
-    (
-        settings.view(finger),
-        settings.sheet(),
-        settings.covered,
-    )  # or says what is wrong, before the mesh is made
+    settings.view(finger), settings.sheet()  # or says what is wrong, before the mesh is made
     chosen = None if solver is None else read_solver(solver)
     with shown_stages(progress) as stages:
         with stages.stage("mesh"):

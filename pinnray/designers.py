@@ -11,13 +11,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.runtime.text_files import as_path
-from pinnray.solvers.physics import Physics
+from pinnray.solvers.load import Physics
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +47,7 @@ def sweep(
     Args:
         study: The values of each parameter of finger, material or load that is varied: a list of them, or
             `{"from": LOW, "to": HIGH}` with `samples`; or the TOML file of a study, which says all the rest.
-        design: The finger from which they differ.
+        design: The finger from which they differ; of a drawn one only material and load can be varied.
         solver: Name of the solver.
         size: Largest element in walls and ribs, mm.
         samples: Number of samples between the ends of the ranges.
@@ -66,7 +67,7 @@ def sweep(
     """
     from pinnray.runtime.stages import shown_stages
     from pinnray.studies.sweep.job import StudyJob
-    from pinnray.studies.sweep.study import Study, load_study
+    from pinnray.studies.sweep.study import Study
     from pinnray.studies.sweep.sweep import run_sweep
     from pinnray.studies.sweep.tables import sample_table
 
@@ -84,7 +85,7 @@ def sweep(
         if fixed or samples is not None or sampling is not None:
             said = next(iter(fixed), "samples" if samples is not None else "sampling")
             raise UserError(f"{said} is said by the study in {file}; change it there")
-        read, folder = load_study(file), file.parent
+        read, folder = Study.load(file), file.parent
     with _kept(out) as where, shown_stages(progress) as stages:
         job = StudyJob(read, folder, where, _processes(processes), finger=finger)
         done = run_sweep(job, stages)
@@ -94,13 +95,14 @@ def sweep(
 
 
 def predict(
-    sweep: str | Path, fingers: Mapping[str, object] | Sequence[Mapping[str, object]]
+    sweep: str | Path, fingers: "Mapping[str, object] | Sequence[Mapping[str, object]] | pd.DataFrame"
 ) -> "pd.DataFrame":
     """Predict the quantities of fingers from a sweep; see `pinnray predict`.
 
     Args:
         sweep: Folder of a sweep.
-        fingers: Values of every parameter that the sweep varies, of one finger or of several.
+        fingers: Values of every parameter that the sweep varies, of one finger or of several:
+            dictionaries, or a table with a column for each.
 
     Returns:
         A row for every finger, with each quantity, such as `force_N`, and the ends of its 95 % interval,
@@ -112,7 +114,9 @@ def predict(
     from pinnray.studies.emulator.emulator import prediction_table
     from pinnray.studies.emulator.store import emulator_of
 
-    several = [fingers] if isinstance(fingers, Mapping) else fingers
+    several: object = [fingers] if isinstance(fingers, Mapping) else fingers
+    if to_dict := getattr(fingers, "to_dict", None):
+        several = to_dict("records")
     if not isinstance(several, Sequence) or not all(isinstance(each, Mapping) for each in several):
         raise UserError(f"the fingers are dictionaries such as {{'rib_count': 5}}, not {fingers!r}")
     emulator = emulator_of(as_path(sweep, "the sweep"))
@@ -162,15 +166,15 @@ def optimise(
         UserError: If the question cannot be asked, the folder holds another one, or nothing is allowed.
     """
     from pinnray.runtime.stages import shown_stages
-    from pinnray.studies.optimum.question import load_question, question_of
+    from pinnray.studies.optimum.question import Question
     from pinnray.studies.optimum.search import search_front
     from pinnray.studies.sweep.job import StudyJob
 
     if isinstance(question, Mapping):
-        read, folder = question_of({"name": "question", **question}), Path()
+        read, folder = Question(**{"name": "question", **question}), Path()
     else:
         file = as_path(question, "the question")
-        read, folder = load_question(file), file.parent
+        read, folder = Question.load(file), file.parent
     with _kept(out) as where, shown_stages(progress) as stages:
         return search_front(StudyJob(read, folder, where, _processes(processes)), stages)
 
@@ -191,7 +195,7 @@ def _study(
             raise UserError(unknown_parameter(name, Parameters, Physics, besides=tuple(given)))
     if sampling is None:
         sampling = "grid" if all("values" in each for each in ranges.values()) else "sobol"
-    finger = design if isinstance(design, Design) else None
+    finger = design if isinstance(design, Design | DrawnFinger) else None
     if finger is None and not isinstance(design, str | Path):
         raise UserError(f"{design!r} is no design; give one that is made, the name of a preset or a file")
     named = {} if finger is not None else {"design": str(design)}

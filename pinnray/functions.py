@@ -23,10 +23,11 @@ from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import as_path
 from pinnray.solution import Solution
-from pinnray.solvers.physics import Load, LoadKind, Material
+from pinnray.solvers.load import Load, LoadKind
+from pinnray.solvers.material import Material
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver
-from pinnray.solvers.solver import Solver, Traits, solved, with_law
+from pinnray.solvers.solver import Solver, Traits, check_asked, solved, with_law
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -126,13 +127,17 @@ def solve(
         if not isinstance(problem, Problem):
             words = ("size", "material", "load", "measurements", "preset", "solver")
             finger, elastic, moved = read_job(problem, material, load, given, besides=words)
+            seen = read_observations(measurements, finger)
+            check_asked(chosen, elastic, seen)
             with stages.stage("mesh"):
                 triangles = finger_mesh(finger, settings=mesh_settings(size))
-            problem = Problem(triangles, elastic, moved, read_observations(measurements, finger), finger)
+            problem = Problem(triangles, elastic, moved, seen, finger)
         elif given or any(each is not None for each in others):
             raise UserError(
                 "a Problem has its own mesh, material, load and observations; give a design to choose them"
             )
+        else:
+            check_asked(chosen, problem.material, problem.observations)
         problem = replace(problem, material=with_law(problem.material, chosen))
         remarks = [] if problem.finger is None else problem_remarks(problem)  # a closed form has any unit
         if (seen := problem.observations) is not None:
@@ -146,7 +151,7 @@ def solve(
     status, faults = DeformedBody(problem.mesh).status(solution)
     for remark in [*status.warnings, *remarks, *faults]:
         warnings.warn(remark, stacklevel=2)
-    return Solution.of(replace(solution, status=status))
+    return Solution.of(solution, status=status)
 
 
 def compare(
@@ -275,5 +280,5 @@ def crossval(
         return cross_validate(job, stages)
 
 
-SEVERAL = {"truths", "layouts", "schemes", "picture_formats"}
+SEVERAL = {"truths", "layouts", "schemes"}
 """Attributes of a cross-validation that are lists of names, of which one may stand alone."""

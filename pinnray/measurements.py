@@ -26,21 +26,22 @@ def load_measurements(
     Raises:
         UserError: If the table cannot be read; the message names the line or row.
     """
-    from pinnray.vision.measurements import measurements_of, read_measurements
+    from pinnray.runtime.tables import columns_of
+    from pinnray.vision.measurements import TITLES, measurements_of, read_measurements
 
     if isinstance(source, str | Path):
         return read_measurements(Path(source), marker_radius=marker_radius)
     if not hasattr(source, "itertuples"):
         kind = type(source).__name__
         raise UserError(f"measurements that are a {kind}; give a data frame, Observations, or a file")
-    table = source.itertuples(index=True, name=None)
-    rows = [(f"row {label}", list(map(_cell, cells))) for label, *cells in table]
+    name = "the data frame"
+    places = columns_of(list(map(str, source.columns)), *TITLES, name)
+    rows = [
+        (f"row {label}", {column: _cell(cells[place]) for column, place in places.items()})
+        for label, *cells in source.itertuples(index=True, name=None)
+    ]
     return measurements_of(
-        list(map(str, source.columns)),
-        rows,
-        marker_radius=marker_radius,
-        table="the data frame",
-        source="measurements from a data frame",
+        rows, marker_radius=marker_radius, table=name, source="measurements from a data frame"
     )
 
 

@@ -10,7 +10,8 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.export_settings import KINDS, ExportSettings, Kind
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import as_path
-from pinnray.solvers.physics import Load, LoadKind, Material
+from pinnray.solvers.load import Load, LoadKind
+from pinnray.solvers.material import Material
 
 if TYPE_CHECKING:
     from pinnray.robots.export import Exported

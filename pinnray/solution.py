@@ -1,6 +1,5 @@
 """A solution that draws, writes and shows itself."""
 
-from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -30,9 +29,9 @@ class Solution(solution.Solution):
     """
 
     @classmethod
-    def of(cls, solved: solution.Solution) -> Self:
-        """Give the solution of a solver its pictures, files and tables."""
-        return cls(**{each.name: getattr(solved, each.name) for each in fields(solved)})
+    def of(cls, solved: solution.Solution, **changes: object) -> Self:
+        """Give the solution of a solver its pictures, files and tables, and what is to be changed in it."""
+        return cls(**vars(solved) | changes)
 
     @property
     def von_mises(self) -> FloatArray:
@@ -121,23 +120,6 @@ class Solution(solution.Solution):
         from pinnray.comparison.report.output_files import field_grid
 
         return field_grid(self.problem.mesh, self._fields)
-
-    def show(self, quantity: str = "von_mises_MPa", **options: Any) -> Any:
-        """Show the deformed finger, to turn and zoom; in Jupyter by trame, if `pyvista[jupyter]` is there.
-
-        Args:
-            quantity: A field of `to_pyvista`.
-            options: Of PyVista's `plot`, such as `jupyter_backend="static"`.
-
-        Raises:
-            UserError: If there is no such field.
-        """
-        grid = self.to_pyvista()
-        known = [*grid.cell_data.keys(), *grid.point_data.keys()]
-        if quantity not in known:
-            raise UserError(f"there is no field {quantity!r} to show; there are {', '.join(known)}")
-        deformed = grid.warp_by_vector("displacement_mm")
-        return deformed.plot(**{"scalars": quantity, "cpos": "xy", **options})
 
     def save(self, path: str | Path) -> Path:
         """Write the fields, and return the path: `.vtu` for ParaView, `.csv` for a table of the triangles.

@@ -13,11 +13,10 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.export_settings import ExportSettings, Kind
 from pinnray.robots.mjcf import Damping, chain_mjcf, flex_mjcf, with_header
-from pinnray.robots.picture import draw_score
 from pinnray.robots.presses import PressedFinger, press
 from pinnray.robots.score import ModelScore, scored
 from pinnray.robots.simulation import Model, chain_front, check_mujoco, flex_front
-from pinnray.robots.solid_files import write_material, write_surface, write_vtk
+from pinnray.robots.solid_files import write_material, write_solid
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.robots.springs import fitted_springs
 from pinnray.runtime.atomic import write_json, write_text
@@ -81,10 +80,8 @@ def export_finger(
         body = SolidMesh.of(finger_mesh(finger, settings=coarse, across=settings.across), settings.layers)
     if kind == "mujoco":
         return _mujoco(problem, finger, density, body, out, settings, stages)
-    files = out / "finger.vtk", out / "finger.stl", out / "material.json"
-    write_vtk(files[0], body)
-    write_surface(files[1], body)
-    write_material(files[2], material, density, settings.loss_factor)
+    files = *write_solid(out, body), out / "material.json"
+    write_material(files[-1], material, density, settings.loss_factor)
     return Exported(files)
 
 
@@ -128,10 +125,9 @@ def _mujoco(
         files.append(out / f"{model.name}.xml")
         write_text(files[-1], with_header(model.text, [*_header(pressed, fit, settings), said]))
     if scores:
-        files += [out / "score.json", out / "score.csv", out / "score.png"]
-        write_json(files[-3], _document(pressed, factor, density, settings, scores))
-        write_csv(files[-2], [{"model": s.model, **each.row()} for s in scores for each in s.presses])
-        draw_score(pressed, scores).save(files[-1])
+        files += [out / "score.json", out / "score.csv"]
+        write_json(files[-2], _document(pressed, factor, density, settings, scores))
+        write_csv(files[-1], [{"model": s.model, **each.row()} for s in scores for each in s.presses])
     return Exported(tuple(files), tuple(scores), pressed.lost)
 
 

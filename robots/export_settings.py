@@ -18,12 +18,7 @@ class ExportSettings(CheckedModel):
         0.2, 0.001, 2, "", "", "Damping of the material, which is stated and not fitted"
     )
     across: int = bounded(
-        1,
-        1,
-        8,
-        "",
-        "",
-        "Least number of tetrahedra through a wall: more are less stiff, and slower",
+        1, 1, 8, "", "", "Least number of tetrahedra through a wall: more are less stiff, and slower"
     )
     layers: int = bounded(1, 1, 40, "", "", "Layers of tetrahedra through the depth")
     places: int = bounded(6, 2, 20, "", "", "Number of places of the cylinder for the fit")

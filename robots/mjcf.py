@@ -12,7 +12,7 @@ from pinnray.robots.chain import MM, Chain
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.robots.springs import Springs
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.physics import Material
+from pinnray.solvers.material import Material
 
 STEP = 1e-3
 """Time step, s."""

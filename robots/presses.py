@@ -11,7 +11,7 @@ from pinnray.solvers.cylinder_contact import touching_centre
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import Solution
-from pinnray.solvers.solver import Progress, silent, solved, with_law
+from pinnray.solvers.solver import Progress, check_law, silent, solved, with_law
 
 FIRST, LAST = 0.2, 0.7
 """Places of the cylinder for the fit, as fractions of the front face from base to tip.
@@ -93,6 +93,7 @@ def press(
             "a robot model is fitted under a cylinder without friction that moves into the finger"
         )
     solver = make_solver("fem-nonlinear")
+    check_law([solver], problem.material)
     problem = replace(problem, material=with_law(problem.material, solver), observations=None)
     finger = at_rest(problem)
     start, end = finger.front[[0, -1], 0]

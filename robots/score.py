@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from pinnray.robots.chain import MM
 from pinnray.robots.presses import Press, PressedFinger
 from pinnray.robots.simulation import Model, Rest, pressed_in_mujoco
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.tables import Cell, terminal_table
+from pinnray.runtime.tables import Cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,23 +99,3 @@ def scored(model: Model, finger: PressedFinger, loads: Sequence[Press]) -> Model
     depth = finger.problem.mesh.depth
     found = (pressed_in_mujoco(model, load, finger.radius, depth, rest) for load in loads)
     return ModelScore(model.name, tuple(ScoredPress(*pair) for pair in zip(loads, found, strict=True)))
-
-
-def score_table(scores: Sequence[ModelScore]) -> Table:
-    """All loads of all models, for the terminal."""
-    names = ("model", "x mm", "stroke", "front moves", "off mm", "force N", "FEM N", "off %")
-    rows = [
-        (
-            score.model,
-            f"{row['place_mm']:.3g}",
-            f"{row['stroke_mm']:.3g}",
-            f"{row['motion_mm']:.3g}",
-            f"{row['shape_error_mm']:.2g}",
-            f"{row['force_N']:.3g}",
-            f"{row['fem_force_N']:.3g}",
-            f"{row['force_error_percent']:+.1f}" + ("" if row["steady"] else " moving"),
-        )
-        for score in scores
-        for row in (each.row() for each in score.presses)
-    ]
-    return terminal_table("Loads that the fit has not seen", names, rows, left=("model",), narrow=True)

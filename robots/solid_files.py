@@ -8,23 +8,19 @@ import pyvista
 
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.runtime.atomic import atomic_path, write_json
-from pinnray.solvers.physics import Material
+from pinnray.solvers.material import Material
 
 
-def write_vtk(path: Path, body: SolidMesh) -> None:
-    """Write the tetrahedra as a VTK file, with 1 at the nodes of `base` and of `front`."""
+def write_solid(out: Path, body: SolidMesh) -> tuple[Path, Path]:
+    """Write the tetrahedra as a VTK file, with 1 at the nodes of `base` and of `front`, and their surface."""
     grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: body.tetrahedra}, body.points)
     for name in ("base", "front"):
         grid.point_data[name] = np.isin(np.arange(len(body.points)), body.nodes_on(name)).astype(np.uint8)
-    with atomic_path(path) as partial:
-        grid.save(partial)
-
-
-def write_surface(path: Path, body: SolidMesh) -> None:
-    """Write the surface, for programs that make tetrahedra of their own."""
-    faces = np.insert(body.skin, 0, 3, axis=1)
-    with atomic_path(path) as partial:
-        pyvista.PolyData(body.points, faces.ravel()).save(partial)
+    files = out / "finger.vtk", out / "finger.stl"
+    for path, data in zip(files, (grid, grid.extract_surface(algorithm="dataset_surface")), strict=True):
+        with atomic_path(path) as partial:
+            data.save(partial)
+    return files
 
 
 def write_material(path: Path, material: Material, density: float, loss_factor: float) -> None:

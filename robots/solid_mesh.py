@@ -53,15 +53,6 @@ class SolidMesh:
         flat = np.unique(self.section.boundary(name))
         return np.asarray((flat + len(self.section.points) * np.arange(self.levels)[:, None]).ravel())
 
-    @property
-    def skin(self) -> IntArray:
-        """Triangles of the whole surface, shape (f, 3), normals outward."""
-        corners = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-        every = self.tetrahedra[:, corners].reshape(-1, 3)
-        ordered = np.sort(every, axis=1)
-        _, first, counts = np.unique(ordered, axis=0, return_index=True, return_counts=True)
-        return np.asarray(every[np.sort(first[counts == 1])])
-
 
 def _volumes(points: FloatArray, cells: IntArray) -> FloatArray:
     edges = points[cells[:, 1:]] - points[cells[:, :1]]

@@ -1,22 +1,63 @@
 """Results that are kept in a folder of the user's, under names that tell everything they depend on."""
 
+import atexit
 import os
+import pickle
+import shutil
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
+from tempfile import TemporaryFile, mkdtemp
+from typing import Any, TypeVar
 
-from pinnray.runtime.atomic import remove_partials
+from pinnray.runtime.atomic import remove_partials, write_bytes
 
 Result = TypeVar("Result")
 
 
+LIBRARIES = {"XDG_CACHE_HOME": "", "MPLCONFIGDIR": "matplotlib"}
+"""Variables that say where libraries keep theirs, as DOLFINx its compiled forms, and places in our folder."""
+
+
 def cache_folder() -> Path:
-    """`PINNRAY_CACHE` if set, else `pinn-ray` in `XDG_CACHE_HOME` or `~/.cache`."""
-    if chosen := os.environ.get("PINNRAY_CACHE"):
-        return Path(chosen)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "pinn-ray"
+    """The folder of what is cached: meshes, CAD files, emulators.
+
+    `PINNRAY_CACHE` if set, else `pinn-ray` in `XDG_CACHE_HOME` or `~/.cache`. Where that cannot be written it
+    is a temporary one for this process and its children; a warning says so, once.
+    """
+    chosen, caches = os.environ.get("PINNRAY_CACHE"), os.environ.get("XDG_CACHE_HOME")
+    try:
+        folder = Path(chosen) if chosen else Path(caches or Path("~/.cache").expanduser()) / "pinn-ray"
+        check_writable(folder)
+    except (OSError, RuntimeError) as error:  # the latter of a user without a home
+        folder = Path(mkdtemp(prefix="pinn-ray-cache-"))
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+        os.environ["PINNRAY_CACHE"] = str(folder)
+        warnings.warn(
+            f"cannot write to the cache folder ({error}): meshes and compiled forms are made anew next time; "
+            "set PINNRAY_CACHE to a folder that can be written",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    return folder
+
+
+def share_cache() -> None:
+    """Let libraries keep theirs in `PINNRAY_CACHE`, if it is set, unless they have a folder of their own."""
+    folder = cache_folder().absolute()
+    for name, place in LIBRARIES.items() if "PINNRAY_CACHE" in os.environ else ():
+        try:
+            check_writable(Path(os.environ[name]))
+        except (KeyError, OSError):
+            os.environ[name] = str(folder / place)
+
+
+def check_writable(folder: Path) -> None:
+    """Make a folder if it is not there, and a file in it; raise an `OSError` if that cannot be done."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryFile(dir=folder):
+        pass
 
 
 @contextmanager
@@ -33,14 +74,24 @@ def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
         )
 
 
+def _unpickled(entry: Path) -> Any:
+    return pickle.loads(entry.read_bytes())
+
+
+def _pickled(made: object, entry: Path) -> None:
+    write_bytes(entry, pickle.dumps(made))
+
+
 def cached(
     entry: Path,
     what: str,
     make: Callable[[], Result],
-    load: Callable[[Path], Result],
-    save: Callable[[Result, Path], None] | None,
+    load: Callable[[Path], Result] = _unpickled,
+    save: Callable[[Result, Path], None] | None = _pickled,
 ) -> Result:
     """Load a result; make it first if it is missing or cannot be read.
+
+    A pickled entry can run code: its name must tell versions and sources, and the cache be the user's own.
 
     Args:
         entry: Its file in the cache.

@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
@@ -33,31 +33,38 @@ def shown(text: str) -> str:
 
 
 @contextmanager
-def ending_at_once() -> Iterator[None]:
-    """End the program with one line if the block is interrupted; for imports, which have nothing to undo.
+def interruptible(*, at_once: bool = False) -> Iterator[None]:
+    """Raise KeyboardInterrupt in the block for every signal that asks the program to end.
 
-    A library that is interrupted while it is imported may say that it is missing.
+    Only the main thread can do so.
+
+    Args:
+        at_once: Whether the program ends there with one line instead. For imports, which have nothing to
+            undo: a library that is interrupted while it is imported may say that it is missing.
     """
 
     def end(number: int, frame: FrameType | None) -> NoReturn:
-        say("interrupted")
-        os._exit(INTERRUPTED)
-
-    with _handled(end):
-        yield
-
-
-@contextmanager
-def interruptible() -> Iterator[None]:
-    """Raise KeyboardInterrupt in the block for every signal that asks the program to end."""
-    _signals.clear()
-
-    def end(number: int, frame: FrameType | None) -> NoReturn:
+        if at_once:
+            say("interrupted")
+            os._exit(INTERRUPTED)
         _signals.append(number)
         raise KeyboardInterrupt
 
-    with _handled(end):
+    _signals.clear()
+    asking = (
+        (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        if threading.current_thread() is threading.main_thread()
+        else ()
+    )
+    before = {each: signal.getsignal(each) for each in asking}
+    ours = [number for number, former in before.items() if former is not signal.SIG_IGN]
+    for number in ours:
+        signal.signal(number, end)
+    try:
         yield
+    finally:
+        for number in ours:
+            signal.signal(number, before[number])
 
 
 @contextmanager
@@ -72,20 +79,3 @@ def errors_of_interruption() -> Iterator[None]:
         if _signals:
             raise KeyboardInterrupt from error
         raise
-
-
-@contextmanager
-def _handled(handler: Callable[[int, FrameType | None], NoReturn]) -> Iterator[None]:
-    """The block with a handler of the signals; only the main thread can have one."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    ours = [number for number, former in before.items() if former is not signal.SIG_IGN]
-    for number in ours:
-        signal.signal(number, handler)
-    try:
-        yield
-    finally:
-        for number in ours:
-            signal.signal(number, before[number])

@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
 WIDTH = 5.5
-"""Width of every figure, inches."""
+"""Width of a figure that is asked for none, inches."""
+
+NARROW = 4.5
+"""Width below which a figure has one column of panels, inches: a journal's column has 85 mm."""
 
 SMALL = 8.1
 """Smallest type, points: 5 points in a journal's column of 3.4 inches, the least that journals print."""
@@ -57,7 +61,6 @@ SETTINGS: "dict[RcKeyType, Any]" = {
     "ytick.major.width": 0.6,
     "legend.fontsize": SMALL,
     "legend.frameon": False,
-    "figure.titlesize": 10,
     "mathtext.fontset": "dejavusans",
     "savefig.dpi": "figure",
     "pdf.fonttype": 42,  # letters as letters, as journals ask for
@@ -74,13 +77,13 @@ OPTIONS: dict[str, dict[str, Any]] = {
 
 
 class Figure(MplFigure):
-    """A matplotlib figure of `WIDTH` by a height in inches, drawn with the project's settings wherever it is.
+    """A matplotlib figure of a height and a width, inches, drawn with the project's settings wherever it is.
 
     It belongs to no pyplot window. Matplotlib gives such a figure no picture in a notebook: this one has it.
     """
 
-    def __init__(self, height: float) -> None:
-        super().__init__(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+    def __init__(self, height: float, width: float = WIDTH) -> None:
+        super().__init__(figsize=(width, height), dpi=DPI, facecolor="white")
         FigureCanvasAgg(self)
 
     def draw(self, renderer: RendererBase) -> None:
@@ -111,28 +114,32 @@ class Figure(MplFigure):
 
 
 @contextmanager
-def figure(height: float) -> Iterator[Figure]:
-    """A new figure of a height in inches, to be filled in the block with the project's settings."""
+def figure(height: float, width: float = WIDTH) -> Iterator[Figure]:
+    """A new figure of a height and a width, inches, to be filled in the block with the project's settings."""
     with mpl.rc_context(SETTINGS):
-        yield Figure(height)
+        yield Figure(height, width)
 
 
 @contextmanager
-def body_figure(points: FloatArray, title: str, *, foot: float = 0.0) -> Iterator[tuple[Figure, Axes]]:
+def body_figure(
+    points: FloatArray, title: str, *, foot: float = 0.0, page: float = WIDTH
+) -> Iterator[tuple[Figure, Axes]]:
     """A figure with axes in mm, of equal scale, around points of shape (n, 2), mm.
 
     Args:
         points: What must be visible.
         title: Of the figure.
         foot: Room below the axes, inches.
+        page: Width of the figure, inches.
     """
     margin = 0.03 * float(np.ptp(points[:, 0]))
     (left, bottom), (right, top) = points.min(axis=0) - margin, points.max(axis=0) + margin
-    width = WIDTH - LEFT - RIGHT
+    width = page - LEFT - RIGHT
     height = width * (top - bottom) / (right - left)
-    total = TITLE + height + BELOW + foot
-    with figure(total) as drawn:
-        axes = drawn.add_axes((LEFT / WIDTH, (BELOW + foot) / total, width / WIDTH, height / total))
+    lines = wrap(title, int(11 * width))
+    total = TITLE + 0.15 * (len(lines) - 1) + height + BELOW + foot
+    with figure(total, page) as drawn:
+        axes = drawn.add_axes((LEFT / page, (BELOW + foot) / total, width / page, height / total))
         axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="x, mm", ylabel="y, mm", aspect="equal")
-        axes.set_title(title, weight="bold")
+        axes.set_title("\n".join(lines), weight="bold")
         yield drawn, axes

@@ -16,15 +16,15 @@ PACKAGES = (
 
 def package_versions() -> dict[str, str]:
     """Versions of all packages that affect the numbers or pictures."""
-    return {"python": platform.python_version()} | {package: _version(package) for package in PACKAGES}
+    return {"python": platform.python_version()} | {package: package_version(package) for package in PACKAGES}
 
 
 def program_version() -> str:
     """Version of pinn-ray, as it is installed."""
-    return _version("pinn-ray")
+    return package_version("pinn-ray")
 
 
-def _version(package: str) -> str:
+def package_version(package: str) -> str:
     """Version of a package; that of its module where it is not installed by pip."""
     try:
         return _installed_version(package)
@@ -53,11 +53,6 @@ def free_memory_gb() -> float:
         if line.startswith("MemAvailable:"):
             return float(line.split()[1]) * 1024 / 1e9
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
-
-
-def peak_memory_gb(usage: resource.struct_rusage) -> float:
-    """Largest memory that a process ever had, GB; on Linux the parent's counts until a process takes more."""
-    return usage.ru_maxrss * 1024 / 1e9
 
 
 def limit_memory(more_gb: float) -> None:

@@ -1,18 +1,19 @@
 """Representations of objects: HTML in a notebook, one line elsewhere."""
 
 import base64
-from collections.abc import Mapping, Sequence
+import reprlib
+from collections.abc import Mapping
 from dataclasses import fields
 from html import escape
 from textwrap import shorten
 from typing import Any
 
-WIDEST, LONGEST = 60, 240
-"""Letters of a text in a line, and of the line."""
+LONGEST = 240
+"""Letters of an object in one line."""
 
 
 def brief(shown: Any) -> str:
-    """A dataclass in one line: the shapes of arrays, the kinds and numbers of what else is large.
+    """A dataclass in one line: the shapes of arrays, the beginning of what else is long.
 
     To be the `__repr__` of a dataclass that holds arrays.
     """
@@ -22,15 +23,7 @@ def brief(shown: Any) -> str:
 
 def _in_short(value: object) -> str:
     shape = getattr(value, "shape", None)
-    if shape:
-        return f"<{' x '.join(map(str, shape))}>"
-    if isinstance(value, str):
-        return repr(shorten(value, WIDEST, placeholder=" ..."))
-    if isinstance(value, Mapping | Sequence):
-        return f"<{len(value)}>" if value else "<none>"
-    if value is None or isinstance(value, bool | int | float):
-        return repr(value)
-    return f"<{type(value).__name__}>"
+    return f"<{' x '.join(map(str, shape))}>" if shape else reprlib.repr(value)
 
 
 def fact_table(title: str, facts: Mapping[str, object], picture: str = "") -> str:

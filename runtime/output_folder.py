@@ -25,44 +25,49 @@ SCHEMA = 1
 """Version of the form of `run.json`."""
 MARK = ".pinnray-unfinished"
 """File in a folder that a run works in or removes; another folder is never replaced."""
+WITHOUT_NUMBERS = ("pictures", "width", "yes")
+"""Options of a run that change no number."""
 SOLUTIONS = "solutions"
 TRAINING = "training"
 
 
 def check_output(out: Path) -> None:
     """Raise a `UserError` if the folder must not be replaced."""
-    try:
-        out.resolve(strict=out.is_symlink())
-    except (OSError, RuntimeError):  # Python 3.11 raises the latter for a loop of links
-        raise UserError(f"{out} is a link that leads nowhere; name an output folder") from None
+    if out.is_symlink() and not out.exists():
+        raise UserError(f"{out} is a link that leads nowhere; name an output folder")
     if out.exists() and not out.is_dir():
         raise UserError(f"{out} is a file; name an output folder")
     if Path.cwd().is_relative_to(out.resolve()):
         raise UserError(
             f"{out} is replaced as a whole: the program cannot run inside it; name another folder"
         )
-    check_links(out)
-    files = [path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file()]
     ours = _written(out)
-    if files and not ours:
-        state = "its run.json is damaged" if (out / RUN_FILE).exists() else "it has no run.json"
+    files = sorted(path.relative_to(out).as_posix() for path in out.rglob("[!.]*") if not path.is_dir())
+    if foreign := next((name for name in files if name not in ours), None):
         raise UserError(
-            f"{out} holds {min(files)}, and {state}, which lists the files that a run has written, so that "
-            "files of yours could be lost; move the folder, or name another output folder"
-        )
-    if foreign := next((path for path in files if path.as_posix() not in ours), None):
-        raise UserError(
-            f"{out} holds {foreign}, which no run has written and which would be lost; move it, or name "
-            "another output folder"
+            f"{out} holds {foreign}, which no {RUN_FILE} there lists and which would be lost; move it, or "
+            "name another output folder"
         )
 
 
-def check_links(folder: Path) -> None:
-    """Raise a `UserError` if a folder holds a symbolic link, through which a run would write elsewhere."""
-    if found := next((path for path in folder.rglob("*") if path.is_symlink()), None):
+def check_same_job(out: Path, options: Mapping[str, Any], usual: Mapping[str, Any]) -> None:
+    """Refuse a folder that holds the finished run of other options, where nobody has asked for that folder.
+
+    Args:
+        out: The folder.
+        options: Those of this run, by their names, as `run.json` has them.
+        usual: Values of those that are not given.
+
+    Raises:
+        UserError: With the options that differ.
+    """
+    before = {**usual, **_provenance(out).get("options", {})}
+    now = {**usual, **to_jsonable_python(options)}
+    names = sorted(name for name in before | now if before.get(name) != now.get(name))
+    if _written(out) and (names := [name for name in names if name not in WITHOUT_NUMBERS]):
         raise UserError(
-            f"{found} is a link, which no run has made and which leads to files elsewhere; remove it, or "
-            "name another folder"
+            f"{out} holds the finished run of another job (other {', '.join(names)}); give --out with "
+            f"another folder, or --out {out} to replace it"
         )
 
 
@@ -78,13 +83,8 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
         UserError: If the folder cannot be written, or another run is writing it.
     """
     out = out.resolve()
-    partial = out.with_name(f"{out.name}.partial")
+    partial, previous = out.with_name(f"{out.name}.partial"), out.with_name(f".{out.name}.pinnray-previous")
     missing = [folder for folder in partial.parents if not folder.exists()]
-    if partial.is_symlink():
-        raise UserError(
-            f"{partial} is a link, which no run has made; remove it, or name another output folder"
-        )
-    check_links(partial)
     try:
         partial.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -97,19 +97,20 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
                 "folder"
             )
         (partial / MARK).touch()
-        _restore(out)
+        if not out.exists() and previous.exists():  # a run was killed between the two renames
+            previous.replace(out)
         _clear(partial, keep)
         try:
             yield partial
         except BaseException:
             if not any([*partial.glob(f"{SOLUTIONS}/*.npz"), *partial.glob(f"{TRAINING}/*/*")]):
                 with suppress(OSError):
-                    _discard(partial)
-                for folder in missing:
-                    with suppress(OSError):  # in use by another program
+                    _clear(partial, keep=())
+                    shutil.rmtree(partial)  # the mark goes last, so that what a kill leaves is known
+                    for folder in missing:
                         folder.rmdir()
             raise
-        _take_place(partial, out)
+        _take_place(partial, out, previous)
 
 
 def write_run(folder: Path, provenance: Mapping[str, Any]) -> None:
@@ -134,61 +135,39 @@ def take_training(name: str, source: Path, target: Path) -> None:
             copy.replace(place)
 
 
-def _take_place(partial: Path, out: Path) -> None:
-    """Replace the output folder; the mark goes last, so that what a kill leaves is known as a run's."""
-    previous = _previous(out)
-    if previous.exists():
-        if not (previous / MARK).exists() and any(previous.iterdir()):
-            raise UserError(f"{previous} would be replaced, but no run has left it; move it")
-        _discard(previous)  # of a run that was killed right here
+def _take_place(partial: Path, out: Path, previous: Path) -> None:
+    """Replace the output folder, which has another name until the new one has its own."""
+    shutil.rmtree(previous, ignore_errors=True)  # of a run that was killed right here
     try:
         if out.exists():
-            with locked(out):  # for a moment it has the name of an unfinished folder
-                (out / MARK).touch()
-                out.replace(previous)
-                partial.replace(out)
-        else:
-            partial.replace(out)
+            out.replace(previous)
+        partial.replace(out)
     except OSError as error:
         with suppress(OSError):
-            _restore(out)
-        with suppress(OSError):
             (partial / MARK).unlink()  # no later run may clear it
+            if previous.exists():
+                previous.replace(out)
         raise UserError(
             f"cannot replace {out} ({error.strerror}); the complete result is in {partial}"
         ) from None
     with suppress(OSError):  # what is left does no harm
         (out / MARK).unlink()
-    if previous.exists():
-        with suppress(OSError):
-            _discard(previous)
-
-
-def _previous(out: Path) -> Path:
-    """Place of the last result for the moment in which the new one takes its name."""
-    return out.with_name(f".{out.name}.previous")
-
-
-def _restore(out: Path) -> None:
-    """Give the last result its name back, if a run ended between the two renames."""
-    previous = _previous(out)
-    if not out.exists() and (previous / MARK).exists() and _is_whole(previous):
-        previous.replace(out)
-        (out / MARK).unlink()
-
-
-def _discard(folder: Path) -> None:
-    """Remove a folder that carries the mark; the mark goes last."""
-    _clear(folder, keep=())
-    shutil.rmtree(folder)
+    shutil.rmtree(previous, ignore_errors=True)
 
 
 def _written(out: Path) -> set[str]:
     """The files that `run.json` lists, and itself; none if it is missing or damaged."""
+    files = _provenance(out).get("files_sha256")
+    return {RUN_FILE, *files} if isinstance(files, dict) else set()
+
+
+def _provenance(out: Path) -> dict[str, Any]:
+    """The content of `run.json`; nothing if it is missing or damaged."""
     try:
-        return {RUN_FILE, *json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["files_sha256"]}
-    except (OSError, ValueError, LookupError, TypeError):
-        return set()
+        content = json.loads((out / RUN_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
 def _is_whole(folder: Path) -> bool:
@@ -200,14 +179,13 @@ def _clear(folder: Path, keep: Collection[str]) -> None:
     """Remove everything but the mark, and the solutions and checkpoints of solvers to keep."""
     kept = {folder / MARK, *(folder / TRAINING / name for name in keep)}
     kept |= {folder / SOLUTIONS / f"{name}.npz" for name in keep}
-    kept |= {path.parent for path in kept}
-    for path in [*folder.glob(f"{SOLUTIONS}/*"), *folder.glob(f"{TRAINING}/*"), *folder.iterdir()]:
-        if path in kept:
-            continue
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
-        else:
-            path.unlink()
+    kept = {path for path in kept | {path.parent for path in kept} if not path.is_symlink()}
+    for pattern in ("*", f"{SOLUTIONS}/*", f"{TRAINING}/*"):
+        for path in {*folder.glob(pattern)} - kept:
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
 
 
 @contextmanager
@@ -234,7 +212,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 def check_resumable_folder(
     file: Path, definition: Mapping[str, Any], *, job: str, free: Collection[str] = ()
-) -> None:
+) -> dict[str, Any]:
     """Refuse a folder that holds a job with another definition, or something else.
 
     Args:
@@ -242,13 +220,15 @@ def check_resumable_folder(
         definition: The definition of this job.
         job: The kind of job, such as "grid search".
         free: Entries that may differ, such as `study.samples`.
+
+    Returns:
+        The entries of the definition in the folder; none if it is new.
     """
     out = file.parent
     if out.exists() and not out.is_dir():
         raise UserError(f"{out} is a file; name an output folder")
     if not out.exists() or all(is_partial(path) for path in out.iterdir()):
-        return
-    check_links(out)
+        return {}
     try:
         before = _flat(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError):
@@ -260,6 +240,7 @@ def check_resumable_folder(
             f"{out} holds a {job} with other settings ({', '.join(names)}); "
             "name another output folder, or remove that one"
         )
+    return before
 
 
 def _flat(content: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
+from math import inf
 from types import TracebackType
 from typing import Any, Self
 
@@ -52,20 +53,15 @@ class NotebookLine:
     EVERY = 0.2  # Time between two changes, s
 
     def __init__(self) -> None:
-        self._handle: Any = None
-        self._last = 0.0
+        from IPython.display import Pretty, display
+
+        self._pretty, self._handle, self._last = Pretty, display(Pretty(""), display_id=True), -inf
 
     def show(self, text: str, *, now: bool = False) -> None:
         """Show a text in place of the last one; unless it has to be `now`, it may be passed over."""
-        if not now and time.perf_counter() - self._last < self.EVERY:
-            return
-        from IPython.display import Pretty, display
-
-        shown, self._last = Pretty(text), time.perf_counter()
-        if self._handle is None:
-            self._handle = display(shown, display_id=True)
-        else:
-            self._handle.update(shown)
+        if now or time.perf_counter() - self._last >= self.EVERY:
+            self._handle.update(self._pretty(text))
+            self._last = time.perf_counter()
 
 
 class Stages:

@@ -1,17 +1,31 @@
-"""Numbers as text; tables of texts for the terminal and pages, of cells for CSV files, written atomically."""
+"""Tables: read from files, written atomically, for the terminal and pages; numbers as text."""
 
 import csv
-from collections.abc import Collection, Iterable, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from math import isfinite, isnan
 from pathlib import Path
+from types import MappingProxyType
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from pinnray.runtime.atomic import atomic_path
+from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import shown
 
+SEPARATORS = ",;\t"
+UNIT = re.compile(r"|[(\[].{0,12}[)\]]|mm|mm/mm|px|%|[mk]?pa|n|s|-", re.I)
+"""A cell of a line of units below the titles."""
+DECIMAL_COMMA = re.compile(r"[-+]?(\d*|\d{1,3}(\.\d{3})+),\d+(e[-+]?\d+)?", re.I)
+THOUSANDS = re.compile(r"[-+]?\d{1,3}(\.\d{3})+")
+"""A whole number with points between its thousands, as it stands in a table with decimal commas."""
+EMPTY = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+"""Texts of a number that is not there, in lower case: as of pandas, R and spreadsheets."""
+MOST_TITLES = 12
+"""Titles of a refused header that a message names."""
 Cell = str | int | float | bool
 NONE = "–"
 """Stands where there is no number."""
@@ -19,29 +33,188 @@ LEAST_PERCENT, LEAST_DISTANCE = 0.001, 0.0001
 """Smaller shares, %, and lengths, mm, are printed as less than this: they are as good as zero."""
 
 
-def write_csv(path: Path, rows: Sequence[Mapping[str, Cell | None]]) -> None:
-    """Write rows with equal keys under a header, atomically; numbers keep all their digits, None is empty.
+@dataclass(frozen=True)
+class ReadTable:
+    """The wanted columns of a table in a file.
 
-    A text that a spreadsheet would take for a formula, as a file of others may be called, gets an apostrophe.
+    Attributes:
+        path: The file.
+        titles: Title of every wanted column that is there, by its name, with the unit from a line of units.
+        rows: The number of the line of every row, and its cells by the names of their columns.
+        comments: Lines that begin with #.
     """
+
+    path: Path
+    titles: Mapping[str, str]
+    rows: Sequence[tuple[int, Mapping[str, str]]]
+    comments: Sequence[str]
+
+    def numbers(self, besides: Collection[str] = ()) -> list[list[float]]:
+        """The numbers of every row, NaN in a row that is empty `besides` some columns.
+
+        Raises:
+            UserError: If another cell holds no finite number.
+        """
+        numbers = []
+        for line, cells in self.rows:
+            numbers.append([read_number(cell) for cell in cells.values()])
+            empty = all(cell.lower() in EMPTY for name, cell in cells.items() if name not in besides)
+            for (name, cell), value in zip(cells.items(), numbers[-1], strict=True):
+                if not isfinite(value) and not (empty and name not in besides):
+                    raise UserError(
+                        f"{self.path}, line {line}: {self.titles[name]} is {cell!r}, no finite number"
+                    )
+        return numbers
+
+
+def read_table(
+    path: Path, what: str, required: Mapping[str, str], optional: Mapping[str, str] = MappingProxyType({})
+) -> ReadTable:
+    """Read a table that programs and people save in many ways: columns, by their titles, in any order.
+
+    Between the cells are commas, semicolons or tabs, with decimal commas unless there are commas between the
+    cells. Before the titles may be a byte-order mark and lines of other text, below them a line of units.
+    Blanks around cells, empty lines and separators at the end of a line do not count. A spreadsheet quotes
+    comments with a comma, and appends separators to them.
+
+    Args:
+        path: The file.
+        what: Its rows, in a message.
+        required: Regular expressions of titles by the names of columns that must be there.
+        optional: The same of columns that may be there.
+
+    Raises:
+        UserError: If it cannot be read, a column is missing or there twice, or a row has more or fewer cells
+            than the header.
+    """
+    text, tables, fault = _text(path, what), [], None
+    for separator in SEPARATORS:
+        try:
+            rows, comments = _rows(text, separator)
+        except csv.Error as error:
+            open_mark = str(error) == "unexpected end of data"
+            reason = "a quotation mark is opened and not closed" if open_mark else "it is not a CSV file"
+            fault = UserError(f"cannot read the {what} {path}: {reason}")
+            continue
+        starts = [n for n, (_, cells) in enumerate(rows) if all(_places(cells, required).values())]
+        width = len(rows[0][1]) if rows else 0
+        tables.append((bool(starts), width, separator, rows[starts[0] if starts else 0 :], comments))
+    if fault and not any(found for found, *_ in tables):
+        raise fault
+    _, _, separator, rows, comments = max(tables, key=lambda table: table[:2])
+    titles = rows[0][1] if rows else []
+    while titles and not titles[-1]:
+        titles.pop()
+    places, body = columns_of(titles, required, optional, str(path)), rows[1:]
+    if body and all(UNIT.fullmatch(cell) for cell in body[0][1]):
+        titles = [" ".join(pair) for pair in zip(titles, body.pop(0)[1], strict=False)]
+    commas = separator != "," and any(DECIMAL_COMMA.fullmatch(cell) for _, cells in body for cell in cells)
+    read = []
+    for line, cells in body:
+        while len(cells) > len(titles) and not cells[-1]:
+            cells.pop()
+        if len(cells) != len(titles):
+            raise UserError(
+                f"{path}, line {line}: the header names {len(titles)} columns, this line has {len(cells)}; "
+                "name every column, and write decimals with a point or put semicolons between the cells"
+            )
+        found = {name: cells[place] for name, place in places.items()}
+        read.append((line, {name: _with_point(cell) for name, cell in found.items()} if commas else found))
+    return ReadTable(path, {name: titles[place] for name, place in places.items()}, read, comments)
+
+
+def columns_of(
+    titles: Sequence[str], required: Mapping[str, str], optional: Mapping[str, str], table: str
+) -> dict[str, int]:
+    """Numbers of the wanted columns by their names; arguments as of `read_table`.
+
+    Args:
+        titles: Of all columns.
+        required: Of columns that must be there.
+        optional: Of columns that may be there.
+        table: Name of the table in messages.
+
+    Raises:
+        UserError: If a column is missing or there twice.
+    """
+    places = _places(titles, {**required, **optional})
+    for name, found in places.items():
+        if not found and name in required:
+            may = f" and may name {', '.join(optional)}" if optional else ""
+            listed = ", ".join(repr(title[:30]) for title in titles[:MOST_TITLES])
+            rest = f" and {len(titles) - MOST_TITLES} more" if len(titles) > MOST_TITLES else ""
+            raise UserError(
+                f"{table} has no column {name}; the header must name {', '.join(required)}{may}; it "
+                + (f"names {listed}{rest}" if titles else "is empty")
+            )
+        if len(found) > 1:
+            both = " and ".join(repr(titles[place]) for place in found[:2])
+            raise UserError(f"{table} has the column {name} twice, {both}; keep one")
+    return {name: found[0] for name, found in places.items() if found}
+
+
+def read_number(text: str) -> float:
+    """The number that a cell holds; NaN where it holds none."""
+    try:
+        return float(text if "_" not in text else "nan")  # Python reads 2_0 as 20
+    except ValueError:
+        return float("nan")
+
+
+def _text(path: Path, what: str) -> str:
+    """The text of a file in UTF-8 or, as spreadsheets write it, UTF-16 or Windows' Latin letters."""
+    try:
+        content = path.read_bytes()
+        if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+            return content.decode("utf-16")
+        if b"\0" not in content:
+            try:
+                return content.decode("utf-8-sig")
+            except UnicodeDecodeError:
+                return content.decode("cp1252")
+    except OSError as error:
+        raise UserError(f"cannot read the {what} {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        pass
+    raise UserError(f"cannot read the {what} {path}: it is not a CSV file")
+
+
+def _rows(text: str, separator: str) -> tuple[list[tuple[int, list[str]]], list[str]]:
+    """Rows of cells with the numbers of their last lines, and comments."""
+    comments: list[str] = []
+
+    def uncommented() -> Iterator[str]:
+        for line in StringIO(text, newline=""):
+            if comment := line.lstrip().startswith("#"):
+                comments.append(line)
+            yield "\n" if comment else line
+
+    reader = csv.reader(uncommented(), delimiter=separator, strict=True, skipinitialspace=True)
+    rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+    quoted = [" ".join(cells[0].split()) for _, cells in rows if cells and cells[0].startswith("#")]
+    table = [(line, cells) for line, cells in rows if any(cells) and not cells[0].startswith("#")]
+    return table, [comment.strip(" \t\r\n,;") for comment in comments + quoted]
+
+
+def _places(titles: Sequence[str], columns: Mapping[str, str]) -> dict[str, list[int]]:
+    return {
+        name: [place for place, title in enumerate(titles) if re.fullmatch(pattern, title, re.I)]
+        for name, pattern in columns.items()
+    }
+
+
+def _with_point(cell: str) -> str:
+    """A cell of a table with decimal commas, its number with a decimal point."""
+    is_number = DECIMAL_COMMA.fullmatch(cell) or THOUSANDS.fullmatch(cell)
+    return cell.replace(".", "").replace(",", ".") if is_number else cell
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Cell | None]]) -> None:
+    """Write rows with equal keys under a header, atomically; numbers keep all their digits, None is empty."""
     with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows({key: plain(cell) for key, cell in row.items()} for row in rows)
-
-
-def plain(cell: Cell | None) -> Cell | None:
-    """The cell, a text that begins like a formula with an apostrophe before it.
-
-    Source: OWASP, CSV Injection.
-    """
-    if not isinstance(cell, str) or not cell.startswith(("=", "+", "-", "@", "\t", "\r")):
-        return cell
-    try:
-        float(cell)
-    except ValueError:
-        return f"'{cell}"
-    return cell
+        writer.writerows(rows)
 
 
 @dataclass(frozen=True)

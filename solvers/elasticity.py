@@ -8,16 +8,17 @@ A. N. Gent's (Rubber Chem. Technol. 69 (1996) 59-61), which stiffens as chains a
 volumetric part of the neo-Hookean.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, assert_never, get_args
+from collections.abc import Callable
+from typing import Any, assert_never, get_args
 
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.errors import UserError
-from pinnray.solvers.names import LawName as LawName
-
-PLANES = ("strain", "stress")
+from pinnray.solvers.material import Lame as Lame
+from pinnray.solvers.material import LawName as LawName
+from pinnray.solvers.material import check_known as check_known
+from pinnray.solvers.material import lame_constants as lame_constants
+from pinnray.solvers.material import lame_derivatives as lame_derivatives
 
 LIMIT = 1.0
 """Value of tr C - 3 - 2 ln J that Gent's law cannot reach: of much filler; gum has 30 to 100.
@@ -27,40 +28,6 @@ The stiffness has grown by a third where it is a quarter, at a stretch of about 
 
 Field = Any
 """A NumPy array, a torch tensor or a UFL expression."""
-
-
-class Lame(NamedTuple):
-    """Lamé constants, MPa: numbers or, at points in a body of several materials, arrays of one at each."""
-
-    λ: float  # As it stands in the law; in plane stress the reduced one, 2 λ μ / (λ + 2 μ)
-    μ: float  # Shear modulus
-    λ_out: float  # σ_zz over the trace of the in-plane strain: λ in plane strain, 0 in plane stress
-
-
-def check_known(what: str, name: str, known: Sequence[str]) -> None:
-    """Refuse a name, such as that of a law, with a `UserError` that lists the known ones."""
-    if name not in known:
-        raise UserError(f"the {what} {name!r} is not known here; take {' or '.join(known)}")
-
-
-def lame_constants(young: float, poisson: float, plane: str) -> Lame:
-    """Lamé constants from Young's modulus (MPa) and Poisson's ratio for plane "strain" or "stress"."""
-    check_known("plane state", plane, PLANES)
-    μ = young / (2 * (1 + poisson))
-    if plane == "stress":
-        return Lame(λ=young * poisson / ((1 + poisson) * (1 - poisson)), μ=μ, λ_out=0.0)
-    λ = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
-    return Lame(λ=λ, μ=μ, λ_out=λ)
-
-
-def lame_derivatives(young: float, poisson: float, plane: str) -> Lame:
-    """Derivatives of the Lamé constants by Poisson's ratio, MPa."""
-    check_known("plane state", plane, PLANES)
-    μ = -young / (2 * (1 + poisson) ** 2)
-    if plane == "stress":
-        return Lame(λ=young * (1 + poisson**2) / (1 - poisson**2) ** 2, μ=μ, λ_out=0.0)
-    λ = young * (1 + 2 * poisson**2) / ((1 + poisson) * (1 - 2 * poisson)) ** 2
-    return Lame(λ=λ, μ=μ, λ_out=λ)
 
 
 def _dimension(gradient: Field) -> int:

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import petsc4py
 
+from pinnray.runtime.cache import share_cache
+
 
 def wheels_mpi(prefix: Path, package: Path) -> Path | None:
     """The MPI library of an environment whose PETSc is a wheel, too; None for a distribution's PETSc.
@@ -27,6 +29,8 @@ def wheels_mpi(prefix: Path, package: Path) -> Path | None:
 
 if (mpi := wheels_mpi(Path(sys.prefix), Path(petsc4py.__file__))) is not None:
     ctypes.CDLL(str(mpi), mode=ctypes.RTLD_GLOBAL)
+
+share_cache()  # DOLFINx, which is imported after this, asks for the folder of its cache only then
 
 # Its handler of signals would end the process at a closed pipe.
 petsc4py.init(["", "-skip_petscrc", "-no_signal_handler"])

@@ -17,14 +17,14 @@ from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import brief
 from pinnray.solvers.elasticity import Lame, lame_constants
-from pinnray.solvers.physics import LEAST_TRAVEL as LEAST_TRAVEL
-from pinnray.solvers.physics import RADIUS as RADIUS
-from pinnray.solvers.physics import ROUGHEST as ROUGHEST
-from pinnray.solvers.physics import Load as Load
-from pinnray.solvers.physics import LoadKind as LoadKind
-from pinnray.solvers.physics import Material as Material
-from pinnray.solvers.physics import Physics as Physics
-from pinnray.solvers.physics import Substance as Substance
+from pinnray.solvers.load import LEAST_TRAVEL as LEAST_TRAVEL
+from pinnray.solvers.load import RADIUS as RADIUS
+from pinnray.solvers.load import ROUGHEST as ROUGHEST
+from pinnray.solvers.load import Load as Load
+from pinnray.solvers.load import LoadKind as LoadKind
+from pinnray.solvers.load import Physics as Physics
+from pinnray.solvers.material import Material as Material
+from pinnray.solvers.material import Substance as Substance
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
-from pinnray.geometry.registration import Pictures
+from pinnray.geometry.picture_frame import Pictures
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.runtime.notebook import brief, fact_table
 from pinnray.solvers.elasticity import energy_density_of, strain_of, stress_of, von_mises
-from pinnray.solvers.problem import Problem
+from pinnray.solvers.problem import Load, Problem
 
 
 class DisplacementField(Protocol):
@@ -38,14 +38,6 @@ class SmoothField(DisplacementField, Protocol):
     """A displacement whose gradient depends on the point alone: it does not jump between triangles."""
 
     smooth: ClassVar[Literal[True]]
-
-
-@runtime_checkable
-class NetworkField(DisplacementField, Protocol):
-    """A displacement that costs little more where its gradient is found, too."""
-
-    def displacement_and_gradient(self, location: LocatedPoints) -> tuple[FloatArray, FloatArray]:
-        """`displacement`, shape (n, 2), mm, and `gradient`, shape (n, 2, 2), at `location.points`."""
 
 
 @runtime_checkable
@@ -106,6 +98,10 @@ class IdentifiedForce(NamedTuple):
 
     size: Estimated  #: N/mm
     position: Estimated | None  #: Contact's abscissa on the drawn front, mm; None where it was no unknown
+    along: Estimated | None = None  #: Its component along the travel, N/mm
+    #: Shares of the variance of `along` by what they come from, the largest first
+    shares: Mapping[str, float] = {}
+    advice: str = ""  #: A sentence on the largest share, and on what would narrow the interval
 
     def phrase(self, depth: float | None = None) -> str:
         """Force and place with their intervals in words; in N as well for a finger of a depth, mm."""
@@ -113,6 +109,12 @@ class IdentifiedForce(NamedTuple):
         if depth is not None:
             said += f", {_interval(*(depth * value for value in self.size))} N over {depth:g} mm"
         return said if self.position is None else f"{said}, at x = {_interval(*self.position)} mm"
+
+
+def along_travel(load: Load) -> FloatArray:
+    """Unit vector along the travel of the indenter, shape (2,); zero if it has none."""
+    travel = np.array([value or 0.0 for value in load.displacement])
+    return np.asarray(travel / (np.linalg.norm(travel) or 1.0))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -207,9 +209,7 @@ class Solution:
     @property
     def force(self) -> float:
         """Force of the indenter along its travel, N, over the whole depth; `reaction` is per mm of depth."""
-        travel = np.array([value or 0.0 for value in self.problem.load.displacement])
-        length = float(np.linalg.norm(travel))
-        return float(self.reaction @ (self.depth * travel / length)) if length else 0.0
+        return self.depth * float(self.reaction @ along_travel(self.problem.load))
 
     @property
     def depth(self) -> float:
@@ -242,13 +242,6 @@ class Solution:
         gradient = self.field.solid_gradient if isinstance(self.field, SolidField) else self.field.gradient
         state = State.from_gradient(gradient(location), self.problem, location.cells)
         return State(**{name: values[0] for name, values in vars(state).items()}) if alone else state
-
-    def displacement_and_state(self, location: LocatedPoints) -> "tuple[FloatArray, State]":
-        """`displacement` and `state` at n points."""
-        if not isinstance(self.field, NetworkField):
-            return self.displacement(location), self.state(location)
-        displacement, gradient = self.field.displacement_and_gradient(location)
-        return displacement, State.from_gradient(gradient, self.problem, location.cells)
 
     def _repr_html_(self) -> str:
         """Status, energy, reaction, unknowns and time, in a notebook."""

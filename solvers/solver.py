@@ -3,7 +3,7 @@
 import re
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import inf, pow
 from pathlib import Path
@@ -92,9 +92,9 @@ class FieldSettings:
         return preset | {name: getattr(self, name) for name in names}
 
     def check_positive(self, *names: str) -> None:
-        """Raise a `UserError` unless settings are above zero."""
+        """Raise a `UserError` unless settings are above zero and finite."""
         for name in names:
-            if not (value := getattr(self, name)) > 0:
+            if not 0 < (value := getattr(self, name)) < inf:
                 raise UserError(f"{self.name}: {name} must be positive, got {value}")
 
     def check_not_negative(self, *names: str) -> None:
@@ -194,6 +194,20 @@ def check_load(solver: Solver, load: Load) -> None:
         )
 
 
+def check_law(solvers: Sequence[Solver], material: Material) -> None:
+    """Raise a `UserError` if the law of a material was given, and none of the solvers has it."""
+    if "law" in material.model_fields_set and not any(material.law in solver.laws for solver in solvers):
+        known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
+        raise UserError(f"law {material.law}: none of the solvers has it ({known})")
+
+
+def check_asked(solver: Solver, material: Material, observations: Observations | None) -> None:
+    """Raise a `UserError` if the only solver lacks the law that was given, or takes no measurements."""
+    check_law([solver], material)
+    if observations is not None and not Traits.of(solver).assimilates:
+        raise UserError(f"{solver.name} does not assimilate markers; `compare` compares it with measurements")
+
+
 def with_law(material: Material, solver: Solver) -> Material:
     """The material with a law that the solver supports: its own if possible, else the solver's default.
 
@@ -201,9 +215,12 @@ def with_law(material: Material, solver: Solver) -> Material:
     """
     law = material.law if material.law in solver.laws else solver.laws[0]
     try:
-        return Material(**{**material.model_dump(), "law": law}).made_of(material.substance)
+        made = Material(**{**material.model_dump(exclude_unset=True), "law": law})
     except UserError as error:
         raise UnsupportedProblemError(f"{solver.name}: {error}") from None
+    if "law" not in material.model_fields_set:
+        made.model_fields_set.remove("law")  # nobody asked for it
+    return made.made_of(material.substance)
 
 
 def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Solution:
@@ -304,8 +321,6 @@ class TrainingContext:
 
     folder: Path | None = None  #: Folder for checkpoints and the history; None to write nothing
     resume: bool = False  #: Whether to continue from the checkpoint in `folder` if there is one
-    #: Energy of a reference solution per depth, N mm/mm, for the progress text
-    reference_energy: float | None = None
 
 
 @runtime_checkable

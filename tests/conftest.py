@@ -24,6 +24,9 @@ os.environ["PETSC_OPTIONS"] = (
     "-no_signal_handler"  # whoever loads PETSc first: a closed pipe would end a worker, and hang them all
 )
 
+os.environ.setdefault("XDG_CACHE_HOME", str(Path.home() / ".cache"))  # so that no test's cache becomes theirs
+os.environ.setdefault("MPLCONFIGDIR", str(Path.home() / ".cache" / "matplotlib"))
+
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 
 

@@ -32,16 +32,16 @@ def test_the_page_has_every_key_of_a_study_and_of_a_question() -> None:
 
 @pytest.mark.parametrize("name", ["ribs", "loads", "friction", "fingers", "gridsearch"])
 def test_the_example_study_can_be_read(name: str) -> None:
-    from pinnray.studies.sweep.study import load_study
+    from pinnray.studies.sweep.study import Study
 
-    load_study(DOCS / "examples" / f"{name}.toml")
+    Study.load(DOCS / "examples" / f"{name}.toml")
 
 
 @pytest.mark.parametrize("name", ["wrap.toml", "wrap-cylinder.toml"])
 def test_the_example_questions_can_be_read(name: str) -> None:
-    from pinnray.studies.optimum.question import load_question
+    from pinnray.studies.optimum.question import Question
 
-    load_question(DOCS / "examples" / name)
+    Question.load(DOCS / "examples" / name)
 
 
 @pytest.mark.release

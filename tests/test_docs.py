@@ -456,13 +456,16 @@ def test_the_docs_have_every_name_of_a_list(page, column, listed):
 
 
 def test_the_docs_have_every_key_of_a_published_line():
-    from pinnray.film.publication import FrameLine
+    from pinnray.film.force_estimate import force_row
+    from pinnray.film.live_force import frame_line
+    from tests.film.test_force_estimate import FORCES, REST, frame, seen
 
     page = HOW_TO / "force-from-film.md"
     (example,) = (block.text for block in blocks(page) if block.language == "json")
-    line = FrameLine.model_validate_json(example)
-    assert line.force is not None
-    for heading, keys in (("key of a line", line.model_dump()), ("column of `force.csv`", line.force)):
+    line = json.loads(example)
+    written = frame_line(frame(0), seen(REST), REST) | {"force": force_row(FORCES[0], 1.0)}
+    assert (line.keys(), line["force"].keys()) == (written.keys(), written["force"].keys())
+    for heading, keys in (("key of a line", line), ("column of `force.csv`", line["force"])):
         said = {name for row in table(page, heading) for name in re.findall(r"`(\w+)`", row[0])}
         assert said == set(keys)
 

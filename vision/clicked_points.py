@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
+from math import comb
 from pathlib import Path
 from typing import Literal
 
@@ -10,10 +11,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import HAND_HELD, Homography, nearest_similarity
+from pinnray.geometry.picture_frame import HAND_HELD, Homography, nearest_similarity
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.measurements import csv_rows
+from pinnray.runtime.tables import read_table
+from pinnray.vision.point_order import likeliest_order, likelihoods, order_text
 
 FEWEST = 3
 """Points that tell a picture's mirror image from itself."""
@@ -23,6 +25,11 @@ ROUNDING = 1e-6
 """Misfit that says nothing, over the points' extent."""
 UNKNOWN_BY = 1.5
 """A mirror image that fits worse by less than this factor may be the right one."""
+OTHER_UNIT = 2.0
+"""Ratio of the sizes of both pictures' points beyond which they are in two units."""
+MOST_CHOICES, CLEAR = 5000, 5.0
+"""Number of ways to leave out points of the longer list up to which they are tried, and lead in logarithmic
+likelihood from which on one is the right one."""
 
 LengthScale = Literal["same", "lengths"]
 
@@ -31,7 +38,7 @@ LengthScale = Literal["same", "lengths"]
 class Clicks:
     """The points of one photograph."""
 
-    places: FloatArray  # Mean of the clicks at every point, shape (m, 2), pixels or any other unit
+    places: FloatArray  # Mean of the clicks at every point, shape (m, 2), any unit; NaN for an empty row
     noise: float | None  # Standard deviation of such a mean from repeats, a coordinate; None without repeats
     numbers: tuple[float, ...] = ()  # Of the points, ascending; empty where none were given
 
@@ -41,7 +48,8 @@ class ClickedPoints:
     """Measurements from clicks, and what was found on the way."""
 
     observations: Observations
-    order: IntArray  # Click of every marker, shape (m,)
+    remarks: tuple[str, ...]  # On points that are missing, and on another order or direction
+    reordered: bool  # Whether the points at rest are in another order than the markers
     scales: tuple[float, float]  # Of the pictures at rest and pressed, mm per unit
     mirrored: bool  # Whether y runs down in the pictures, as in most programs
     misfit: float  # Rms distance of a coordinate at rest from the drawing, mm
@@ -50,36 +58,23 @@ class ClickedPoints:
 
 
 def read_clicks(path: Path) -> Clicks:
-    """Clicks from a CSV file with columns x and y, a row a click.
+    """Clicks from a table with columns x and y, a row a click; one of nan is a missing point.
 
     With a column `point`, clicks of one number are repeats, and points are in the order of their numbers. A
     `UserError` names what cannot be read.
     """
-    _, rows = csv_rows(path, "clicks")
-    header = [cell.lower() for cell in rows[0][1]] if rows else []
-    if not {"x", "y"} <= set(header):
-        found = f"it has {', '.join(map(repr, header))}" if header else "it is empty"
-        raise UserError(f"{path}: the header must name the columns x and y, and may name point; {found}")
-    columns = [header.index(name) for name in ("x", "y", "point") if name in header]
-    values = []
-    for line, row in rows[1:]:
-        try:
-            values.append([float(row[column]) for column in columns])
-        except (ValueError, IndexError):
-            said = f"{path}, line {line}: {','.join(row)!r} has no number in x, y or point"
-            raise UserError(said) from None
-        if not np.isfinite(values[-1]).all():
-            raise UserError(f"{path}, line {line}: {','.join(row)!r} has a number that is not finite")
-    if len(values) < FEWEST:
-        raise UserError(f"{path} has {len(values)} points; give at least {FEWEST}")
-    table = np.array(values)
-    clicks = table[:, :2]
-    if table.shape[1] == 2:
-        return Clicks(clicks, None)
-    numbers, group = np.unique(table[:, 2], return_inverse=True)
+    table = read_table(path, "clicks", {"x": "x", "y": "y"}, {"point": "point"})
+    values = np.array(table.numbers(besides=("point",))).reshape(-1, len(table.titles))
+    seen = np.isfinite(values[:, 0])
+    clicks = values[:, :2]
+    numbers, group = np.arange(len(clicks))[seen], np.arange(seen.sum())
+    if "point" in table.titles:
+        numbers, group = np.unique(values[seen, 2], return_inverse=True)
     if len(numbers) < FEWEST:
         raise UserError(f"{path} has {len(numbers)} points; give at least {FEWEST}")
-    counts = np.bincount(group)
+    if "point" not in table.titles:
+        return Clicks(clicks, None)
+    clicks, counts = clicks[seen], np.bincount(group)
     means = np.column_stack([np.bincount(group, weights=clicks[:, axis]) / counts for axis in (0, 1)])
     freedom = len(clicks) - len(counts)
     noise = None
@@ -101,7 +96,9 @@ def clicked_points(
     """Displacements of markers (m, 2), mm, from clicks in their order, or at least of each other.
 
     The picture at rest is put on the drawing by turn, shift and, where it is not known, scale; the pressed
-    one is moved with it. Its own frame is `HAND_HELD`.
+    one is moved with it. Its own frame is `HAND_HELD`. A point that is missing in one picture is left out; a
+    pressed list in another order than that at rest is put into this order, unless its points are numbered,
+    and one whose y runs the other way is turned over.
 
     Args:
         rest: At rest.
@@ -114,54 +111,131 @@ def clicked_points(
         source: A sentence for the observations.
 
     Raises:
-        UserError: If the points of both are not the same, or those at rest do not lie as on the drawing.
+        UserError: If the points of both are not the same or in two units, or those at rest do not lie as on
+            the drawing.
     """
-    if rest.numbers != pressed.numbers:
-        alone = sorted({*rest.numbers} ^ {*pressed.numbers})
+    zoom = _size(rest.places) / _size(pressed.places) if scale == "lengths" else 1.0
+    if isinstance(scale, tuple):
+        zoom = scale[1] / scale[0]
+    one, other, names, remarks = _paired(rest, pressed, zoom)
+    here, there = rest.places[one], pressed.places[other]
+    _check_pair(here, zoom * there)
+    found = likeliest_order(here, zoom * there, may_flip=True)
+    if found.flipped:
         raise UserError(
-            f"a point is numbered in one picture only: {', '.join(f'{each:g}' for each in alone)}"
+            "y runs the other way in the pressed list than at rest; save both with y down, or both with y up"
         )
-    counts = len(rest.places), len(pressed.places), len(markers)
-    if len(set(counts)) > 1:
-        raise UserError(
-            f"{counts[0]} points at rest, {counts[1]} pressed, {counts[2]} markers on the drawing; give each "
-            "marker one point in both pictures, in one order"
-        )
-    order, mirrored = _matched(rest.places, markers)
-    sign = np.array([1.0, -1.0 if mirrored else 1.0])
-    here, there = (each.places[order] * sign for each in (rest, pressed))
+    owner, mirrored = _matched(here, markers, one if len(rest.places) == len(markers) else None)
+    own, sign = markers[owner], np.array([1.0, -1.0 if mirrored else 1.0])
+    order = found.order if not rest.numbers else np.arange(len(here))
+    here, given = here * sign, there * sign
+    there = given[order]
     if isinstance(scale, tuple):
         scales = scale
     elif scale == "same":
-        scales = (1 + float(nearest_similarity(here, markers).values[3]),) * 2
+        scales = (1 + float(nearest_similarity(here, own).values[3]),) * 2
     else:
-        listed = np.argsort(order)
-        own, one, two = (_length(each[listed]) for each in (markers, here, there))
-        scales = (own / one, own / two)
-    here, there = scales[0] * here, scales[1] * there
-    motion: Homography = nearest_similarity(here, markers, rigid=True)
-    here, there = motion.moved(here), motion.moved(there)
-    misfit = float(np.sqrt(((here - markers) ** 2).sum() / (2 * len(markers) - 4)))
-    misfit = max(misfit, ROUNDING * float(np.ptp(markers)))
+        scales = (_length(own) / _length(here), _length(own) / _length(there))
+    here, there, given = scales[0] * here, scales[1] * there, scales[1] * given
+    motion: Homography = nearest_similarity(here, own, rigid=True)
+    here, there, given = motion.moved(here), motion.moved(there), motion.moved(given)
+    if (found.order != np.arange(len(here))).any():
+        text = order_text(found.order, names)
+        far, least = (
+            float(np.linalg.norm(each - here, axis=1).max()) for each in (given, given[found.order])
+        )
+        remarks.append(
+            f"the pressed points are in another order than those at rest: {text} the farthest moves by "
+            f"{least:.3g} mm, not {far:.3g}; "
+            + ("see their numbers" if rest.numbers else "they were taken in that order")
+        )
+    if len(absent := np.setdiff1d(np.arange(len(markers)), owner)):
+        remarks.append(f"not visible, for want of a point: marker {_listed(absent + 1)}")
+    misfit = float(np.sqrt(((here - own) ** 2).sum() / max(2 * len(own) - 4, 1)))
+    misfit = max(misfit, ROUNDING * float(np.ptp(own)))
     noise, reason = _noise(rest, pressed, scales, misfit)
+    displacements, seen = np.zeros_like(markers), np.isin(np.arange(len(markers)), owner)
+    displacements[owner] = there - here
     return ClickedPoints(
         observations=Observations(
             points=markers,
-            displacements=there - here,
+            displacements=displacements,
             standard_deviations=np.full(markers.shape, np.sqrt(2) * noise),
-            visible=np.ones(len(markers), dtype=np.bool_),
+            visible=seen,
             source=source,
             simulated=False,
             marker_radius=marker_radius,
             pressed=HAND_HELD,
         ),
-        order=order,
+        remarks=tuple(remarks),
+        reordered=bool((np.diff(owner) < 0).any()),
         scales=scales,
         mirrored=mirrored,
         misfit=misfit,
         noise=noise,
         reason=reason,
     )
+
+
+def _paired(rest: Clicks, pressed: Clicks, zoom: float) -> tuple[IntArray, IntArray, list[str], list[str]]:
+    """Numbers of the points that both lists have, in each, their names, and remarks on the others."""
+    if bool(rest.numbers) != bool(pressed.numbers):
+        raise UserError("the points of one picture are numbered, those of the other are not")
+    spots = [np.flatnonzero(np.isfinite(each.places[:, 0])) for each in (rest, pressed)]
+    labels = [
+        np.array(each.numbers)[own] if each.numbers else own + 1
+        for each, own in zip((rest, pressed), spots, strict=True)
+    ]
+    if rest.numbers or len(rest.places) == len(pressed.places):
+        _, one, other = np.intersect1d(labels[0], labels[1], return_indices=True)
+    else:
+        one, other = _likeliest_choice(rest.places[spots[0]], zoom * pressed.places[spots[1]])
+    if len(one) < FEWEST:
+        raise UserError(f"{len(one)} points are in both pictures; give at least {FEWEST}")
+    missing = {"in the pressed picture": np.delete(labels[0], one), "at rest": np.delete(labels[1], other)}
+    remarks = [
+        f"left out, as missing {where}: point {_listed(each)}" for where, each in missing.items() if len(each)
+    ]
+    return spots[0][one], spots[1][other], [f"{label:g}" for label in labels[0][one]], remarks
+
+
+def _likeliest_choice(here: FloatArray, there: FloatArray) -> tuple[IntArray, IntArray]:
+    """Numbers of the points in two lists of different lengths that give the likeliest displacements."""
+    fewer, more = sorted((here, there), key=len)
+    said = (
+        f"{len(here)} points at rest and {len(there)} pressed; number them in a column point, or write "
+        "nan for one that is missing"
+    )
+    if comb(len(more), len(fewer)) > MOST_CHOICES:
+        raise UserError(said)
+    choices = np.array(list(combinations(range(len(more)), len(fewer))))
+    found = likelihoods(fewer, more[choices])
+    if len(found) > 1 and np.diff(np.sort(found)[-2:])[0] < CLEAR:
+        raise UserError(said)
+    every, chosen = np.arange(len(fewer)), choices[found.argmax()]
+    return (every, chosen) if len(here) < len(there) else (chosen, every)
+
+
+def _check_pair(here: FloatArray, there: FloatArray) -> None:
+    """Refuse points of one picture given twice, and those of two pictures in two units."""
+    if np.array_equal(np.sort(here, axis=0), np.sort(there, axis=0)):
+        raise UserError("both lists have the same points; give those of the pressed picture as well")
+    ratio = _size(here) / _size(there)
+    if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
+        nearer = "closer together" if ratio > 1 else "farther apart"
+        raise UserError(
+            f"the pressed points lie {max(ratio, 1 / ratio):.3g} times {nearer} than those at rest: give "
+            "both lists in one unit (10 is between mm and cm), or --scale lengths"
+        )
+
+
+def _size(places: FloatArray) -> float:
+    """Rms distance of the points from their middle, without those that are missing."""
+    return float(np.sqrt(np.nanvar(places, axis=0).sum()))
+
+
+def _listed(names: Sequence[float] | FloatArray | IntArray) -> str:
+    return ", ".join(f"{each:g}" for each in names)
 
 
 def _noise(rest: Clicks, pressed: Clicks, scales: Sequence[float], misfit: float) -> tuple[float, str]:
@@ -175,12 +249,13 @@ def _noise(rest: Clicks, pressed: Clicks, scales: Sequence[float], misfit: float
     return misfit, "the points at rest against the drawing"
 
 
-def _matched(places: FloatArray, markers: FloatArray) -> tuple[IntArray, bool]:
-    """The click of every marker, and whether the picture is mirrored: as listed, or else by the nearest."""
-    listed = np.arange(len(markers))
-    misfits = [_misfit(places * [1, sign], markers) for sign in (1, -1)]
+def _matched(places: FloatArray, markers: FloatArray, listed: IntArray | None) -> tuple[IntArray, bool]:
+    """The marker of every click, and whether the picture is mirrored: as listed, or else the nearest."""
     size = float(np.sqrt(markers.var(axis=0).sum()))
-    if min(misfits) > FAR * size:
+    misfits = (
+        [np.inf] if listed is None else [_misfit(places * [1, sign], markers[listed]) for sign in (1, -1)]
+    )
+    if listed is None or min(misfits) > FAR * size:
         found = [_nearest(places * [1, sign], markers) for sign in (1, -1)]
         misfits = [misfit for _, misfit in found]
         if min(misfits) > FAR * size:
@@ -198,8 +273,8 @@ def _matched(places: FloatArray, markers: FloatArray) -> tuple[IntArray, bool]:
 
 
 def _nearest(places: FloatArray, markers: FloatArray) -> tuple[IntArray, float]:
-    """The assignment of least misfit, mm: from each orientation of the main axes, to the nearest in turns."""
-    best = np.arange(len(markers)), np.inf
+    """The markers of least misfit, mm: from each orientation of the main axes, to the nearest in turns."""
+    best = np.arange(len(places)), np.inf
     frames = [np.linalg.svd(each - each.mean(axis=0))[2] for each in (places, markers)]
     spread = [np.sqrt(each.var(axis=0).sum()) for each in (places, markers)]
     for signs in product((1, -1), repeat=2):
@@ -208,12 +283,12 @@ def _nearest(places: FloatArray, markers: FloatArray) -> tuple[IntArray, float]:
             continue
         moved = (places - places.mean(axis=0)) @ turn * spread[1] / spread[0] + markers.mean(axis=0)
         for _ in range(20):
-            apart = np.linalg.norm(markers[:, None] - moved[None], axis=2)
-            order = linear_sum_assignment(apart**2)[1]
-            moved = nearest_similarity(places[order], markers).moved(places)
-        misfit = _misfit(places[order], markers)
+            apart = np.linalg.norm(moved[:, None] - markers, axis=2)
+            owner = linear_sum_assignment(apart**2)[1]
+            moved = nearest_similarity(places, markers[owner]).moved(places)
+        misfit = _misfit(places, markers[owner])
         if misfit < best[1]:
-            best = order, misfit
+            best = owner, misfit
     return best
 
 

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
@@ -10,21 +10,20 @@ from types import MappingProxyType
 import numpy as np
 
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, HAND_HELD, Registration
+from pinnray.geometry.picture_frame import FIXED, HAND_HELD, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import atomic_path
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.tables import EMPTY, read_number, read_table
 
 POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")
 REQUIRED = (*POSITION, *DISPLACEMENT)
 OPTIONAL = {"std_u_mm": 0.0, "std_v_mm": 0.0, "visible": 1.0}
+TITLES = {name: name for name in REQUIRED}, {name: name for name in OPTIONAL}
+"""Titles of the columns that must and that may be there, by their names."""
 WORDS = {"true": "1", "false": "0", "yes": "1", "no": "0"}
 """Other ways to write `visible`, in lower case."""
-EMPTY = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
-"""Texts of a number that is not there, in lower case: as of pandas, R and spreadsheets."""
-MOST_TITLES = 12
-"""Titles of a refused header that a message names."""
 CLICKED = 0.05
 """Median standard deviation, mm, from which points were set by hand: fixed cameras do better."""
 SMALLEST_DISTANCE = 1e-3
@@ -82,13 +81,12 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
         UserError: If the file cannot be read, a column is missing, a value is no number
             or a marker occurs twice; the message names the line.
     """
-    comments, table = csv_rows(path, "measurements")
-    sources = _said(comments, SOURCE_MARK)
-    simulated = any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in comments)
-    known = {picture: said[0] for picture, mark in PICTURES.items() if (said := _said(comments, mark))}
+    table = read_table(path, "measurements", *TITLES)
+    sources = _said(table.comments, SOURCE_MARK)
+    simulated = any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in table.comments)
+    known = {picture: said[0] for picture, mark in PICTURES.items() if (said := _said(table.comments, mark))}
     return measurements_of(
-        table[0][1] if table else [],
-        [(f"line {number}", cells) for number, cells in table[1:]],
+        [(f"line {line}", cells) for line, cells in table.rows],
         marker_radius=marker_radius,
         table=str(path),
         source=sources[0] if sources else f"measurements from {path.name}",
@@ -98,8 +96,7 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
 
 
 def measurements_of(
-    header: Sequence[str],
-    rows: Sequence[tuple[str, Sequence[str]]],
+    rows: Sequence[tuple[str, Mapping[str, str]]],
     *,
     marker_radius: float,
     table: str,
@@ -110,8 +107,7 @@ def measurements_of(
     """Observations from a table; columns and defaults as in `read_measurements`.
 
     Args:
-        header: Names of the columns.
-        rows: Cells of every marker, as texts, each row with its name in messages.
+        rows: Name of every row in messages, and the texts of its marker by their columns of `TITLES`.
         marker_radius: Radius of the markers' discs, mm.
         table: Name of the table in messages.
         source: One sentence on the origin of the numbers.
@@ -119,27 +115,13 @@ def measurements_of(
         pictures: How well the frames of the pictures of `PICTURES` are known, in words.
 
     Raises:
-        UserError: If a column is missing, a value is no number or a marker occurs twice.
+        UserError: If a value is no number or a marker occurs twice.
     """
-    for name in REQUIRED:
-        if name not in header:
-            raise UserError(
-                f"{table} has no column {name}; the header must name {', '.join(REQUIRED)} "
-                f"and may name {', '.join(OPTIONAL)}, with commas between; it {_titles(header)}"
-            )
-    for name in (*REQUIRED, *OPTIONAL):
-        if header.count(name) > 1:
-            raise UserError(f"{table} has the column {name} twice; keep one")
     if not rows:
         raise UserError(f"{table} has a header but no marker")
     markers: list[dict[str, float]] = []
     for number, cells in rows:
-        if len(cells) != len(header):
-            raise UserError(
-                f"{table}, {number}: the header names {len(header)} columns, this line has {len(cells)}; "
-                "separate them with commas, and write decimals with a point"
-            )
-        marker = _marker(dict(zip(header, cells, strict=True)), f"{table}, {number}")
+        marker = _marker(cells, f"{table}, {number}")
         if any(
             hypot(other["x_mm"] - marker["x_mm"], other["y_mm"] - marker["y_mm"]) < SMALLEST_DISTANCE
             for other in markers
@@ -182,57 +164,13 @@ def _said(comments: Sequence[str], mark: str) -> list[str]:
     return [found[1] for each in comments if (found := re.match(rf"#\s*{words}\s*(.*)", each, re.I))]
 
 
-def _titles(header: Sequence[str]) -> str:
-    """A clause on the titles that a header has."""
-    if not header:
-        return "is empty"
-    named = ", ".join(repr(title[:30]) for title in header[:MOST_TITLES])
-    return f"names {named}" + (f" and {rest} more" if (rest := len(header) - MOST_TITLES) > 0 else "")
-
-
-def csv_rows(path: Path, what: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The comments of a CSV file, and the cells of its other rows with the numbers of their last lines.
-
-    A spreadsheet program that saves the file puts a byte-order mark before the first line, quotes comments
-    with a comma, and appends commas to them: the mark "simulated" must survive that. Within quotation marks a
-    row goes on in the next line.
-
-    Args:
-        path: The file.
-        what: Its rows, in a message.
-
-    Raises:
-        UserError: If it cannot be read or is no such file.
-    """
-    comments: list[str] = []
-
-    def uncommented(lines: Iterable[str]) -> Iterator[str]:
-        for line in lines:
-            if comment := line.lstrip().startswith("#"):
-                comments.append(line)
-            yield "\n" if comment else line
-
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(uncommented(file), strict=True)
-            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a CSV file in UTF-8"
-        if str(error) == "unexpected end of data":
-            reason = "a quotation mark is opened and not closed"
-        raise UserError(f"cannot read the {what} {path}: {reason}") from None
-    comments += [" ".join(cells[0].split()) for _, cells in rows if cells[0].startswith("#")]
-    table = [(number, cells) for number, cells in rows if any(cells) and not cells[0].startswith("#")]
-    return [comment.strip(" \t\r\n,;") for comment in comments], table
-
-
 def _marker(cells: Mapping[str, str], where: str) -> dict[str, float]:
     """The numbers of one row; zeros instead of the displacement of a marker that was not seen."""
     said = cells.get("visible")
     if said is None:
         visible = float(any(cells[name].lower() not in EMPTY for name in DISPLACEMENT))
     else:
-        visible = _float(WORDS.get(said.lower(), said))
+        visible = read_number(WORDS.get(said.lower(), said))
         if visible not in (0, 1):
             raise UserError(
                 f"{where}: visible is {said!r}; it must be 1 or True (seen), or 0 or False (not seen)"
@@ -245,7 +183,7 @@ def _marker(cells: Mapping[str, str], where: str) -> dict[str, float]:
 
 def _number(cells: Mapping[str, str], name: str, where: str) -> float:
     text = cells.get(name, str(OPTIONAL.get(name, "")))
-    value = _float(text)
+    value = read_number(text)
     if not np.isfinite(value):
         remedy = ""
         if text.lower() in EMPTY:
@@ -257,11 +195,3 @@ def _number(cells: Mapping[str, str], name: str, where: str) -> float:
     if abs(value) > LARGEST:
         raise UserError(f"{where}: {name} is {text}, beyond {LARGEST:g} mm; give mm")
     return value
-
-
-def _float(text: str) -> float:
-    """A number; NaN where there is none."""
-    try:
-        return float(text if "_" not in text else "nan")  # Python reads 2_0 as 20
-    except ValueError:
-        return float("nan")

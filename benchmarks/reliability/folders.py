@@ -15,7 +15,7 @@ from PIL import Image
 
 TIMES = ("second", "started", "time", "rate_hz", "pace", "live")
 """Words in the names of entries that differ from run to run."""
-PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", ".safetensors", "run.json")
+PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", "run.json")
 """Ends of files of which only the presence is compared: they, or the files that they list, tell times."""
 CUT = "cut off"
 

@@ -18,7 +18,7 @@ from pinnray.studies.fields.reader import FIGURES
 from pinnray.studies.fields.snapshots import KnownSamples, Snapshots
 from pinnray.studies.fields.store import fields_of
 from pinnray.studies.sweep.job import StudyJob
-from pinnray.studies.sweep.study import load_study
+from pinnray.studies.sweep.study import Study
 from pinnray.studies.sweep.sweep import run_sweep
 
 STROKES, SEED = 7, 11
@@ -30,7 +30,7 @@ MEASURES = ("displacement", "von Mises stress away from corners", *FIGURES)
 def _judged(name: str, paths: int) -> Table:
     """Median and 95th percentile of each relative error, and how many lie within the interval."""
     file = DOCS / "examples" / f"{name}.toml"
-    study = load_study(file)
+    study = Study.load(file)
     unseen = study.model_copy(update={"samples": paths, "strokes": STROKES, "seed": SEED})
     known, others = Path("out") / name, Path("out") / f"{name}-unseen"
     for each, folder in ((study, known), (unseen, others)):

@@ -22,6 +22,7 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tables import DOCS, cells_of, fill, markdown
+from benchmarks.tracker.cables import cable, covered
 from benchmarks.tracker.films import HIDDEN, Finger, Score, figures, film_of, one_thread
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
@@ -34,8 +35,7 @@ from pinnray.vision.frames.frame import Frames, Image
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.rig.bench import BENCH, Bench
 from pinnray.vision.rig.exposure import Exposure
-from pinnray.vision.rig.motion import Course, Motion
-from pinnray.vision.rig.occluders import cable, cables
+from pinnray.vision.rig.motion import Motion
 from pinnray.vision.rig.recording import FrameTruth, Recording
 from pinnray.vision.rig.recording_files import FILES, record
 from pinnray.vision.rig.shapes import Shape, rectangle
@@ -50,13 +50,6 @@ MOTION = Motion(rest=5, moving=3, held=5)
 JUMP = Motion(rest=5, moving=0, held=5)
 
 Hide = Callable[[Recording], Callable[[int], Sequence[Shape]]]
-
-
-def covered(shares: Mapping[int, float], paint: str = "dark") -> Hide:
-    """Cables over shares of the diameters of markers, which are counted from 1, in all frames."""
-    return lambda film: cables(
-        film.bench, Course.proportional(film.displacement), film.motion, shares, paint=paint
-    )
 
 
 def fiducials(*numbers: int) -> Hide:

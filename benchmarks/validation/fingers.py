@@ -10,7 +10,7 @@ import pinnray as pr
 from benchmarks.tables import markdown
 from benchmarks.validation.printed_finger import FINGERS, FRICTION, RADIUS, PrintedFinger
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import nearest_similarity
+from pinnray.geometry.picture_frame import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
 from pinnray.solvers.problem import Load

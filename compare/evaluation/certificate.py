@@ -1,11 +1,9 @@
 """Error certificate of a solution of the linear problem, by the energy of finite elements."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from pinnray.comparison.evaluation.differences import Number, Numbers
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import percent
 
@@ -40,18 +38,6 @@ ROUNDING = 1e-8
 """Relative difference that the rounding of a direct solver explains."""
 
 
-class Region(Numbers):
-    """The error in a part of the body.
-
-    The squares of the L2 norms of all parts, relative to `fem` in the whole body, add up to the body's.
-    """
-
-    area: Number  #: Share of the body's area.
-    excess: Number  #: Share of the excess energy; NaN where there is no excess to share.
-    rel_l2_displacement: Number  #: L2 norm of the difference from `fem` here over the norm of `fem`.
-    rel_l2_von_mises: Number  #: The like for the von Mises stress.
-
-
 @dataclass(frozen=True, eq=False)
 class Certificate:
     """A solution against the finite-element solution of the same mesh, by energies per depth, N mm / mm.
@@ -74,7 +60,6 @@ class Certificate:
     load: FloatArray  #: Largest deviation from the prescribed u and v, shape (2,), mm; NaN where free.
     work: float  #: Of the own reaction on the prescribed displacement; twice the energy in equilibrium.
     stroke: float  #: Largest prescribed displacement, mm.
-    regions: Mapping[str, Region]  #: The error by region, see `certification.REGIONS`.
 
     @property
     def rel_excess(self) -> float:

@@ -50,7 +50,7 @@ class Results:
         """Every number of the run, computed once."""
         given = self.observations
         return Scores(
-            schema=1,
+            schema=2,
             design=self.design.definition(),
             material=self.material.model_dump(),
             load=self.load.model_dump(),

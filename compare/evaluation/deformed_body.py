@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from pinnray.comparison.evaluation.certification import NOT_FINITE
+from pinnray.comparison.evaluation.certifier import NOT_FINITE
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 from pinnray.runtime.arrays import BoolArray, FloatArray

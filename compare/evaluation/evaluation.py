@@ -91,7 +91,7 @@ class Evaluation:
         inside, nodes = quadrature.location, LagrangeSpace(mesh, 2).at_nodes()
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             inside, nodes = (mesh.locate_on(solution.problem.mesh, place.points) for place in (inside, nodes))
-        displacement, state = solution.displacement_and_state(inside)
+        displacement, state = solution.displacement(inside), solution.state(inside)
         at_nodes = solution.displacement(nodes)
         markers = np.asarray(mesh.markers if markers is None else markers, dtype=np.float64)
         at_markers = solution.displacement_in_space(markers)

@@ -17,7 +17,7 @@ from pinnray.comparison.evaluation.scores import (
     UncertaintyScores,
 )
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import nearest_similarity
+from pinnray.geometry.picture_frame import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.finger_figures import FingerFigures
 

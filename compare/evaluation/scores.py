@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from pinnray.comparison.evaluation.certificate import ROUNDING, Region
+from pinnray.comparison.evaluation.certificate import ROUNDING
 from pinnray.comparison.evaluation.differences import Differences, FieldDifference, Number, Numbers
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
@@ -64,6 +64,9 @@ class ForceScore(Numbers):
 
     size: Interval  #: N/mm.
     position: Interval | None  #: Abscissa where it acts, mm; None where it was no unknown.
+    along: Interval | None = None  #: Its component along the travel, N/mm.
+    shares: Mapping[str, Number] = {}  #: Of the variance of `along`, by what they come from.
+    advice: str = ""  #: A sentence on the largest share, and on what would narrow the interval.
 
 
 class FigureScores(Numbers):
@@ -90,7 +93,6 @@ class CertificateScore(Numbers):
     work: Number
     base: Number
     load: Vector
-    regions: Mapping[str, Region]
 
     @property
     def excess_beyond_rounding(self) -> float:
@@ -175,7 +177,7 @@ class Measurements(Numbers):
 class Scores(Numbers):
     """Every number of a run; `metrics.json` is its file."""
 
-    version: Literal[1] = Field(alias="schema")
+    version: Literal[1, 2] = Field(alias="schema")
     design: Mapping[str, Any]
     material: Mapping[str, Any]
     load: Mapping[str, Any]

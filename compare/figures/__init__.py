@@ -22,6 +22,21 @@ def check_formats(formats: Collection[str]) -> None:
         raise UserError(f"there are no pictures as {unknown[0]}; besides PNG there are {', '.join(FORMATS)}")
 
 
+def page_width(width: float | None) -> float:
+    """A picture's width in inches from one in mm; the usual one if None.
+
+    Raises:
+        UserError: If type of the usual size has no room, or no page is so wide.
+    """
+    from pinnray.runtime.figure import WIDTH
+
+    if width is not None and not 80 <= width <= 200:
+        raise UserError(
+            f"no picture can be {width:g} mm wide: give 80 to 200 mm; a journal's column has 85, its page 180"
+        )
+    return WIDTH if width is None else width / 25.4
+
+
 @dataclass(frozen=True)
 class Picture:
     """A picture that has been written as a PNG file."""
@@ -37,20 +52,22 @@ def draw_all(
     comparison: Results,
     progress: Callable[[float, str], None] = lambda done, what: None,
     formats: Collection[str] = (),
+    width: float | None = None,
 ) -> list[Picture]:
     """Write every picture of a comparison as PNG, and in other `FORMATS`, in the order of a report.
 
+    Pictures have the usual width, or one in mm.
     `progress` is called before every picture with the share done, from 0 to 1, and what comes next.
     """
     from pinnray.comparison.figures.gallery import GALLERY
 
-    pictures = []
+    pictures, page = [], page_width(width)
     # Figures have so many objects that a tenth of the time went into collecting garbage among older ones.
     gc.freeze()
     try:
         for number, (name, (what, draw)) in enumerate(GALLERY.items()):
             progress(number / len(GALLERY), what)
-            if drawing := draw(comparison):
+            if drawing := draw(comparison, page):
                 path = drawing.figure.save(folder / f"{name}.png", formats)
                 pictures.append(Picture(path, drawing.title, drawing.caption, drawing.alt))
     finally:

@@ -4,7 +4,6 @@ A panel has a strip below the body for a note and a scale bar, so that neither l
 """
 
 from collections.abc import Iterable, Sequence
-from functools import cache
 from typing import NamedTuple
 
 import matplotlib as mpl
@@ -13,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Colormap, ListedColormap, Normalize
+from matplotlib.colors import Colormap, Normalize
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
@@ -29,6 +28,10 @@ from pinnray.runtime.figure import INK, MUTED, SMALL
 
 PERCENT = 99.5
 """Share of the area within a colour scale; peaks at re-entrant corners would leave the rest in one colour."""
+
+
+SEQUENTIAL, DIVERGING = "viridis", "coolwarm"
+"""Matplotlib's maps of fields, and of differences: blue, light grey, red, as dark on either side of zero."""
 
 
 class ColourScale(NamedTuple):
@@ -52,43 +55,14 @@ class ColourScale(NamedTuple):
 def sequential(values: FloatArray, weights: FloatArray) -> ColourScale:
     """A scale from zero to the percentile of values, shape (t,), under area weights, shape (t,)."""
     return ColourScale(
-        0.0, _positive(weighted_percentile(values, weights, PERCENT)), mpl.colormaps["viridis"]
+        0.0, _positive(weighted_percentile(values, weights, PERCENT)), mpl.colormaps[SEQUENTIAL]
     )
 
 
 def symmetric(fields: Sequence[FloatArray], weights: FloatArray) -> ColourScale:
     """A scale symmetric about zero that covers the percentile of the absolute value in each of the fields."""
     limit = max((weighted_percentile(np.abs(values), weights, PERCENT) for values in fields), default=0.0)
-    return ColourScale(-_positive(limit), _positive(limit), diverging())
-
-
-@cache
-def diverging() -> Colormap:
-    """Blue, light grey, red along straight lines in OKLab: perceptually uniform on either side of zero.
-
-    Source: B. Ottosson, "A perceptual color space for image processing" (2020): the matrices from OKLab to
-    linear sRGB.
-    """
-    steps = np.linspace(0, 1, 128)[:, None]
-    blue, grey, red = np.array([(0.42, -0.035, -0.145), (0.955, 0.0, 0.0), (0.45, 0.165, 0.075)])
-    lab = np.concatenate([blue + (grey - blue) * steps, grey + (red - grey) * steps])
-    lms = lab @ np.array(
-        [
-            [1, 1, 1],
-            [0.3963377774, -0.1055613458, -0.0894841775],
-            [0.2158037573, -0.0638541728, -1.2914855480],
-        ]
-    )
-    linear = lms**3 @ np.array(
-        [
-            [4.0767416621, -1.2684380046, -0.0041960863],
-            [-3.3077115913, 2.6097574011, -0.7034186147],
-            [0.2309699292, -0.3413193965, 1.7076147010],
-        ]
-    )
-    linear = np.clip(linear, 0, 1)
-    rgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return ListedColormap(np.clip(rgb, 0, 1), name="difference")
+    return ColourScale(-_positive(limit), _positive(limit), mpl.colormaps[DIVERGING])
 
 
 def _positive(limit: float) -> float:

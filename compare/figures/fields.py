@@ -3,19 +3,21 @@
 from collections.abc import Callable, Collection
 from typing import NamedTuple
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 
 from pinnray.comparison.evaluation.comparison import TRUTH, Results
 from pinnray.comparison.evaluation.differences import COMPONENTS, FieldDifference
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import body
-from pinnray.comparison.figures.body import ColourScale, diverging, sequential, symmetric
+from pinnray.comparison.figures.body import DIVERGING, ColourScale, sequential, symmetric
 from pinnray.comparison.figures.canvas import Canvas
-from pinnray.comparison.figures.style import axes_at, write_heading
+from pinnray.comparison.figures.layout import TALLEST, axes_at, fitting, write_heading
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.figure import WIDTH, Figure, figure
+from pinnray.runtime.figure import NARROW, WIDTH, Figure, figure
 from pinnray.runtime.tables import percent, significant
 
 MARGIN = 0.1
@@ -95,16 +97,14 @@ def difference_scale(
     return symmetric([difference], mesh.areas)
 
 
-TALLEST = 9.0
-"""Height that a picture of fields has at most, inches: that of a page of a journal."""
-
-
 def compared_with(comparison: Results) -> Evaluation:
     """The field from which differences are drawn: the truth where it is known, else the reference."""
     return next((each for each in comparison.shown_fields if each.solver == TRUTH), comparison.reference)
 
 
-def drawn_solvers(comparison: Results, solvers: Collection[str] = ()) -> list[Evaluation]:
+def drawn_solvers(
+    comparison: Results, solvers: Collection[str] = (), page: float = WIDTH
+) -> list[Evaluation]:
     """The fields that a picture has room for: what they are compared with, the reference, then the others.
 
     Those that converged come before those that did not, and `solvers` are the chosen ones, all if empty.
@@ -112,66 +112,83 @@ def drawn_solvers(comparison: Results, solvers: Collection[str] = ()) -> list[Ev
     Raises:
         UserError: If one of them is no solver of the comparison.
     """
-    base, reference = compared_with(comparison), comparison.reference
-    known = {each.solver: each for each in comparison.shown_fields if each.solver != base.solver}
-    if unknown := [name for name in solvers if name not in known and name != base.solver]:
-        raise UserError(f"no field of this comparison is called {unknown[0]!r}; it has {', '.join(known)}")
-    chosen = [each for each in known.values() if not solvers or each.solver in solvers]
-    chosen.sort(key=lambda each: (each.solver != reference.solver, not each.converged))
-    extent = body.field_extent(comparison.mesh, width := (WIDTH - 3 * MARGIN) / 2)
-    rows = int((TALLEST - HEAD - FOOT) / (PANEL_TITLE + width * extent.height / extent.width))
-    return [base, *chosen][: max(rows, 2)]
+    base = compared_with(comparison)
+    known = [each for each in comparison.shown_fields if each.solver != base.solver]
+    names = [each.solver for each in known]
+    if unknown := [name for name in solvers if name not in names and name != base.solver]:
+        raise UserError(f"no field of this comparison is called {unknown[0]!r}; it has {', '.join(names)}")
+    columns, width = _columns(comparison, page)
+    extent = body.field_extent(comparison.mesh, width)
+    panels = int((TALLEST - HEAD - FOOT) / (PANEL_TITLE + width * extent.height / extent.width)) * columns
+    chosen = fitting(
+        known, comparison.reference, (panels - 1) // 2 if columns == 1 else panels // 2 - 1, solvers
+    )
+    chosen.sort(key=lambda each: (each.solver != comparison.reference.solver, not each.converged))
+    return [base, *chosen]
 
 
-def draw_field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str] = ()) -> Figure:
+def draw_field(
+    comparison: Results, quantity: FieldQuantity, solvers: Collection[str] = (), page: float = WIDTH
+) -> Figure:
     """Draw a quantity on the undeformed body: a row a solver, beside it its difference from the first row.
 
     The first row is the truth where the markers are simulated, else the reference. See `drawn_solvers` for
-    the others.
+    the others. On a narrow page, of a width in inches, a difference is below its field.
     """
-    mesh, ordered = comparison.mesh, drawn_solvers(comparison, solvers)
+    mesh, ordered = comparison.mesh, drawn_solvers(comparison, solvers, page)
     reference = ordered[0]
-    columns = 1 if len(ordered) == 1 else 2
-    width = (WIDTH - MARGIN * (columns + 1)) / columns
+    columns, width = _columns(comparison, page)
     extent = body.field_extent(mesh, width)
-    height = width * extent.height / extent.width
+    row = PANEL_TITLE + width * extent.height / extent.width
     scale = field_scale(quantity, mesh, reference)
-    total = HEAD + len(ordered) * (PANEL_TITLE + height) + FOOT
+    panels = [0, *range(columns, columns + 2 * len(ordered) - 2)]  # the reference has no difference
+    rows = -(-(panels[-1] + 1) // columns)
+    bars = min(len(ordered), 2)
+    total = HEAD + rows * row + FOOT * (1 if columns == 2 else bars)
     base = quantity.values(reference)
     largest = "largest magnitude" if quantity.signed else "largest"
+    places = iter(divmod(panel, columns) for panel in panels)
+
+    def next_axes() -> Axes:
+        place, column = next(places)
+        box = (MARGIN + column * (width + MARGIN), HEAD + PANEL_TITLE + place * row, width, row - PANEL_TITLE)
+        return axes_at(drawn, box)
 
     canvas = Canvas(mesh, extent, width=body.PIXELS // 2)
-    with figure(total) as drawn:
-        write_heading(drawn, f"{quantity.title}, undeformed body")
-        for row, evaluation in enumerate(ordered):
-            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
-            axes = axes_at(drawn, (MARGIN, top, width, height))
+    with figure(total, page) as drawn:
+        write_heading(drawn, f"{quantity.title}, undeformed")
+        for evaluation in ordered:
             values = quantity.values(evaluation)
             means = evaluation.per_triangle(values)
             name = _name(evaluation)
             note = f"{largest} {significant(np.abs(means).max(), 3)} {quantity.unit}"
-            body.panel(axes, canvas, mesh, scale.paint(means), name, note)
+            body.panel(axes := next_axes(), canvas, mesh, scale.paint(means), name, note)
             if evaluation is not reference:
-                axes = axes_at(drawn, (2 * MARGIN + width, top, width, height))
                 own = difference_scale(quantity, mesh, evaluation, reference)
                 distance = percent(FieldDifference.of(values, base, reference.weights).rel_l2)
                 title = f"minus {reference.solver}, ±{significant(own.high, 2)} {quantity.unit}"
                 colours = own.paint(evaluation.per_triangle(values - base))
-                body.panel(axes, canvas, mesh, colours, title, f"rel. L² {distance}", bold=False)
+                body.panel(
+                    axes := next_axes(), canvas, mesh, colours, title, f"rel. L² {distance}", bold=False
+                )
         body.scale_bar(axes, extent)
-        bars = [
-            (scale, f"${quantity.symbol}$, {quantity.unit}"),
-            (
-                ColourScale(-1.0, 1.0, diverging()),
-                f"difference of ${quantity.symbol}$, share of the panel's own scale",
-            ),
+        differences = ColourScale(-1.0, 1.0, mpl.colormaps[DIVERGING])
+        legends = [
+            (scale, f"${quantity.symbol}$, {quantity.unit}", "both" if quantity.signed else "max"),
+            (differences, f"difference of ${quantity.symbol}$, share of the panel's scale", "both"),
         ]
-        for column, (shared, title) in enumerate(bars[:columns]):
+        for number, (shared, title, extend) in enumerate(legends[:bars]):
+            place, column = divmod(number, columns)
             left = MARGIN + column * (width + MARGIN) + 0.1 * width
-            axes = axes_at(drawn, (left, total - FOOT + 0.1, 0.8 * width, 0.09))
-            extend = "max" if column == 0 and not quantity.signed else "both"
+            axes = axes_at(drawn, (left, HEAD + rows * row + place * FOOT + 0.1, 0.8 * width, 0.09))
             body.colour_bar(axes, shared, title, extend=extend)
     return drawn
+
+
+def _columns(comparison: Results, page: float) -> tuple[int, float]:
+    """Number of columns of panels on a page of a width, and width of a panel, inches."""
+    columns = 1 if page < NARROW or len(comparison.shown_fields) == 1 else 2
+    return columns, (page - MARGIN * (columns + 1)) / columns
 
 
 def _name(evaluation: Evaluation) -> str:

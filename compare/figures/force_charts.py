@@ -7,13 +7,8 @@ import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.force_curves import ForceCurve, follows_load
-from pinnray.comparison.figures.style import (
-    axes_at,
-    legend_above,
-    legend_height,
-    solver_colour,
-    write_heading,
-)
+from pinnray.comparison.figures.layout import axes_at, legend_above, legend_height, write_heading
+from pinnray.comparison.figures.solver_colours import solver_colour
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
 
@@ -24,6 +19,7 @@ def draw_force_displacement(
     depth: float,
     truth: ForceCurve | None = None,
     identified: Mapping[int, Evaluation] | None = None,
+    page: float = WIDTH,
 ) -> Figure:
     """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
 
@@ -34,15 +30,15 @@ def draw_force_displacement(
     labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
     true_label = [_end_label(truth, "truth, simulated")] if truth else []
     found = {
-        number: (each, each.identified)
+        number: (each, each.identified.along or each.identified.size)
         for number, each in (identified or {}).items()
         if each.identified is not None
     }
-    more = [f"{each.label}, {force.size.value:.3g} N/mm, identified" for each, force in found.values()]
-    top, height, left = 0.3 + legend_height([*labels, *true_label, *more]), 2.4, 0.75  # inches
-    with figure(top + height + 0.45) as drawn:
+    more = [f"{each.label}, {along.value:.3g} N/mm, identified" for each, along in found.values()]
+    top, height, left = 0.3 + legend_height([*labels, *true_label, *more], page), 2.4, 0.75  # inches
+    with figure(top + height + 0.45, page) as drawn:
         write_heading(drawn, "Force of the indenter along its travel")
-        axes = axes_at(drawn, (left, top, WIDTH - left - 0.65, height))
+        axes = axes_at(drawn, (left, top, page - left - 0.65, height))
         straight = sum(not follows_load(curve.evaluation) for curve in curves)
         for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
             followed = follows_load(curve.evaluation)
@@ -65,7 +61,7 @@ def draw_force_displacement(
             axes.plot(truth.travel, truth.force, color=MEASURED, lw=1.3, zorder=3)
         reach = (truth or curves[0]).travel[-1]
         for place, (number, label) in enumerate(zip(found, more, strict=True)):
-            value, low, high = found[number][1].size
+            value, low, high = found[number][1]
             # Beside each other: the intervals of several solvers would hide each other.
             x, apart = reach * (1 - 0.02 * (place + 1)), [[value - low], [high - value]]
             style: dict[str, Any] = {
@@ -79,7 +75,7 @@ def draw_force_displacement(
         every = [*curves, truth] if truth else curves
         axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))
         forces = np.concatenate(
-            [curve.force for curve in every] + [np.array(force.size) for _, force in found.values()]
+            [curve.force for curve in every] + [np.array(along) for _, along in found.values()]
         )
         axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
         axes.set_xlabel("travel of the indenter, mm")
@@ -91,12 +87,12 @@ def draw_force_displacement(
         )
         whole.set_ylabel(f"force for {depth:g} mm of depth, N")
         whole.spines["right"].set(visible=True, color=INK)
-        legend_above(axes)
+        legend_above(axes, page)
     return drawn
 
 
 def _end_label(curve: ForceCurve, name: str) -> str:
-    return f"{name}, {curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
+    return f"{name}, {curve.force[-1]:.3g} N/mm"
 
 
 def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, *, depth: float) -> Figure:

@@ -1,6 +1,6 @@
 """The pictures of a comparison by name, in the order of the report, with their captions."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -10,14 +10,13 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import IN_SAMPLE, Evaluation
 from pinnray.comparison.evaluation.force_curves import ForceCurve, force_curves
 from pinnray.comparison.figures.body import PERCENT
-from pinnray.comparison.figures.design_drawing import draw_design
 from pinnray.comparison.figures.fields import QUANTITIES, FieldQuantity, draw_field, drawn_solvers
 from pinnray.comparison.figures.force_charts import draw_force_displacement
 from pinnray.comparison.figures.mesh_drawing import draw_mesh, mesh_numbers
-from pinnray.comparison.figures.overlay import draw_overlay
-from pinnray.comparison.figures.solver_charts import draw_convergence, draw_losses, draw_marker_errors
+from pinnray.comparison.figures.overlay import Panels, draw_overlay
+from pinnray.comparison.figures.solver_charts import draw_losses, draw_marker_errors
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.figure import Figure
+from pinnray.runtime.figure import WIDTH, Figure
 
 
 class Illustration(NamedTuple):
@@ -29,7 +28,7 @@ class Illustration(NamedTuple):
     alt: str
 
 
-def _overlay(comparison: Results) -> Illustration:
+def _overlay(comparison: Results, page: float) -> Illustration:
     observations = comparison.observations
     cylinder = "" if comparison.load.radius is None else " Grey circle: the cylinder where it ends."
     circles = f"Circles: {observations.label} marker positions. " if observations.known else ""
@@ -38,11 +37,12 @@ def _overlay(comparison: Results) -> Illustration:
             "Pink arrows: errors there, times the factor above the panel, of held-out markers if known. "
         )
     return Illustration(
-        draw_overlay(comparison),
+        draw_overlay(comparison, page),
         "Deformed finger",
         f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
         f"displacement is not exaggerated. {circles}Crosses: the solver’s markers. "
-        f"Grey: the undeformed body.{cylinder} {_given(comparison)}{_simulated(comparison)}",
+        f"Grey: the undeformed body.{cylinder}{_given(comparison)}"
+        f"{_absent(comparison.evaluations, Panels.on(comparison, page).solvers)}",
         each_of(
             "Largest displacement, mm",
             comparison.evaluations,
@@ -51,7 +51,7 @@ def _overlay(comparison: Results) -> Illustration:
     )
 
 
-def _marker_errors(comparison: Results) -> Illustration | None:
+def _marker_errors(comparison: Results, page: float) -> Illustration | None:
     observations = comparison.observations
     if not observations.known:
         return None
@@ -62,14 +62,13 @@ def _marker_errors(comparison: Results) -> Illustration | None:
         else ""
     )
     return Illustration(
-        draw_marker_errors(comparison),
+        draw_marker_errors(comparison, page),
         "Errors at the markers",
         f"Absolute difference between each solver’s displacement and the {observations.label} one, "
-        f"for both components, on one logarithmic scale, which a solver that did not converge may exceed "
-        f"and at whose lower end are all smaller errors; markers are numbered as in the drawing of the "
-        f"design. Bars: at a marker that the solver was "
-        f"not given, predicted from all others if it was given those. Circles: training errors."
-        f"{unseen} {_given(comparison)}{_simulated(comparison)}",
+        f"for both components, on one logarithmic scale; smaller errors are at its lower end. Markers are "
+        f"numbered as in the drawing of the design. Bars: at a marker that the solver was not given, "
+        f"predicted from all others if it was given those. Circles: training errors."
+        f"{unseen}{_given(comparison)}",
         each_of(
             "Mean of |Δu| + |Δv| at markers that were not given, mm",
             comparison.evaluations,
@@ -78,8 +77,10 @@ def _marker_errors(comparison: Results) -> Illustration | None:
     )
 
 
-def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str] = ()) -> Illustration:
-    drawn = drawn_solvers(comparison, solvers)
+def _field(
+    comparison: Results, page: float, quantity: FieldQuantity, solvers: Collection[str] = ()
+) -> Illustration:
+    drawn = drawn_solvers(comparison, solvers, page)
     reference = drawn[0].label
     mixed = (
         " The solvers have different laws: strain is Green-Lagrange where it is finite, stress is Cauchy."
@@ -94,13 +95,13 @@ def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str
     )
     if comparison.truth is not None:
         beside += " Truth: the simulated finger of the markers."
-    names = {each.solver for each in drawn}
-    if absent := [each.label for each in comparison.shown_fields if each.solver not in names]:
-        beside += f" Not drawn, as a page has no more room or others were chosen: {', '.join(absent)}."
+    beside += _absent(comparison.shown_fields, drawn)
     return Illustration(
-        draw_field(comparison, quantity, solvers),
+        draw_field(comparison, quantity, solvers, page),
         quantity.title,
-        f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
+        f"{quantity.title}, drawn as the {QUANTITIES[0].title}."
+        if quantity is not QUANTITIES[0]
+        else f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
         f"mean. One scale for all: {PERCENT:g} % of the area of {reference} lie "
         f"within it, the peaks at the corners take the end colours. At a sharp corner the field has no "
         f"bound: the largest mean of a triangle, printed beside, grows with refinement.{beside}{mixed}",
@@ -112,7 +113,7 @@ def _field(comparison: Results, quantity: FieldQuantity, solvers: Collection[str
     )
 
 
-def _force_displacement(comparison: Results) -> Illustration | None:
+def _force_displacement(comparison: Results, page: float) -> Illustration | None:
     depth = comparison.design.depth
     if not (curves := force_curves(comparison.evaluations, comparison.load)):
         return None
@@ -123,7 +124,7 @@ def _force_displacement(comparison: Results) -> Illustration | None:
     found = {n: each for n, each in enumerate(comparison.evaluations) if each.identified}
     squares = " Squares: forces identified from the markers, with intervals of 95 %." if found else ""
     return Illustration(
-        draw_force_displacement(curves, depth=depth, truth=truth, identified=found),
+        draw_force_displacement(curves, depth=depth, truth=truth, identified=found, page=page),
         "Force over displacement",
         f"Force of the indenter along its travel: per mm of depth (left), and for the finger’s "
         f"{depth:g} mm (right). A point is an equilibrium that a solver found as the load "
@@ -137,22 +138,8 @@ def _force_displacement(comparison: Results) -> Illustration | None:
     )
 
 
-def _convergence(comparison: Results) -> Illustration | None:
-    if (figure := draw_convergence(comparison)) is None:
-        return None
-    return Illustration(
-        figure,
-        "Convergence",
-        f"Elastic energy per unit depth: as each solver went on, with its relative distance from that of "
-        f"{comparison.reference.label} (dashed line) beside it; along the load; over factors of the markers’ "
-        f"weight, the energy that they add. A solver that solves directly keeps no record. One that was "
-        f"given the markers pays energy for them.",
-        each_of("Energy at the end, N mm per mm", comparison.evaluations, lambda each: each.energy),
-    )
-
-
-def _losses(comparison: Results) -> Illustration | None:
-    if (figure := draw_losses(comparison)) is None:
+def _losses(comparison: Results, page: float) -> Illustration | None:
+    if (figure := draw_losses(comparison, page)) is None:
         return None
     return Illustration(
         figure,
@@ -161,7 +148,7 @@ def _losses(comparison: Results) -> Illustration | None:
         f"value is not zero, and where the conditions are met, every further one raises it. So markers "
         f"cannot lower it at convergence. A network with the lower L_PDE at some epoch has come farther "
         f"in its training or misses its conditions by more, which L_BC tells; it is no more accurate for "
-        f"it. A curve that still falls is a training that has not ended. {_given(comparison)}",
+        f"it. A curve that still falls is a training that has not ended.{_given(comparison)}",
         each_of(
             "Last L_PDE",
             [each for each in comparison.evaluations if "PDE" in each.history],
@@ -170,22 +157,20 @@ def _losses(comparison: Results) -> Illustration | None:
     )
 
 
-def _design(comparison: Results) -> Illustration:
+def _design(comparison: Results, page: float) -> Illustration:
     finger = comparison.design
-    symbols = " under the paper’s symbols" if any(symbol for _, symbol, _ in finger.facts()) else ""
     return Illustration(
-        draw_design(finger),
+        finger.plot(page),
         "Design",
-        f"The finger “{finger.name}”, to scale, with its dimensions{symbols}, the clamped base (hatched), "
-        f"the contact (orange) and the numbered markers.",
-        "; ".join(f"{name} {value}" for name, symbol, value in finger.facts() if symbol or not symbols),
+        f"The finger “{finger.name}”, to scale: clamped base (hatched), contact (orange), numbered markers.",
+        "; ".join(f"{name} {value}" for name, _, value in finger.facts()),
     )
 
 
-def _mesh(comparison: Results) -> Illustration:
+def _mesh(comparison: Results, page: float) -> Illustration:
     numbers = mesh_numbers(comparison.mesh)
     return Illustration(
-        draw_mesh(comparison.mesh),
+        draw_mesh(comparison.mesh, page),
         "Mesh",
         f"The mesh that every solver shares: {numbers['size']}, edges from {numbers['edges']}. Quality is "
         f"twice the ratio of the inscribed to the circumscribed radius (1 for an equilateral triangle): "
@@ -204,14 +189,15 @@ GALLERY: dict[str, tuple[str, Callable[..., Illustration | None]]] = {
     "force_displacement": ("chart of force over displacement", _force_displacement),
     "design": ("drawing of the design", _design),
     "mesh": ("picture of the mesh", _mesh),
-    "convergence": ("chart of the energy", _convergence),
     "losses": ("chart of the losses", _losses),
 }
 """By file name: words for the progress line, and the function; it gives None if there is nothing to draw."""
 
 
-def draw(comparison: Results, name: str, solvers: Collection[str] = ()) -> Illustration:
+def draw(comparison: Results, name: str, solvers: Collection[str] = (), page: float = WIDTH) -> Illustration:
     """One picture of a comparison by its name; a picture of fields may have chosen solvers only.
+
+    The page has a width in inches.
 
     Raises:
         UserError: If there is no such picture or solver, or nothing to draw in it.
@@ -221,7 +207,7 @@ def draw(comparison: Results, name: str, solvers: Collection[str] = ()) -> Illus
     what, make = GALLERY[name]
     if solvers and name not in CHOOSING:
         raise UserError(f"the {what} has all solvers; chosen ones are for {', '.join(CHOOSING)}")
-    if (drawing := make(comparison, solvers=solvers) if solvers else make(comparison)) is None:
+    if (drawing := make(comparison, page, solvers=solvers) if solvers else make(comparison, page)) is None:
         raise UserError(f"{name}: no solver of this comparison has data for the {what}")
     return drawing
 
@@ -231,13 +217,15 @@ def each_of(quantity: str, evaluations: Iterable[Evaluation], value: Callable[[E
     return f"{quantity}: {', '.join(f'{each.label} {value(each):.3g}' for each in evaluations)}."
 
 
+def _absent(every: Sequence[Evaluation], drawn: Sequence[Evaluation]) -> str:
+    """The solvers that a picture does not have, if there are any."""
+    names = {each.solver for each in drawn}
+    absent = [each.label for each in every if each.solver not in names]
+    if not absent:
+        return ""
+    return f" Not drawn, as a page has no more room or others were chosen: {', '.join(absent)}."
+
+
 def _given(comparison: Results) -> str:
     """The meaning of the mark beside a solver's name, if there is one."""
-    return f"{IN_SAMPLE}. " if any(evaluation.in_sample for evaluation in comparison.evaluations) else ""
-
-
-def _simulated(comparison: Results) -> str:
-    observations = comparison.observations
-    if observations.label != "simulated":
-        return ""
-    return f"The marker positions are simulated, not measured: {observations.source.rstrip('.')}."
+    return f" {IN_SAMPLE}." if any(evaluation.in_sample for evaluation in comparison.evaluations) else ""

@@ -1,6 +1,6 @@
 """The deformed finger of every solver, with its markers and those that were seen."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -12,41 +12,63 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.scores import SolverScores
 from pinnray.comparison.figures import body
-from pinnray.comparison.figures.body import ColourScale
+from pinnray.comparison.figures.body import SEQUENTIAL, ColourScale
 from pinnray.comparison.figures.canvas import Canvas, Extent
-from pinnray.comparison.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
+from pinnray.comparison.figures.layout import (
+    TALLEST,
+    arrow,
+    axes_at,
+    fitting,
+    head_height,
+    legend_below_heading,
+    wrapped,
+    write_heading,
+)
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.figure import INK, MEASURED, MUTED, NARROW, SMALL, WIDTH, Figure, figure
 
 MARGIN = 0.12
-HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
-"""Heights in inches: heading and legend; the name above a panel; the colour bar."""
+PANEL_TITLE, FOOT = 0.27, 0.48
+"""Heights in inches: the name above a panel; the colour bar."""
 
 
-def draw_overlay(comparison: Results) -> Figure:
-    """Draw every solver's deformed finger, one panel each, at true scale."""
-    mesh, evaluations = comparison.mesh, comparison.evaluations
-    across, up = np.ptp(mesh.points, axis=0)
-    columns = 1 if len(evaluations) <= 3 and up < 0.7 * across else 2
-    columns = min(columns, len(evaluations))
+class Panels(NamedTuple):
+    """The panels that a page has room for."""
+
+    columns: int
+    width: float  # inches
+    extent: Extent  # of each
+    solvers: list[Evaluation]
+
+    @classmethod
+    def on(cls, comparison: Results, page: float) -> "Panels":
+        """Those on a page of a width, inches: in one column if it is narrow or they all fit, else in two."""
+        count, columns = len(comparison.evaluations), 1
+        while True:
+            width = (page - MARGIN * (columns + 1)) / columns
+            extent = overlay_extent(comparison, width)
+            row = PANEL_TITLE + width * extent.height / extent.width
+            room = int((TALLEST - _head(comparison, page) - FOOT) / row) * columns
+            if columns == min(2, count) or page < NARROW or count <= min(3, room):
+                break
+            columns = 2
+        return cls(columns, width, extent, fitting(comparison.evaluations, comparison.reference, room))
+
+
+def draw_overlay(comparison: Results, page: float = WIDTH) -> Figure:
+    """Draw solvers' deformed fingers, one panel each, at true scale, on a page of a width in inches."""
+    mesh = comparison.mesh
+    columns, width, extent, evaluations = Panels.on(comparison, page)
     rows = -(-len(evaluations) // columns)
-    width = (WIDTH - MARGIN * (columns + 1)) / columns
-    extent = overlay_extent(comparison, width)
     height = width * extent.height / extent.width
     high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
-    scale = ColourScale(0.0, high or 1.0, mpl.colormaps["viridis"])
-    notes = []
-    if any(evaluation.in_sample for evaluation in evaluations):
-        notes.append("† was given these markers and meets them; held out: each predicted from the others")
-    if comparison.observations.known:
-        notes.append("pink arrows: errors at the markers, held out if known, × the factor above the panel")
-    given = "\n".join(notes)
-    head = HEAD + LEGEND_LINE * len(notes)
+    scale = ColourScale(0.0, high or 1.0, mpl.colormaps[SEQUENTIAL])
+    head = _head(comparison, page)
     total = head + rows * (PANEL_TITLE + height) + FOOT
     canvas = Canvas(mesh, extent, width=body.PIXELS // columns)
-    with figure(total) as drawn:
+    with figure(total, page) as drawn:
         write_heading(drawn, "Deformed finger, true scale")
         for number, evaluation in enumerate(evaluations):
             row, column = divmod(number, columns)
@@ -56,19 +78,38 @@ def draw_overlay(comparison: Results) -> Figure:
             _panel(axes, canvas, scale, comparison, evaluation)
             _motion(axes, comparison, evaluation)
             body.scale_bar(axes, extent)
-        bar = axes_at(drawn, (0.25 * WIDTH, total - FOOT + 0.06, 0.5 * WIDTH, 0.09))
+        bar = axes_at(drawn, (0.25 * page, total - FOOT + 0.06, 0.5 * page, 0.09))
         body.colour_bar(bar, scale, "displacement magnitude, mm")
-        moved = "contact" if comparison.load.radius is None else "cylinder"
-        label = f"markers, {comparison.observations.label}"
-        seen = [Line2D([], [], ls="", marker="o", ms=5, mfc="none", mec=MEASURED, mew=1.1, label=label)]
-        handles = [
-            *(seen if comparison.observations.known else []),
-            Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
-            Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
-            Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label=f"{moved}’s motion"),
-        ]
-        legend_below_heading(drawn, handles, length=1.6, note=given)
+        legend_below_heading(drawn, _handles(comparison), length=1.6, note=_note(comparison, page))
     return drawn
+
+
+def _head(comparison: Results, page: float) -> float:
+    """Height of heading, legend and notes, inches."""
+    return head_height(page, len(_handles(comparison)), _note(comparison, page))
+
+
+def _handles(comparison: Results) -> list[Line2D]:
+    """The legend."""
+    moved = "contact" if comparison.load.radius is None else "cylinder"
+    label = f"markers, {comparison.observations.label}"
+    seen = [Line2D([], [], ls="", marker="o", ms=5, mfc="none", mec=MEASURED, mew=1.1, label=label)]
+    return [
+        *(seen if comparison.observations.known else []),
+        Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
+        Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
+        Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label=f"{moved}’s motion"),
+    ]
+
+
+def _note(comparison: Results, page: float) -> str:
+    """Notes on marks in the panels, in lines that fit the page."""
+    notes = []
+    if any(evaluation.in_sample for evaluation in comparison.evaluations):
+        notes.append("† was given these markers and meets them; held out: each predicted from the others")
+    if comparison.observations.known:
+        notes.append("pink arrows: errors at the markers, held out if known, × the factor above the panel")
+    return "\n".join(wrapped(note, page) for note in notes)
 
 
 def overlay_extent(comparison: Results, width: float) -> Extent:

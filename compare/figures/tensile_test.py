@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pinnray.comparison.figures.style import axes_at, solver_colour, write_heading
+from pinnray.comparison.figures.layout import axes_at, write_heading
+from pinnray.comparison.figures.solver_colours import solver_colour
 from pinnray.runtime.figure import MEASURED, WIDTH, Figure, figure
 from pinnray.solvers.materials import TensileFit, TensileTest
 

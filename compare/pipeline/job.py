@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from pinnray.comparison.evaluation.comparison import Results, supported_solvers
 from pinnray.comparison.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
-from pinnray.comparison.figures import Picture, check_formats
+from pinnray.comparison.figures import Picture, check_formats, page_width
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
@@ -17,7 +17,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.fem.adaptive_refinement import check_adaptable
 from pinnray.solvers.problem import Load, Material
-from pinnray.solvers.solver import Solver, check_name
+from pinnray.solvers.solver import Solver, check_law, check_name
 from pinnray.vision.measurements import read_measurements
 
 
@@ -61,6 +61,7 @@ class Job:
     out: Path = Path("out/default")  #: Output folder.
     resume: bool = False  #: Whether to take over the finished solutions of an earlier run.
     picture_formats: Sequence[str] = ()  #: Formats of the pictures besides PNG, of `FORMATS`.
+    picture_width: float | None = None  #: Width of the pictures, mm; the usual one if None.
     options: Mapping[str, object] = field(default_factory=dict)  #: Of the command line, for `run.json`.
 
     def __post_init__(self) -> None:
@@ -99,8 +100,10 @@ def checked(job: Job) -> Job:
                 "not resume, or move the class from the notebook or shell into a module"
             )
     check_formats(job.picture_formats)
+    page_width(job.picture_width)
     check_truths([job.truth], job.design)
     check_walls(TRUTHS[job.truth])
+    check_law(job.solvers, job.material)
     supported_solvers(job.solvers, job.spare, job.material, job.load)
     if isinstance(job.measurements, Path):
         radius = job.design.marker_radius

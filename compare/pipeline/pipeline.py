@@ -177,7 +177,8 @@ def _write(
                 folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
             )
     with stages.stage("pictures") as progress:
-        pictures = draw_all(folder / "figures", comparison, progress, job.picture_formats)
+        figures = folder / "figures"
+        pictures = draw_all(figures, comparison, progress, job.picture_formats, job.picture_width)
     with stages.stage("report"):
         record = _provenance(folder, job, comparison, stages)
         write_report(folder / "report.html", comparison, [*pictures, *photographs], record)

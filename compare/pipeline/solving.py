@@ -11,7 +11,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.certifier import with_certificates
 from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated
 from pinnray.comparison.pipeline.job import Job
 from pinnray.geometry.cache import expected_triangles
@@ -208,7 +208,7 @@ class _Part:
         """Solve with one solver after another, in this process."""
         outcome = Outcome()
         for solver in self.solvers:
-            trained = self._in_context(solver, outcome.evaluations.get("fem"))
+            trained = self._in_context(solver)
             try:
                 with work.used():
                     outcome.evaluations[solver.name] = self._evaluation(trained, stage)
@@ -231,16 +231,14 @@ class _Part:
         write_text(self.folder / ERRORS / f"{solver.name}.txt", trace)
         return str(error)
 
-    def _in_context(self, solver: Solver, fem: Evaluation | None) -> Solver:
-        """Give a trained solver the folder of its checkpoints and the energy of `fem` under its law."""
+    def _in_context(self, solver: Solver) -> Solver:
+        """Give a trained solver the folder of its checkpoints."""
         if not isinstance(solver, TrainedSolver):
             return solver
         job, checkpoints = self.job, self.folder / TRAINING / solver.name
         if job.resume and not checkpoints.exists():
             take_training(solver.name, job.out, self.folder)
-        law = with_law(job.material, solver).law
-        energy = fem.energy if fem and fem.law == law else None
-        return solver.in_context(TrainingContext(checkpoints, job.resume, energy))
+        return solver.in_context(TrainingContext(checkpoints, job.resume))
 
     def _evaluation(self, solver: Solver, stage: Stage) -> Evaluation:
         """Solve and sample, or take over the result of an earlier run."""

@@ -30,22 +30,25 @@ class Comparison(Results):
     `comparison["fem"]` is the result of one solver.
     """
 
-    def plot(self, picture: str = "overlay", solvers: Collection[str] = ()) -> "Figure":
+    def plot(
+        self, picture: str = "overlay", solvers: Collection[str] = (), width: float | None = None
+    ) -> "Figure":
         """A picture of the report, as a figure that a notebook shows; `figure.save(path)` keeps it.
 
         Args:
             picture: `overlay`, `marker_errors`, `von_mises`, `strain_principal`, `strain_xx`, `strain_yy`,
-                `strain_xy`, `force_displacement`, `convergence`, `losses`,
-                `design` or `mesh`.
+                `strain_xy`, `force_displacement`, `losses`, `design` or `mesh`.
             solvers: Names of those whose fields are drawn, for a picture of fields; all that a page has room
                 for if empty.
+            width: Of the figure, mm: 85 for a journal's column, 180 for its page; type has 8 to 9 points.
 
         Raises:
             UserError: If there is no such picture or solver, or nothing to draw in it.
         """
+        from pinnray.comparison.figures import page_width
         from pinnray.comparison.figures.gallery import draw
 
-        return draw(self, picture, solvers).figure
+        return draw(self, picture, solvers, page_width(width)).figure
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one HTML file that holds its pictures, and return its path."""

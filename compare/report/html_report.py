@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from jinja2 import Template
 
-from pinnray.comparison.evaluation.certification import REGION_RADIUS
 from pinnray.comparison.evaluation.comparison import TRUTH, Results, unsupported_remarks
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
@@ -148,7 +147,6 @@ def report_html(
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
     """
     design, scores = comparison.design, comparison.scores
-    certificates = [each.certificate for each in comparison.evaluations if each.certificate]
     fields = {quantity.name for quantity in QUANTITIES}
     return _template().render(
         comparison=comparison,
@@ -161,8 +159,6 @@ def report_html(
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
         unsupported=[*unsupported_remarks(comparison.unsupported), *comparison.failed.values()],
         has_symbols=any(symbol for _, symbol, _ in design.facts()),
-        regions={name for certificate in certificates for name in certificate.regions},
-        near=REGION_RADIUS,
         text=text,
         viewer=viewer(comparison),
         urls=picture_urls([picture.path for picture in pictures]),
@@ -191,5 +187,4 @@ def _entry(evaluation: Evaluation, comparison: Results) -> dict[str, object]:
         "reaction": text.without_rounding(own.reaction),
         "seconds": seconds(own),
         "certificate": evaluation.certificate,
-        "certificate_sentence": text.certificate_sentence(evaluation, comparison.load.kind),
     }

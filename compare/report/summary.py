@@ -120,8 +120,7 @@ def _trust(scores: Scores) -> RunAnswer | None:
     plain = [name for name, own in networks.items() if not own.markers.in_sample]
     verdicts = [_verdict(name, scores) for name in plain]
     sentences = [said for name in plain for said in _against_reference(name, scores)]
-    sentences += [_beside_twin(name, scores) for name in networks if name not in plain]
-    return RunAnswer("May the network be trusted here?", " ".join(verdicts), list(filter(None, sentences)))
+    return RunAnswer("May the network be trusted here?", " ".join(verdicts), sentences)
 
 
 def _verdict(solver: str, scores: Scores) -> str:
@@ -145,7 +144,7 @@ def _verdict(solver: str, scores: Scores) -> str:
 
 def _against_reference(solver: str, scores: Scores) -> list[str]:
     name, reference = scores.label(solver), scores.label(scores.reference)
-    own, to, true = scores[solver], scores[solver].to_reference, scores[solver].to_truth
+    own, to = scores[solver], scores[solver].to_reference
     fields = [
         f"{_plus_minus(getattr(to, key), getattr(to.reference_uncertainty, key, nan))} in {field}"
         for key, field in (("rel_l2_displacement", "displacement"), ("rel_l2_von_mises", "von Mises stress"))
@@ -154,32 +153,15 @@ def _against_reference(solver: str, scores: Scores) -> list[str]:
     own_error = f"; after ± the estimated error of {reference} itself" if "±" in str(fields) else ""
     away = f"{name} is {', '.join(fields)} away from {reference} (relative L² over the body{own_error})."
     said = [away] if fields else []
-    if own.certificate and own.certificate.rel_excess > 0:
-        above = percent(own.certificate.rel_excess, 2)
-        said.append(f"On the shared mesh its energy is {above} above the least that is possible.")
-    if true:
+    if own.to_truth:
         sentence = (
             f"In displacement, von Mises stress and force, {name} is {_truth_numbers(own)} away from the "
             f"simulated finger, {reference} {_truth_numbers(scores[scores.reference])}."
         )
-        if to.rel_l2_displacement < 0.1 * true.displacement.rel_l2:
+        if to.rel_l2_displacement < 0.1 * own.to_truth.displacement.rel_l2:
             sentence += " That is the error of the model and its load, not of the network."
         said.append(sentence)
     return said
-
-
-def _beside_twin(solver: str, scores: Scores) -> str:
-    own, twin = scores[solver], scores.solvers.get(scores[solver].twin or "")
-    if not (twin and own.held_out and twin.held_out):
-        return ""
-    off, of_twin = own.held_out.mae_sum, twin.held_out.mae_sum
-    if not isfinite(off + of_twin):
-        return ""
-    return (
-        f"{scores.label(solver)}, which is given the markers, is {off:.3f} mm off (mean |Δu| + |Δv|) at "
-        f"held-out {scores.measurements.source} markers; {scores.label(own.twin or '')}, its twin by finite "
-        f"elements, {of_twin:.3f} mm."
-    )
 
 
 def _markers(scores: Scores) -> RunAnswer | None:
@@ -255,11 +237,11 @@ def _force_interval(name: str, own: SolverScores, scores: Scores) -> str:
         said += f" at x = {middle} mm ({start} to {end} mm)"
     said += f" from the {source} markers"
     true = hypot(*own.reaction) / (1 + own.force_to_truth_rel)
-    if not isfinite(true):
-        return f"{said}."
-    where = "inside" if low <= true <= high else "outside"
-    placed = f", {where} it" if isfinite(low + high) else ""
-    return f"{said}; that of the simulated finger is {number(true, 3)}{placed}."
+    if isfinite(true):
+        where = "inside" if low <= true <= high else "outside"
+        placed = f", {where} it" if isfinite(low + high) else ""
+        said += f"; that of the simulated finger is {number(true, 3)}{placed}"
+    return f"{said}. {own.force.advice}".rstrip()
 
 
 def _convergence(scores: Scores) -> RunAnswer:
@@ -286,8 +268,6 @@ def _convergence(scores: Scores) -> RunAnswer:
         sentences.append(
             f"Energy above the least on the shared mesh, which no solver can argue away: {each}."
         )
-    if without := [name for name, each in certificates.items() if not each]:
-        sentences.append(f"By their own criterion alone, without a certificate: {_listed(without)}.")
     return RunAnswer("What is not converged?", verdict, sentences)
 
 

@@ -159,23 +159,13 @@ def beside(value: float, own: float | None) -> Markup:
     )
 
 
-def certificate_sentence(evaluation: Evaluation, load: str = "mean") -> str:
-    """Why a result under a kind of load has no certificate, or that it misses energy; empty for others."""
-    label, certificate = evaluation.label, evaluation.certificate
-    if certificate is not None:
-        missed = percent(certificate.missed / certificate.fem_energy)
-        said = (
-            f"{label} reports {missed} less energy than the least that is possible: its quadrature misses it."
-        )
-        return said if certificate.misses_energy else ""
-    if evaluation.law != "linear":
-        reason = "there is one for the linear law only"
-    elif evaluation.in_sample:
-        reason = "it pays energy for the markers that it was given"
-    elif evaluation.solid:
-        reason = "the least energy of the plane says nothing of three dimensions"
-    elif load == "cylinder":
-        reason = "the least energy is that of a contact that is given, not found"
-    else:
-        reason = "DOLFINx, which makes it, is not installed" if evaluation.finite else "it is not finite"
-    return f"{label} has no certificate: {reason}."
+def missed_energy(evaluation: Evaluation) -> str:
+    """That a result misses energy; empty for others."""
+    certificate = evaluation.certificate
+    if certificate is None or not certificate.misses_energy:
+        return ""
+    missed = percent(certificate.missed / certificate.fem_energy)
+    return (
+        f"{evaluation.label} reports {missed} less energy than the least that is possible: its quadrature "
+        "misses it."
+    )

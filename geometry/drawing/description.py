@@ -1,5 +1,6 @@
 """Clamp, contact and markers of a drawn finger: a small TOML file beside the drawing, or lines of one."""
 
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -9,7 +10,7 @@ from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.text_files import parse_toml, read_toml
+from pinnray.runtime.text_files import read_toml
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Coordinates = tuple[Number, Number]
@@ -110,7 +111,7 @@ def load_description(path: Path | None, lines: Sequence[str] = ()) -> Descriptio
         values = read_toml(path, "description")
     for text in lines:
         try:
-            values |= parse_toml(text)
+            values |= tomllib.loads(text)
         except ValueError:
             raise UserError(f"cannot read {text!r}; write TOML, such as contact = [35, 0]") from None
     try:

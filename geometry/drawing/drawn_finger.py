@@ -221,12 +221,12 @@ class DrawnFinger:
             rows["Mesh"] = f"{len(self.mesh.triangles)} triangles of the file, as they are"
         return [(meaning, "", value) for meaning, value in rows.items()]
 
-    def plot(self) -> "Figure":
+    def plot(self, width: float | None = None) -> "Figure":
         """The section with clamp, contact and numbered markers in the file's axes, as a matplotlib figure."""
         from pinnray.geometry.finger.picture import plot_finger
 
         place = self.placement.inverse
-        return plot_finger(self, place.section(self.section), place)
+        return plot_finger(self, place.section(self.section), place, width)
 
     def _source(self, key: str) -> str:
         source = self.sources.get(key)

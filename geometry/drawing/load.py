@@ -48,7 +48,13 @@ def finger_from_file(path: str | Path, description: Description | None = None) -
     path = Path(path)
     if description is None:
         description = load_description(description_beside(path))
-    drawing = read_drawing(path, description.units, description.plane, description.tolerance)
+    drawing = read_drawing(
+        path,
+        description.units,
+        description.plane,
+        description.tolerance,
+        depth_known=description.depth is not None,
+    )
     try:
         return finger_of(drawing, description)
     except UserError as error:
@@ -56,7 +62,12 @@ def finger_from_file(path: str | Path, description: Description | None = None) -
 
 
 def read_drawing(
-    path: Path, units: str | None = None, plane: str | None = None, tolerance: float | None = None
+    path: Path,
+    units: str | None = None,
+    plane: str | None = None,
+    tolerance: float | None = None,
+    *,
+    depth_known: bool = False,
 ) -> Drawing:
     """The curves of a STEP, DXF, SVG or MSH file.
 
@@ -65,6 +76,7 @@ def read_drawing(
         units: Unit of its coordinates; None means the file's own, or mm.
         plane: Plane in which a solid is cut, such as `z = 6`.
         tolerance: Largest gap between two ends of curves that is closed, mm; None means 0.001 mm.
+        depth_known: Whether the depth is given, so that a solid need not be extruded.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
@@ -77,7 +89,8 @@ def read_drawing(
         digest = file_digest(path)
         kind = suffix[1:].replace("stp", "step")
         read = getattr(import_module(f"pinnray.geometry.drawing.formats.{kind}"), f"read_{kind}")
-        drawing: Drawing = read(path, units, tolerance, *([plane] if kind == "step" else []))
+        solid = {"plane": plane, "depth_known": depth_known} if kind == "step" else {}
+        drawing: Drawing = read(path, units, tolerance, **solid)
     except OSError as error:
         raise UserError(f"cannot read the drawing {path}: {error.strerror}") from None
     except UserError as error:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-import shapely
 
 from pinnray.geometry.drawing.description import PartMaterial
 from pinnray.geometry.drawing.formats.drawing import MeshInFile, label_of
@@ -11,7 +10,7 @@ from pinnray.geometry.drawing.placement import Placement
 from pinnray.geometry.mesh.boundary import counter_clockwise
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
 from pinnray.geometry.section.section import Section
-from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 
 
@@ -37,9 +36,9 @@ def ready_mesh(
     points = placement(found.points)
     triangles = counter_clockwise(points, found.triangles)
     rim = boundary_edges(triangles)
-    boundaries = {
-        name: rim[_on_pieces(points[rim].mean(axis=1), section, name)] for name in ("base", "front", "back")
-    }
+    places = section.outline.places(points[rim].mean(axis=1))
+    names = np.where(places.distances <= 1e-3, np.array(section.outline.names)[places.pieces], "")
+    boundaries = {name: rim[names == name] for name in ("base", "front", "back")}
     off = np.abs(points[boundaries["front"]].mean(axis=1)[:, 0] - contact[0])
     boundaries["contact"] = boundaries["front"][off <= max(contact[1] / 2, off.min())]
     nodes = np.linalg.norm(points[:, None] - markers, axis=2).argmin(axis=0)
@@ -68,12 +67,3 @@ def _moduli(found: MeshInFile, materials: Mapping[str, PartMaterial]) -> FloatAr
             raise UserError(f"the physical surface {name!r} overlaps another one that has a material")
         moduli[rows] = part.young, part.poisson
     return moduli
-
-
-def _on_pieces(middles: FloatArray, section: Section, name: str) -> BoolArray:
-    """Mask of the points (k, 2) on the pieces of a name."""
-    near = np.zeros(len(middles), dtype=bool)
-    for loop, which in section.named(name):
-        line = shapely.LineString(loop.along(which, np.linspace(0, 1, 200)))
-        near |= shapely.distance(shapely.points(middles), line) <= 1e-3
-    return near

@@ -19,7 +19,7 @@ from pinnray.geometry.finger.section import finger_section
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.notebook import fact_table
+from pinnray.runtime.notebook import fact_table, png_image
 
 if TYPE_CHECKING:
     from pinnray.runtime.figure import Figure
@@ -62,36 +62,35 @@ class Design(Parameters):
         return self.model_dump()
 
     def facts(self) -> list[tuple[str, str, str]]:
-        """Every parameter's meaning, symbol of the paper and value with unit."""
+        """Meaning, symbol of the paper and value with unit; without zeros that the paper does not have."""
         rows = []
         for name, described in type(self).model_fields.items():
             value = getattr(self, name)
-            if name in ("name", "contact_position") or value is None:
+            symbol = str(parameter_info(name, "symbol"))
+            if name in ("name", "contact_position") or value is None or not (value or symbol):
                 continue
             meaning = (described.description or name).split(" [")[0].replace("`", "")
             unit = str(parameter_info(name, "unit"))
             words = _in_words(value, unit)
             if name == "marker_diameter" and self.small_markers:
                 words += f", as {self.small_markers}"
-            rows.append((meaning, str(parameter_info(name, "symbol")), words))
+            rows.append((meaning, symbol, words))
         return [*rows, ("Abscissa of the contact's middle", "", _in_words(self.contact_abscissa, "mm"))]
 
-    def plot(self) -> "Figure":
+    def plot(self, width: float | None = None) -> "Figure":
         """The section with clamp, contact and numbered markers, as a matplotlib figure."""
         from pinnray.geometry.finger.picture import plot_finger
 
-        return plot_finger(self, self.section, np.asarray)
+        return plot_finger(self, self.section, np.asarray, width)
 
     def _repr_html_(self) -> str:
         """The section and the paper's nine parameters, in a notebook."""
-        from pinnray.geometry.finger.svg import section_svg
-
         facts = {
             f"{name} ({symbol})": with_unit(getattr(self, name), name) for symbol, name in SYMBOLS.items()
         }
         if self.small_markers:
             facts["markers"] = f"of {self.marker_diameter:g} mm: {self.small_markers}"
-        return fact_table(f"Design “{self.name}”", facts, section_svg(self).partition("?>")[2])
+        return fact_table(f"Design “{self.name}”", facts, png_image(self.plot()._repr_png_()))
 
     def __repr__(self) -> str:
         """The name, the paper's nine parameters and what else differs from its default, in one line."""

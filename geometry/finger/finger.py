@@ -80,7 +80,7 @@ class Finger(Protocol):
     def facts(self) -> list[tuple[str, str, str]]:
         """Rows of the report: meaning, the paper's symbol or an empty text, and value with unit."""
 
-    def plot(self) -> "Figure":
+    def plot(self, width: float | None = None) -> "Figure":
         """The section with clamp, contact and numbered markers, as a matplotlib figure."""
 
 

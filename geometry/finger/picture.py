@@ -4,36 +4,56 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withTickedStroke
 
 from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
-from pinnray.geometry.section.thickness import inner_normals
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, SMALL, Figure, body_figure
+from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, body_figure
+
+COLUMN, ROW = 1.2, 0.17
+"""Width and height of a parameter below the section, inches."""
+
+HATCHED = (withTickedStroke(angle=-120, spacing=4, length=1.5),)
+"""Strokes on the outer side of a line."""
 
 
-def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], FloatArray]) -> Figure:
+def plot_finger(
+    finger: Finger, section: Section, place: Callable[[FloatArray], FloatArray], width: float | None = None
+) -> Figure:
     """The section to scale: the clamp hatched, an arrow at the contact, numbered markers.
+
+    Below it the parameters of the paper, if the finger has them.
 
     Args:
         finger: The finger.
         section: Its section in the frame of the picture.
         place: From the finger's frame into that of the picture, points of shape (n, 2), mm.
+        width: Of the figure, inches; the usual one if None.
     """
+    page = width or WIDTH
     extent = float(np.ptp(section.bounds, axis=0).max())
     contact = finger.section.front_point(finger.contact_abscissa)
     tip, tail = place(np.stack([contact, contact + np.array([0.0, 0.09 * extent])]))
     hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
     shown = _not_tall(np.concatenate([hatched, tip[None], tail[None]]))
-    with body_figure(shown, f"Finger “{finger.name}”") as (drawn, axes):
+    parameters = [_with_symbol(symbol, value) for _, symbol, value in finger.facts() if symbol]
+    columns = int((page - 0.4) / COLUMN)
+    rows = -(-len(parameters) // columns)
+    with body_figure(shown, f"Finger “{finger.name}”", foot=ROW * rows, page=page) as (drawn, axes):
+        for number, said in enumerate(parameters):
+            row, column = divmod(number, columns)
+            x, y = 0.4 + column * COLUMN, ROW * (rows - row - 0.5)
+            drawn.text(x / page, y / drawn.get_figheight(), said, fontsize=SMALL, color=INK, va="center")
         draw_section(axes, section)
         for loop, which in section.named("base"):
-            axes.plot(*loop.along(which, np.linspace(0, 1, 60)).T, color=INK, lw=2.2, zorder=3)
-            axes.plot(*_hatches(loop, which, extent / 40), color=INK, lw=0.6, zorder=2)
+            clamped = loop.along(which, np.linspace(0, 1, 60))
+            axes.plot(*clamped.T, color=INK, lw=2.2, zorder=3)
+            axes.plot(*clamped.T, color=INK, lw=0.6, zorder=2, path_effects=HATCHED)
         front = np.linspace(*finger.contact_ends, 30)
         touched = place(np.array([finger.section.front_point(x) for x in front]))
         axes.plot(*touched.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=4)
@@ -43,11 +63,18 @@ def plot_finger(finger: Finger, section: Section, place: Callable[[FloatArray], 
             "fontsize": SMALL,
             "color": MEASURED,
             "zorder": 6,
+            "path_effects": [patheffects.withStroke(linewidth=2, foreground="white")],
         }
         for number, centre in enumerate(place(finger.markers), start=1):
             axes.add_patch(Circle(tuple(centre), finger.marker_radius, fc=MEASURED, ec="none", zorder=4))
             axes.annotate(str(number), centre, xytext=(3, 3), **text)
     return drawn
+
+
+def _with_symbol(symbol: str, value: str) -> str:
+    """A parameter of the paper, such as `L_tip`, and its value, with the symbol as mathematics."""
+    letter, _, index = symbol.partition("_")
+    return rf"${letter}_\mathrm{{{index}}}$ = {value}" if index else f"${letter}$ = {value}"
 
 
 def draw_section(axes: Axes, shape: Section) -> None:
@@ -64,13 +91,3 @@ def _not_tall(points: FloatArray) -> FloatArray:
     half = max(right - left, (top - bottom) / 0.8) / 2
     middle = 0.5 * (left + right)
     return np.concatenate([points, [[middle - half, bottom], [middle + half, top]]])
-
-
-def _hatches(loop: Loop, which: int, step: float) -> FloatArray:
-    """Short strokes on the outer side of a piece, as coordinates (2, k) with gaps."""
-    count = max(int(loop.lengths[which] / step), 2)
-    share = (np.arange(count) + 0.5) / count
-    start, outward = loop.along(which, share), -inner_normals(loop, which, share)
-    turned = outward @ np.array([[1.0, 0.6], [-0.6, 1.0]])
-    strokes = np.stack([start, start + 0.9 * step * turned, np.full_like(start, np.nan)], axis=1)
-    return np.asarray(strokes.reshape(-1, 2).T)

@@ -11,7 +11,6 @@ from pinnray.geometry.finger.markers import marker_positions
 from pinnray.geometry.finger.parameters import MARKER, Parameters, parameter_info
 from pinnray.geometry.finger.section import (
     back_line,
-    cavity_ends,
     cells,
     corner_angles,
     finger_outline,
@@ -46,24 +45,24 @@ def broken_rule(p: Parameters) -> str | None:
     return next((result.sentence for result in results if result.margin < ROUNDING), None)
 
 
-def cavity_length(p: Parameters) -> RuleResult:
-    """Base wall and tip leave room for a cavity."""
-    start, end = cavity_ends(p)
+def cavities_open(p: Parameters) -> RuleResult:
+    """Walls, ribs and tip leave every cavity open."""
+    first, last = cells(p)[0], cells(p)[-1]
+    near, far = ("first rib", "last rib") if p.rib_count else ("tip block", "base wall")
+    gaps = {
+        "front and back wall at the tip block": last[3, 1] - last[2, 1],
+        f"base wall and {near}": (first[[3, 2]] - first[[0, 1]])[:, 0].min(),
+        f"{far} and tip block": (last[[3, 2]] - last[[0, 1]])[:, 0].min(),
+    }
+    if p.rib_count > 1:
+        gaps["neighbouring ribs"] = rib_pitch(p) * np.cos(np.radians(rib_slope(p))) - p.rib_thickness
+    where = min(gaps, key=gaps.__getitem__)
     return RuleResult(
-        end - start - MIN_CAVITY,
-        f"no room for a cavity: tip_length {p.tip_length:g} mm and base_thickness {p.base_thickness:g} mm "
-        f"leave {end - start:.3g} mm of height {p.height:g} mm, at least {MIN_CAVITY} mm is needed",
-    )
-
-
-def cavity_open(p: Parameters) -> RuleResult:
-    """Front and back wall stay apart up to the tip block."""
-    _, _, back, front = cells(p)[-1]
-    opening = float(front[1] - back[1])
-    return RuleResult(
-        opening - MIN_CAVITY,
-        f"front_thickness {p.front_thickness:g} mm and back_thickness {p.back_thickness:g} mm leave "
-        f"{opening:.3g} mm between the walls at the tip block, at least {MIN_CAVITY} mm is needed",
+        float(gaps[where]) - MIN_CAVITY,
+        f"no room for the cavities: {p.rib_count} ribs of {p.rib_thickness:g} mm at {p.rib_angle:g} deg, "
+        f"base_thickness {p.base_thickness:g} mm, tip_length {p.tip_length:g} mm, front_thickness "
+        f"{p.front_thickness:g} mm and back_thickness {p.back_thickness:g} mm leave {gaps[where]:.3g} mm "
+        f"between {where}, at least {MIN_CAVITY} mm is needed",
     )
 
 
@@ -107,26 +106,6 @@ def tip_rounded(p: Parameters) -> RuleResult:
         f"tip_radius too large: {p.tip_radius:g} mm rounds {tip_tangent(p):.4g} mm of front and back face, "
         f"the solid tip has {min(p.tip_length, behind):.4g} mm",
     )
-
-
-def ribs_apart(p: Parameters) -> RuleResult:
-    """Neighbouring ribs leave a gap."""
-    gap = rib_pitch(p) * np.cos(np.radians(rib_slope(p))) - p.rib_thickness
-    return RuleResult(
-        float(gap) - MIN_CAVITY if p.rib_count > 1 else np.inf,
-        f"ribs {'overlap' if gap < 0 else 'are too close'}: {p.rib_count} ribs of {p.rib_thickness:g} mm at "
-        f"{p.rib_angle:g} deg leave gaps of {gap:.3g} mm, at least {MIN_CAVITY} mm is needed",
-    )
-
-
-def ribs_clear_of_base(p: Parameters) -> RuleResult:
-    """The first rib stays clear of the base wall at both its ends."""
-    return _cavity_width(p, 0, "first rib runs into the base wall")
-
-
-def ribs_clear_of_tip(p: Parameters) -> RuleResult:
-    """The last rib stays clear of the tip block at both its ends."""
-    return _cavity_width(p, -1, "last rib runs into the tip block")
 
 
 def contact_on_front(p: Parameters) -> RuleResult:
@@ -226,20 +205,7 @@ def markers_not_through(p: Parameters) -> RuleResult:
 
 
 RULES: tuple[Callable[[Parameters], RuleResult], ...] = (
-    *(cavity_length, cavity_open, base_wall, slot_fits, tip_rounded),
-    *(ribs_apart, ribs_clear_of_base, ribs_clear_of_tip, contact_on_front, fillets_fit),
+    *(cavities_open, base_wall, slot_fits, tip_rounded, contact_on_front, fillets_fit),
     *(markers_fit, markers_apart, markers_not_through),
 )
 """In the order of checking: the later ones presuppose the earlier ones."""
-
-
-def _cavity_width(p: Parameters, number: int, fault: str) -> RuleResult:
-    """Result for the narrower end of the first or last cavity."""
-    base_front, base_back, tip_back, tip_front = cells(p)[number]
-    front, back = tip_front[0] - base_front[0], tip_back[0] - base_back[0]
-    wall, width = ("front", front) if front < back else ("back", back)
-    return RuleResult(
-        float(width) - MIN_CAVITY if p.rib_count else np.inf,
-        f"{fault}: with {p.rib_count} ribs of {p.rib_thickness:g} mm at {p.rib_angle:g} deg the cavity "
-        f"between them is {width:.3g} mm wide at the {wall} wall, at least {MIN_CAVITY} mm is needed",
-    )

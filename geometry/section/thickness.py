@@ -21,24 +21,21 @@ class Crossing(NamedTuple):
     pieces: IntArray  # number of the piece that is met among those of all loops, shape (n,)
 
 
-def wall_thickness(
-    section: Section, spacing: float, *, corners: bool = False
-) -> tuple[FloatArray, FloatArray]:
+def wall_thickness(section: Section, spacing: float) -> tuple[FloatArray, FloatArray]:
     """Thickness of the walls along the whole boundary, by rays along the inner normals.
 
     A ray that ends on the piece beyond a sharp corner (90 degrees or less) measures no wall: toward the apex
-    of a wedge its length vanishes whatever the wedge. Such points are left out unless `corners`.
+    of a wedge its length vanishes whatever the wedge. Such points are left out.
 
     Args:
         section: The body.
         spacing: Largest distance of neighbouring points on a piece, mm; every piece has at least one.
-        corners: Whether to keep the points whose ray ends beyond a sharp corner.
 
     Returns:
         Points of the boundary, shape (n, 2), mm, and the thickness there, shape (n,), mm; both empty for a
         triangle without cavities.
     """
-    return _widths(section.loops, spacing, corners=corners)
+    return _widths(section.loops, spacing)
 
 
 def cavity_widths(section: Section, spacing: float) -> tuple[FloatArray, FloatArray]:
@@ -91,14 +88,12 @@ class _Pieces(NamedTuple):
         return cls(start, end, bulges, centres, np.linalg.norm(start - centres, axis=1), following)
 
 
-def _widths(loops: Sequence[Loop], spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
+def _widths(loops: Sequence[Loop], spacing: float) -> tuple[FloatArray, FloatArray]:
     """Lengths of the rays to the left of curves up to the next one of them."""
     pieces = _Pieces.of(loops)
     points, normals, own = _samples(loops, spacing)
     crossing = _through(pieces, points, normals)
-    kept = np.isfinite(crossing.lengths)
-    if not corners:
-        kept &= ~_beyond_corner(pieces, own, crossing.pieces)
+    kept = np.isfinite(crossing.lengths) & ~_beyond_corner(pieces, own, crossing.pieces)
     return points[kept], crossing.lengths[kept]
 
 

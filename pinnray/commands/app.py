@@ -6,7 +6,7 @@ from pathlib import Path
 from cyclopts import App
 from docstring_parser.attrdoc import AttributeDocstrings
 
-from pinnray.commands.launch import EXIT_CODES
+from pinnray.commands.launch import EPILOGUE
 from pinnray.options.file import take_options
 from pinnray.runtime.machine import program_version
 
@@ -35,7 +35,7 @@ pinnray = App(
     version=program_version,
     version_format="plaintext",
     help="Can a physics-informed neural network stand in for finite elements on a real Fin Ray finger?",
-    help_epilogue=EXIT_CODES,
+    help_epilogue=EPILOGUE,
     help_format="plaintext",  # Markdown would cost a third of the start
     result_action="return_value",
     suppress_keyboard_interrupt=False,
@@ -47,7 +47,7 @@ for module in COMMANDS:
         name=name,
         help=described(module),
         help_format="markdown",
-        help_epilogue=EXIT_CODES,
+        help_epilogue=EPILOGUE,
         version=program_version,
         config=take_options if name == "compare" else None,
     )

@@ -5,30 +5,48 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
-from io import TextIOWrapper
-from pathlib import Path
-from tempfile import TemporaryFile
+from contextlib import redirect_stdout, suppress
+from functools import partial
+from io import StringIO, TextIOWrapper
 from typing import Any, TextIO
 
 from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 
+from pinnray.runtime.cache import share_cache
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, errors_of_interruption, say
 
-EXIT_CODES = (
+EPILOGUE = (
     "Exit codes: 0 all well; 1 a fault of the program; 2 bad input, with one line that says what and how to "
     "mend it; 3 done, but a solver failed or did not converge, or --adapt did not reach its tolerance; "
-    "130 interrupted; 141 the output went into a pipe that nobody reads any more."
+    "130 interrupted; 141 the output went into a pipe that nobody reads any more. "
+    "Every command takes --quiet: no progress and no results, only warnings and errors."
 )
 
+SIZES = range(20, 1001)
+"""Columns and lines that a terminal may have."""
 
-def launched(command: Callable[[], Any]) -> int:
-    """Run a command and return its exit code."""
+
+def launched(command: Callable[[], Any], *, quiet: bool = False) -> int:
+    """Run a command, which shows only warnings and errors if it is quiet, and return its exit code."""
     _write_any_letter()
-    _give_libraries_a_cache()
+    _drop_impossible_sizes()
     _leave_signals_alone()
-    return guarded(command)
+    return guarded(partial(_quietly if quiet else _loudly, command))
+
+
+def _loudly(command: Callable[[], Any]) -> Any:
+    """Run a command."""
+    share_cache()
+    return command()
+
+
+def _quietly(command: Callable[[], Any]) -> Any:
+    """Run a command without its progress and its output."""
+    from pinnray.runtime.stages import quiet_stages
+
+    with redirect_stdout(StringIO()), quiet_stages():
+        return _loudly(command)
 
 
 def guarded(command: Callable[[], Any]) -> int:
@@ -94,29 +112,20 @@ def _write_any_letter() -> None:
 
     A stream that the caller has closed gives nothing, takes everything and shows nothing.
     """
-    if sys.stdin is None:
-        sys.stdin = open(os.devnull, encoding="utf-8")  # noqa: SIM115
-    if sys.stdout is None:
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    if sys.stderr is None:
-        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    for name, mode in {"stdin": "r", "stdout": "w", "stderr": "w"}.items():
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
 
 
-def _give_libraries_a_cache() -> None:
-    """Let DOLFINx and matplotlib keep their files in `PINNRAY_CACHE` where the home cannot be written."""
-    cache, home = os.environ.get("PINNRAY_CACHE"), Path("~/.cache").expanduser()
-    if cache is None or "XDG_CACHE_HOME" in os.environ:
-        return
-    try:
-        home.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=home):
-            pass
-    except OSError:
-        os.environ["XDG_CACHE_HOME"] = cache
-        os.environ.setdefault("MPLCONFIGDIR", str(Path(cache) / "matplotlib"))
+def _drop_impossible_sizes() -> None:
+    """Forget a width or height of the terminal that none has, as COLUMNS=0 of `docker exec` and editors."""
+    for name in ("COLUMNS", "LINES"):
+        given = os.environ.get(name, "")
+        if not (given.isdecimal() and int(given) in SIZES):
+            os.environ.pop(name, None)
 
 
 def _leave_signals_alone() -> None:

@@ -1,7 +1,6 @@
 """Time and memory that a fine mesh takes, told before it is made."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.finger import Finger
@@ -21,35 +20,25 @@ USABLE = 0.8
 """Share of the free memory that needs no consent."""
 
 
-@dataclass(frozen=True)
-class MeshCost:
-    """The price of a mesh.
+def mesh_seconds(triangles: int, solvers: Sequence[Solver] = (), *, simulated: bool = False) -> float:
+    """Time of a mesh and of what is done on it, s, as far as a coarser mesh takes less.
 
-    Attributes:
+    Args:
         triangles: Number of triangles.
         solvers: What it is made for.
         simulated: Whether it is for a virtual experiment as well.
     """
+    return sum(cost.of_mesh(triangles) for cost in [MESH, *_work(solvers, simulated=simulated)])
 
-    triangles: int
-    solvers: Sequence[Solver] = ()
-    simulated: bool = False
 
-    @property
-    def seconds(self) -> float:
-        """Time, s, as far as a coarser mesh takes less."""
-        costs = [MESH, *[EXPERIMENT] * self.simulated, *(Traits.of(each).cost for each in self.solvers)]
-        return sum(cost.of_mesh(self.triangles) for cost in costs)
+def mesh_memory_gb(triangles: int, solvers: Sequence[Solver] = (), *, simulated: bool = False) -> float:
+    """Memory of the work on a mesh that takes most, GB."""
+    needs = [cost.kilobytes for cost in _work(solvers, simulated=simulated)]
+    return 1e-6 * triangles * max(needs, default=0.0)
 
-    @property
-    def memory_gb(self) -> float:
-        """Memory, GB, of the solver that takes most."""
-        costs = [*[EXPERIMENT] * self.simulated, *(Traits.of(each).cost for each in self.solvers)]
-        return 1e-6 * self.triangles * max((cost.kilobytes for cost in costs), default=0.0)
 
-    def fits(self, free_gb: float) -> bool:
-        """Whether it needs no consent."""
-        return self.seconds <= MAX_SECONDS and self.memory_gb <= USABLE * free_gb
+def _work(solvers: Sequence[Solver], *, simulated: bool) -> list[Cost]:
+    return [*[EXPERIMENT] * simulated, *(Traits.of(each).cost for each in solvers)]
 
 
 def check_mesh_cost(
@@ -72,11 +61,12 @@ def check_mesh_cost(
     """
     if (settings := mesh_sizes(finger, settings)) is None:
         return
-    free = free_memory_gb()
-    cost = MeshCost(estimated_triangles(finger, settings), solvers, simulated)
-    if not cost.fits(free):
+    triangles, free = estimated_triangles(finger, settings), free_memory_gb()
+    seconds = mesh_seconds(triangles, solvers, simulated=simulated)
+    memory = mesh_memory_gb(triangles, solvers, simulated=simulated)
+    if seconds > MAX_SECONDS or memory > USABLE * free:
         raise UserError(
-            f"--mesh-size {settings.size:g} gives about {cost.triangles:,} triangles, which take about "
-            f"{cost.seconds / 60:.0f} min and {cost.memory_gb:.1f} GB ({free:.1f} GB are free); "
+            f"--mesh-size {settings.size:g} gives about {triangles:,} triangles, which take about "
+            f"{seconds / 60:.0f} min and {memory:.1f} GB ({free:.1f} GB are free); "
             "go on with --yes, or take a coarser mesh"
         )

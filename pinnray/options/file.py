@@ -70,6 +70,12 @@ def given_options(*groups: "BaseModel", **others: object) -> dict[str, object]:
     return {name.replace("_", "-"): value for name, value in values.items()}
 
 
+def usual_options(*groups: "BaseModel") -> dict[str, object]:
+    """The defaults of groups of options, by their names on the command line."""
+    values = {name: value for each in groups for name, value in type(each)().model_dump(mode="json").items()}
+    return {name.replace("_", "-"): value for name, value in values.items()}
+
+
 def note_versions(file: Path, earlier: Mapping[str, Any]) -> None:
     """Say which packages have another version than in the provenance of an earlier run."""
     then, now = earlier.get("versions", {}), package_versions()

@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,14 +16,14 @@ from pinnray.geometry.finger.parameters import CheckedModel
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import errors_of_interruption, say
 from pinnray.runtime.machine import cores
-from pinnray.runtime.text_files import parse_toml
-from pinnray.solvers.physics import LoadKind, Physics
+from pinnray.solvers.load import LoadKind, Physics
+from pinnray.solvers.material import Material
 
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
     from pinnray.geometry.finger.design import Design
     from pinnray.geometry.finger.finger import Finger
     from pinnray.geometry.mesh.settings import MeshSettings
-    from pinnray.solvers.physics import Load, Material
+    from pinnray.solvers.load import Load
     from pinnray.solvers.solver import Solver
     from pinnray.studies.sweep.job import S, StudyJob
 
@@ -130,7 +131,7 @@ class FingerOptions(CheckedModel):
 def toml_value(text: str) -> str:
     """The text as a value of TOML: a number, list or quoted text as it is, any other in quotes."""
     try:
-        parse_toml(f"value = {text}")
+        tomllib.loads(f"value = {text}")
     except ValueError:
         return json.dumps(text)
     return text
@@ -143,9 +144,8 @@ def _changed_name(design: "Design", changes: Mapping[str, object]) -> str:
     return name if len(name) <= 64 else f"{name[:55]}-{design.digest[:8]}"
 
 
-@Parameter(name="*", group=PHYSICS, negative="")
-class PhysicsOptions(Physics):
-    """Material and load."""
+class MaterialOptions(Material):
+    """Elastic constants, or the name of a material that has them."""
 
     material: str | None = Field(
         default=None,
@@ -153,34 +153,39 @@ class PhysicsOptions(Physics):
         "are given; `pinnray material` lists them",
     )
 
-    def read(self, preset: str | None = None, usual_load: LoadKind | None = None) -> "tuple[Material, Load]":
-        """Material and load; the command or a preset of the solvers may choose the kind that is usual."""
-        material, load = Physics(**self.values(preset, usual_load)).parts
-        return material.made_of(self._known.substance if self._known else None), load
-
-    def values(self, preset: str | None = None, usual_load: LoadKind | None = None) -> dict[str, Any]:
-        """What is not as by default, by the names of a study."""
-        from pinnray.options.preset_jobs import job_defaults
-
-        usual: dict[str, Any] = {"load": usual_load or job_defaults(preset).load}
-        if self._known:
-            usual |= {"young": self._known.young, "poisson": self._known.poisson}
-        return usual | self.model_dump(exclude_unset=True, exclude={"material"})
+    def made(self) -> Material:
+        """The material."""
+        given = self.model_dump(exclude_unset=True, include=set(Material.model_fields))
+        return Material(**self._usual | given).made_of(self._known.substance if self._known else None)
 
     @property
-    def _known(self) -> "Material | None":
-        """The material that goes by a name."""
+    def _usual(self) -> dict[str, Any]:
+        """The constants of the material that goes by a name."""
+        return {"young": self._known.young, "poisson": self._known.poisson} if self._known else {}
+
+    @property
+    def _known(self) -> Material | None:
         if self.material is None:
             return None
         from pinnray.solvers.materials.presets import preset
 
         return preset(self.material).material
 
-    def check_law(self, solvers: "Sequence[Solver]") -> None:
-        """Raise a `UserError` if none of the solvers has the law that is given."""
-        if "law" in self.model_fields_set and not any(self.law in solver.laws for solver in solvers):
-            known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
-            raise UserError(f"--law {self.law}: none of the solvers has it ({known})")
+
+@Parameter(name="*", group=PHYSICS, negative="")
+class PhysicsOptions(Physics, MaterialOptions):
+    """Material and load."""
+
+    def read(self, preset: str | None = None, usual_load: LoadKind | None = None) -> "tuple[Material, Load]":
+        """Material and load; the command or a preset of the solvers may choose the kind that is usual."""
+        return self.made(), Physics(**self.values(preset, usual_load)).parts[1]
+
+    def values(self, preset: str | None = None, usual_load: LoadKind | None = None) -> dict[str, Any]:
+        """What is not as by default, by the names of a study."""
+        from pinnray.options.preset_jobs import job_defaults
+
+        usual = {"load": usual_load or job_defaults(preset).load} | self._usual
+        return usual | self.model_dump(exclude_unset=True, exclude={"material"})
 
 
 @Parameter(name="*", group=TRAINING)

@@ -29,7 +29,9 @@ def made_solvers(
     having = [name for name in names if preset in PRESETS.get(name, ())]
     if preset is not None and not having:
         known = "; ".join(f"{name} has {', '.join(presets)}" for name, presets in PRESETS.items())
-        raise UserError(f"preset {preset}: none of the solvers that are named has it ({known})")
+        said = f"{', '.join(names)} {'do' if len(names) > 1 else 'does'} not have it"
+        said = said if names else "it is for solvers that are given by their names"
+        raise UserError(f"preset {preset}: {said} ({known})")
     made = []
     for name in names:
         own: dict[str, Any] = {"preset": preset} if name in having else {}

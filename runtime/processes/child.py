@@ -10,7 +10,7 @@ import sys
 import warnings
 from contextlib import suppress
 from ctypes import CDLL
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import import_module
 from math import inf
 from multiprocessing.connection import Connection
@@ -24,7 +24,6 @@ class ProcessFailed:
 
     exit_code: int | None  # of its process, negative for the signal that ended it; None after the time limit
     reason: str = ""  # last line of a `captured` process, or a file that could not be read or written
-    peak_gb: float = field(default=0.0, compare=False)  # see `peak_memory_gb`
 
     @property
     def message(self) -> str:

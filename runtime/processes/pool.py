@@ -37,7 +37,6 @@ from pathlib import Path
 from time import monotonic
 from typing import IO, Any, Self, TypeVar
 
-from pinnray.runtime.machine import peak_memory_gb
 from pinnray.runtime.processes.child import ProcessFailed, serve
 
 FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_", "MPIEXEC_")
@@ -219,17 +218,12 @@ class _Child:
             kind, content = self.connection.recv()
             return kind, content
         except (EOFError, OSError):
-            reason, peak_gb = "", 0.0
-            with suppress(ChildProcessError):  # where SIGCHLD is ignored, the system has taken it away
-                _, status, usage = os.wait4(self.process.pid, 0)
-                self.process.returncode = os.waitstatus_to_exitcode(status)
-                peak_gb = peak_memory_gb(usage)
-            code = self.process.wait()
+            code, reason = self.process.wait(), ""
             if self._written:
                 self._written.seek(0)
                 reason = (self._written.read().strip().splitlines() or ["it left no message"])[-1]
             self.end()
-            return "death", ProcessFailed(code, reason, peak_gb)
+            return "death", ProcessFailed(code, reason)
 
     def close(self) -> None:
         """Let a process end, and one with a task after it has saved its state; an unused one may import."""

@@ -2,14 +2,13 @@
 
 import atexit
 import os
-import resource
 import tempfile
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.machine import free_memory_gb, limit_memory, peak_memory_gb
+from pinnray.runtime.machine import free_memory_gb, limit_memory
 from pinnray.runtime.processes.child import ProcessFailed
 from pinnray.runtime.processes.pool import Pool
 
@@ -37,25 +36,20 @@ def run_task(task: Task, timeout_s: float) -> Any:
             process crashes.
     """
     what, memory_gb = task.what, 0.9 * free_memory_gb()
-    peaks = [0.0]
-    ((_, answer),) = _pool(os.getpid()).answers(
-        perform,
-        {what: (task, memory_gb)},
-        timeout_s=timeout_s,
-        report=lambda _, peak_gb: peaks.append(peak_gb),
-    )
+    pool = _pool(os.getpid())
+    ((_, answer),) = pool.answers(perform, {what: (task, memory_gb)}, timeout_s=timeout_s)
     if isinstance(answer, UserError):
         raise answer
     if not isinstance(answer, ProcessFailed):
         return answer
     if answer.exit_code is None:
         raise UserError(f"{what} was ended after {timeout_s:g} s; use larger elements, or allow more time")
-    # Gmsh crashes where it gets no more. An earlier task may have taken as much.
-    crowded = answer.exit_code < 0 and answer.peak_gb > max(0.8 * memory_gb, *peaks)
     last_words = ("bad_alloc", "MemoryError", "Cannot allocate memory", "out of memory")
-    if crowded or any(words in answer.reason for words in last_words):
+    if any(words in answer.reason for words in last_words):
         raise _too_large(what, memory_gb)
-    raise UserError(f"{what} failed (exit code {answer.exit_code}): {answer.reason}")
+    # Gmsh crashes where it gets no more memory.
+    crash = f"; it may need more than {memory_gb:.2g} GB, which is what is free" * (answer.exit_code < 0)
+    raise UserError(f"{what} failed (exit code {answer.exit_code}): {answer.reason}{crash}")
 
 
 @cache
@@ -66,8 +60,8 @@ def _pool(parent: int) -> Pool:
     return pool
 
 
-def perform(limited: tuple[Task, float], report: Callable[..., None]) -> Any:
-    """Run a task with a limit of memory, GB, in this process; report the memory that the process had before.
+def perform(limited: tuple[Task, float], _: object) -> Any:
+    """Run a task with a limit of memory, GB, in this process.
 
     Returns:
         Its result, or why there is none.
@@ -76,7 +70,6 @@ def perform(limited: tuple[Task, float], report: Callable[..., None]) -> Any:
     try:
         work = task.prepare()
         limit_memory(memory_gb)
-        report(peak_memory_gb(resource.getrusage(resource.RUSAGE_SELF)))
         return work(*task.given)
     except MemoryError:
         return _too_large(task.what, memory_gb)

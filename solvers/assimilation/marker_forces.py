@@ -10,8 +10,8 @@ without the markers' forces p it is u_0, and
 M = (W^-1 + C)^-1, the leave-one-out residual of marker i is M_ii^-1 p_i, a block of 2 by 2.
 
 Sources: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, section
-5.4.2, for leaving one out, and equation 2.30 for the evidence: with the prior exp(-E / T) the compliance
-times T is the prior covariance of B u. P. C. Hansen, SIAM Review 34 (1992) 561-580, for the L-curve.
+5.4.2, for leaving one out: with the prior exp(-E / T) the compliance times T is the prior covariance of B u.
+P. C. Hansen, SIAM Review 34 (1992) 561-580, for the L-curve.
 """
 
 from dataclasses import dataclass
@@ -70,12 +70,6 @@ class MarkerForces:
             residual_without=np.linalg.solve(blocks, scaled[..., None])[..., 0] / root,
             energy=0.5 * float(forces.ravel() @ self.compliance @ forces.ravel()),
         )
-
-    def log_evidence(self, scale: float, factor: float = 1.0) -> float:
-        """Log evidence of d up to a constant, for W = scale / σ² and the prior exp(-E / (factor scale))."""
-        values, _ = self._modes
-        spread = 1 + factor * values
-        return -0.5 * float((self._in_modes**2 / spread).sum() / scale + np.log(spread).sum())
 
 
 def residual_phrase(residual: FloatArray, residual_without: FloatArray) -> str:

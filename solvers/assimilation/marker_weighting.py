@@ -31,10 +31,6 @@ class MarkerWeighting(MarkerSettings):
             value = getattr(self, setting)
             if value is not None and not 0 <= value < np.inf:
                 raise UserError(f"{self.solver_name}: {setting} must be zero or more, got {value}")
-        if self.choose == "evidence" and self.weights != "precision":
-            raise UserError(
-                f"{self.solver_name}: choose=evidence needs weights=precision: the paper's are no precision"
-            )
 
     @classmethod
     def of(cls, solver: Solver) -> "MarkerWeighting":
@@ -63,23 +59,17 @@ class MarkerWeighting(MarkerSettings):
         return misfit_of(problem, self)
 
     def curve(self, forces: MarkerForces) -> dict[str, FloatArray]:
-        """The L-curve: energy, misfits and, for "precision", evidence over the factors of the weights."""
+        """The L-curve: energy and misfits over the factors of the weights."""
         fits = [forces.fit(factor) for factor in FACTORS]
-        columns = {
+        return {
             "weight_factor": FACTORS,
             "curve_energy": np.array([fit.energy for fit in fits]),
             "curve_in_sample_mm": np.array([root_mean_square(fit.residual) for fit in fits]),
             "curve_left_out_mm": np.array([root_mean_square(fit.residual_without) for fit in fits]),
         }
-        if self.weights == "precision":
-            evidence = [forces.log_evidence(self.scale, factor) for factor in FACTORS]
-            columns["curve_log_evidence"] = np.array(evidence)
-        return columns
 
     def factor(self, forces: MarkerForces) -> float:
         """The factor chosen."""
         if self.choose == "given":
             return 1.0
-        curve = self.curve(forces)
-        lost = curve["curve_left_out_mm"] if self.choose == "left-out" else -curve["curve_log_evidence"]
-        return float(FACTORS[lost.argmin()])
+        return float(FACTORS[self.curve(forces)["curve_left_out_mm"].argmin()])

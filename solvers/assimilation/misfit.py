@@ -26,7 +26,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Problem
 
 Weighting = Literal["paper", "precision"]
-Choice = Literal["given", "left-out", "evidence"]
+Choice = Literal["given", "left-out"]
 
 MIN_STANDARD_DEVIATION = 0.005
 """Minimum standard deviation of an observation, mm: a well-calibrated camera's; simulated ones have none."""
@@ -49,7 +49,7 @@ class MarkerSettings:
         contact_deviation: Standard deviation of the contact's displacement about the prescribed one, mm: a
             spring of stiffness scale / contact_deviation² between contact and indenter, or none if zero.
         choose: Factor of the weights: "given" (one), or of `FACTORS` the one with the least error at markers
-            left out one at a time ("left-out") or with the largest evidence ("evidence", for "precision").
+            left out one at a time ("left-out").
     """
 
     weights: Weighting = "paper"

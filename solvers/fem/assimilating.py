@@ -17,7 +17,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerForces, residual_phrase
 from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
 from pinnray.solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
-from pinnray.solvers.assimilation.pictures import FreePictures
+from pinnray.solvers.assimilation.picture_frames import FreePictures
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium

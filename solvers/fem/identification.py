@@ -12,7 +12,7 @@ import ufl
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import Registration
+from pinnray.geometry.picture_frame import Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import COST_CHANGE
@@ -29,8 +29,7 @@ from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
 from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.identification.settings import IdentifyingSolver
-from pinnray.solvers.identification.tracker import ForceTracker
-from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
+from pinnray.solvers.identification.unknowns import Unknowns
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import Solution, Status
@@ -246,21 +245,6 @@ class FemIdSolver(IdentifyingSolver):
     ) -> Identifier:
         body = partial(FemBody, degree=self.degree)
         return Identifier(self, problem, body, cost_change=cost_change, flexibility=flexibility)
-
-
-def fem_force_tracker(
-    problem: Problem, points: FloatArray, radius: float, *, degree: int = 2
-) -> ForceTracker:
-    """The force tracker of a finger.
-
-    Args:
-        problem: The finger, with a law of finite strain; its load only gives the drawn contact.
-        points: Markers at rest, shape (m, 2), mm, in the drawn body.
-        radius: Of the markers' discs, mm; less is taken where one is nearer to the boundary.
-        degree: Of the elements, 1 or 2.
-    """
-    unknowns = Unknowns(replace(problem, observations=None), DEFAULT)
-    return ForceTracker(ResponseModel(FemBody(unknowns, degree), unknowns), points, radius)
 
 
 def _interpolated(fit: Fit, model: ResponseModel) -> Response:

@@ -302,9 +302,8 @@ def _strain_over_break(material: Material, strain: float) -> float:
 def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, Interval]:
     """The 95 % intervals of force and stress that a solver knows."""
     found: dict[str, Interval] = {}
-    if solution.identified is not None:
-        _, low, high = solution.identified.size
-        found["force"] = depth * low, depth * high
+    if solution.identified is not None and (along := solution.identified.along) is not None:
+        found["force"] = depth * along.low, depth * along.high
     known = solution.uncertainty
     if known is not None and known.von_mises is not None and np.isfinite(stress.value):
         half = NORMAL * float(known.von_mises(solution.problem.mesh.locate(stress.place[None]))[0])

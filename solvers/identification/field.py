@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.wall_motion import WallMotion
-from pinnray.geometry.registration import Pictures
+from pinnray.geometry.picture_frame import Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import deformation_jacobian
 from pinnray.solvers.identification.body import Body
@@ -16,7 +16,7 @@ from pinnray.solvers.identification.boundary import RigidMotion
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.unknowns import doubt_of_the_plane
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.solution import DisplacementField, State
+from pinnray.solvers.solution import State
 
 STEP = 1e-3
 """Difference quotient's step in standard errors: the error of first order is a thousandth of a deviation."""
@@ -37,15 +37,10 @@ class Snapshot:
     state: FloatArray  # Its displacement without the clamp's
     pictures: Pictures  # Frames of the observations' pictures
 
-    @property
-    def drawn(self) -> DisplacementField:
-        """The displacement without the clamp's, as a function of the drawn position."""
-        return self.body.field(self.state)
-
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement of the material drawn at points, shape (n, 2), mm."""
         places = location.points + self.walls.shifts(location, self.changes)
-        return self.clamp.moved(places + self.drawn.displacement(location)) - places
+        return self.clamp.moved(places + self.body.field(self.state).displacement(location)) - places
 
     def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
         """Displacement of the material that is at points before the load, to first order, (n, 2), mm."""
@@ -53,7 +48,7 @@ class Snapshot:
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Gradient of the displacement by the place before the load, shape (n, 2, 2)."""
-        return self._gradient(self.drawn.gradient(location), location)
+        return self._gradient(self.body.field(self.state).gradient(location), location)
 
     def _gradient(self, drawn: FloatArray, location: LocatedPoints) -> FloatArray:
         """`gradient` from the gradient by the drawn position without the clamp, both of shape (n, 2, 2)."""

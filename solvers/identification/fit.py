@@ -18,10 +18,22 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
-from pinnray.solvers.identification.unknowns import doubt_of_the_plane, log_prior
+from pinnray.solvers.identification.unknowns import CONTACT, LAW_ODDS, SHARE, Unknowns, doubt_of_the_plane
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
+SOURCES = {
+    "third dimension": "the third dimension, of which markers tell nothing: weigh one press; the ratio of "
+    "its force to that found here holds for other presses of the finger",
+    "markers": "the errors of the markers: film nearer or sharper, or use more markers",
+    "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
+    "contact": "place, width and pressure of the contact: put markers nearer to it",
+    "finger": "walls, clamp and Poisson's ratio: measure the walls, and leave those that are as drawn out of "
+    "the parameters",
+    "frames": "the frames of the pictures: show fiducials, and fix the camera",
+    "law": "the choice between the laws: give --law, or press farther",
+}
+"""What the variance of a force comes from, and what would narrow its interval."""
 
 
 class Fit(NamedTuple):
@@ -50,7 +62,7 @@ class Fit(NamedTuple):
     @property
     def log_posterior(self) -> float:
         """Logarithm of the law's probability, up to a constant that all laws share."""
-        return self.log_evidence + log_prior(self.law)
+        return self.log_evidence + float(np.log(LAW_ODDS.get(self.law, 1.0)))
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -65,21 +77,60 @@ class Fit(NamedTuple):
     @property
     def force(self) -> tuple[float, float]:
         """Size of the indenter's force and its standard deviation, N/mm."""
-        unknowns, force = self.model.unknowns, self.response.hypothesis.force
-        size = float(np.linalg.norm(force))
-        along = force / size if size else unknowns.directions[0]
-        slopes = unknowns.slopes(self.response.values).force @ along
-        doubt = doubt_of_the_plane(unknowns.problem) * size
-        return size, float(np.hypot(np.linalg.norm(slopes @ self.standard_errors), doubt))
+        return size_of(self.model.unknowns, self.response.values, self.standard_errors)
 
     @property
     def place(self) -> tuple[float, float] | None:
         """Abscissa on the drawn front at which the force acts, and its standard deviation, mm; if unknown."""
-        names = self.model.unknowns.names
-        if "position" not in names:
+        unknowns = self.model.unknowns
+        if "position" not in unknowns.names:
             return None
-        along = np.array([float(name in ("position", "eccentricity")) for name in names])
-        # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
-        couple = 0.25 * mean_thickness(self.model.unknowns.problem.mesh)
-        deviation = float(np.hypot(np.linalg.norm(along @ self.standard_errors), couple))
-        return float(along @ self.estimate.values), deviation
+        return place_of(unknowns, self.response.values, self.standard_errors)
+
+    def component(self, direction: FloatArray) -> tuple[float, float]:
+        """Component of the indenter's force in a direction, (2,), and its standard deviation, N/mm."""
+        return component_of(self.model.unknowns, self.response.values, self.standard_errors, direction)
+
+    def variances(self, direction: FloatArray) -> dict[str, float]:
+        """Variance of that component, (N/mm)^2, by what it comes from: names of `SOURCES`.
+
+        With the estimate's error C A^T e - C p, for unit errors e of the observations and p of the priors, it
+        is the sum of independent parts. Where φ is above one, all but 1 / φ^2 of the observations' is misfit.
+        """
+        found, unknowns = self.estimate, self.model.unknowns
+        slopes = unknowns.slopes(self.response.values).force @ direction * found.slopes
+        spread = found.quantile / NORMAL * found.covariance @ slopes
+        noise, misfit = float(((found.sensitivities @ spread) ** 2).sum()), 1 - 1 / found.inflation**2
+        value = float(self.response.hypothesis.force @ direction)
+        parts = dict.fromkeys(SOURCES, 0.0)
+        parts["third dimension"] = (doubt_of_the_plane(unknowns.problem) * value) ** 2
+        parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
+        for name, part in zip(unknowns.names, spread.tolist(), strict=True):
+            contact, frame = name in (*CONTACT, SHARE), name.startswith(("pressed", "drawn"))
+            parts["contact" if contact else "frames" if frame else "finger"] += part**2
+        return parts
+
+
+def size_of(unknowns: Unknowns, values: FloatArray, errors: FloatArray) -> tuple[float, float]:
+    """Size of the force for values, (p,), with independent errors, (p, k), and its deviation, N/mm."""
+    force = unknowns.hypothesis(values).force
+    size = float(np.linalg.norm(force))
+    return component_of(unknowns, values, errors, force / size if size else unknowns.directions[0])
+
+
+def component_of(
+    unknowns: Unknowns, values: FloatArray, errors: FloatArray, direction: FloatArray
+) -> tuple[float, float]:
+    """As `size_of`, the component in a direction, shape (2,)."""
+    component = float(unknowns.hypothesis(values).force @ direction)
+    slopes = unknowns.slopes(values).force @ direction
+    doubt = doubt_of_the_plane(unknowns.problem) * component
+    return component, float(np.hypot(np.linalg.norm(slopes @ errors), doubt))
+
+
+def place_of(unknowns: Unknowns, values: FloatArray, errors: FloatArray) -> tuple[float, float]:
+    """As `size_of`, the abscissa on the drawn front at which the force acts, mm."""
+    along = np.isin(unknowns.names, ("position", "eccentricity")).astype(np.float64)
+    # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
+    couple = 0.25 * mean_thickness(unknowns.problem.mesh)
+    return float(along @ values), float(np.hypot(np.linalg.norm(along @ errors), couple))

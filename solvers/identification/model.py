@@ -9,7 +9,7 @@ where the base is held; at its feet c' is their motion, and ∂F/∂θ the force
 
 A marker is at a fixed place P of the drawn body; where the walls have moved by W, the material there was
 drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
-`pinnray.geometry.registration` has what pictures show of that whose frames are unknown.
+`pinnray.geometry.picture_frame` has what pictures show of that whose frames are unknown.
 """
 
 from dataclasses import dataclass, replace
@@ -22,6 +22,7 @@ from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Prediction
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
+from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
@@ -130,7 +131,7 @@ class ResponseModel:
         rows = body.displacement_rows(points, means)
         moved_rows = [-body.gradient_rows(points, means[:, :, None] * shift) for shift in shifts]
         if any(name.startswith("drawn") for name in self.unknowns.names):
-            still = self.unknowns.homography("drawn", {})
+            still = pictures_of(self.unknowns.centre, {}).drawn
             moved_rows += [body.gradient_rows(points, means[:, :, None] * by) for by in still.slopes(points)]
         return rows, np.array(moved_rows).reshape(-1, *rows.shape)
 

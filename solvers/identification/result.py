@@ -10,7 +10,7 @@ from pinnray.solvers.assimilation.estimation import LEVEL
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
-from pinnray.solvers.identification.fit import NORMAL, Fit
+from pinnray.solvers.identification.fit import NORMAL, SOURCES, Fit
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import (
     Estimated,
@@ -18,6 +18,7 @@ from pinnray.solvers.solution import (
     Solution,
     Status,
     Uncertainty,
+    along_travel,
     unstable_phrase,
 )
 
@@ -65,7 +66,21 @@ class Identified:
         """The force and its place: the mean over the laws, with an interval that holds their scatter."""
         size = self._mean([fit.force for fit in self.fits])
         places = [place for fit in self.fits if (place := fit.place)]
-        return IdentifiedForce(size._replace(low=max(size.low, 0.0)), self._mean(places) if places else None)
+        travel = along_travel(self.best.model.unknowns.problem.load)
+        components = [fit.component(travel) for fit in self.fits]
+        along = self._mean(components)
+        found = np.array([value for value, _ in components]) - along.value
+        parts = self.best.variances(travel) | {"law": float(self.probabilities @ found**2)}
+        whole = sum(parts.values()) or 1.0
+        shares = {name: parts[name] / whole for name in sorted(parts, key=parts.__getitem__, reverse=True)}
+        first, share = next(iter(shares.items()))
+        return IdentifiedForce(
+            size._replace(low=max(size.low, 0.0)),
+            self._mean(places) if places else None,
+            along,
+            shares,
+            f"{share:.0%} of the variance of the force comes from {SOURCES[first]}.",
+        )
 
     def _mean(self, found: Sequence[tuple[float, float]]) -> Estimated:
         """The mean over the laws of a value with its standard deviation by each."""
@@ -238,9 +253,7 @@ class Identified:
         parts.append(f"markers missed by {np.sqrt((missed**2).mean()):.2g} mm (root mean square)")
         if found.inflation > 1:
             parts.append(
-                f"{found.inflation:.3g} times their standard deviations: no values of these parameters "
-                "explain them, so the model is wrong elsewhere and they make up for that; intervals are as "
-                "much wider"
+                f"{found.inflation:.3g} times their standard deviations; intervals are as much wider"
             )
         if unresolved := [
             f"{u.name} ({share:.0%})"

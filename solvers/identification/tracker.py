@@ -17,10 +17,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri, ndtri
+from scipy.optimize import lsq_linear
+from scipy.special import chdtri
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.runtime.errors import ShapeError, UserError
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import (
     LEVEL,
     degrees_of_freedom,
@@ -29,8 +30,9 @@ from pinnray.solvers.assimilation.estimation import (
     values_of,
 )
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
+from pinnray.solvers.identification.fit import NORMAL, place_of, size_of
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, SHARE, doubt_of_the_plane
+from pinnray.solvers.identification.unknowns import CONTACT, SHARE
 
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
@@ -92,18 +94,13 @@ class ForceTracker:
         model: The finger, with `normal_force` and `position` among its unknowns.
         points: The m markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of their discs, mm; less is taken where one is nearer to the boundary.
-
-    Raises:
-        UserError: If the unknowns lack the force or its place.
     """
 
     def __init__(self, model: ResponseModel, points: FloatArray, radius: float) -> None:
         self._unknowns, names = model.unknowns, model.unknowns.names
-        if missing := {"normal_force", "position"} - set(names):
-            raise UserError(f"a force is followed with {' and '.join(sorted(missing))} among the unknowns")
         self._model, self.law = model, model.unknowns.problem.material.law
         self._parameters = model.unknowns.parameters(model.flexibility())
-        self._bounds = np.array([parameter.bounds for parameter in self._parameters]).T
+        self._bounds = tuple(np.array([parameter.bounds for parameter in self._parameters]).T)
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
         measurement = MarkerData(points, still, still, inside, np.arange(len(points)))
         self._markers = MarkerModel(model, measurement)
@@ -123,17 +120,8 @@ class ForceTracker:
             displacements: Of the markers since rest, shape (m, 2), mm; any value where one is hidden.
             deviations: Their standard deviations, shape (m, 2), mm; `MIN_STANDARD_DEVIATION` at least.
             visible: Mask of the markers that were seen, shape (m,).
-
-        Raises:
-            ShapeError: If the arrays have other numbers of markers.
         """
-        started, shape = time.perf_counter(), self._markers.measurement.points.shape
-        if displacements.shape != shape or deviations.shape != shape or visible.shape != shape[:1]:
-            raise ShapeError(
-                f"a frame has displacements and deviations of shape {shape} and a mask of shape {shape[:1]}, "
-                f"got {displacements.shape}, {deviations.shape} and {visible.shape}"
-            )
-        self._evaluations = 0
+        started, self._evaluations = time.perf_counter(), 0
         reading = self._updated(displacements, deviations, visible)
         return replace(reading, evaluations=self._evaluations, seconds=time.perf_counter() - started)
 
@@ -187,33 +175,18 @@ class ForceTracker:
 
     def _posterior(self, prior: _Prior, slopes: FloatArray, residuals: FloatArray) -> _Posterior:
         """The minimum for residuals (n,) over σ at the last equilibrium and their derivatives (n, p)."""
-        z, inflation = self._last.z, 1.0
-        spread = np.linalg.inv(np.linalg.cholesky(prior.precision)).T
+        root, inflation = np.linalg.cholesky(prior.precision).T, 1.0
+        spread = np.linalg.inv(root)
+        observed = slopes @ self._last.z - residuals
         for _ in range(20):  # φ is known to a thousandth much earlier
-            a, r = slopes / inflation, residuals / inflation
-            curvature = a.T @ a + prior.precision
-            gradient = np.asarray(a.T @ r + prior.precision @ (z - prior.mean), dtype=np.float64)
-            found = self._bounded(z, curvature, gradient)
-            freedom = degrees_of_freedom(a @ spread)
-            used, inflation = inflation, inflation_of(residuals + slopes @ (found - z), freedom)
+            rows = np.vstack([slopes / inflation, root])
+            right = np.concatenate([observed / inflation, root @ prior.mean])
+            z = np.asarray(lsq_linear(rows, right, self._bounds, method="bvls").x)
+            freedom = degrees_of_freedom(slopes @ spread / inflation)
+            used, inflation = inflation, inflation_of(slopes @ z - observed, freedom)
             if abs(inflation / used - 1) < 1e-3:
                 break
-        return _Posterior(found, np.linalg.inv(curvature), used, quantile_of(used, freedom))
-
-    def _bounded(self, z: FloatArray, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Minimum of a quadratic within the bounds: an unknown that leaves them is held at its bound."""
-        free = np.ones(len(z), dtype=bool)
-        found = z.copy()
-        for _ in z:
-            held = np.where(free, 0.0, found - z)
-            pulled = -gradient - curvature @ held
-            found[free] = z[free] + np.linalg.solve(curvature[np.ix_(free, free)], pulled[free])
-            outside = (found < self._bounds[0]) | (found > self._bounds[1])
-            if not outside.any():
-                break
-            found = np.clip(found, *self._bounds)
-            free &= ~outside
-        return found
+        return _Posterior(z, np.linalg.inv(rows.T @ rows), used, quantile_of(used, freedom))
 
     def _linearised(self, z: FloatArray) -> _Linearised | None:
         """The markers about the equilibrium at z; None if there is none.
@@ -243,26 +216,19 @@ class ForceTracker:
 
     def _reading(self, found: _Posterior, status: str) -> ForceReading:
         values, derivatives = values_of(self._parameters, found.z)
-        directions = self._unknowns.slopes(values).force
-        by_z = directions * derivatives[:, None]
-        spread = by_z.T @ found.covariance @ by_z
-        force = values @ directions
-        size = float(np.linalg.norm(force))
-        along = force / size if size else self._unknowns.directions[0]
-        doubt = doubt_of_the_plane(self._unknowns.problem) * size
-        half = found.quantile * float(np.hypot(np.sqrt(along @ spread @ along), doubt))
-        wider = found.quantile / float(ndtri((1 + LEVEL) / 2))
-        may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chdtri(len(force), 1 - LEVEL)
-        of_place = np.isin(self._unknowns.names, ("position", "eccentricity")).astype(np.float64)
-        place, place_by_z = float(of_place @ values), of_place * derivatives
-        around = found.quantile * np.sqrt(place_by_z @ found.covariance @ place_by_z)
-        ends = np.clip(place + around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
+        errors = found.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(found.covariance)
+        force = self._unknowns.hypothesis(values).force
+        size, deviation = size_of(self._unknowns, values, errors)
+        by_errors = self._unknowns.slopes(values).force.T @ errors
+        may_be_none = force @ np.linalg.solve(by_errors @ by_errors.T, force) < chdtri(len(force), 1 - LEVEL)
+        place, around = place_of(self._unknowns, values, errors)
+        ends = np.clip(place + NORMAL * around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
         return replace(
             self._unknown(status),
             force=force,
             size=size,
-            low=0.0 if may_be_none else max(size - half, 0.0),
-            high=size + half,
+            low=0.0 if may_be_none else max(size - NORMAL * deviation, 0.0),
+            high=size + NORMAL * deviation,
             position=place,
             position_low=float(ends[0]),
             position_high=float(ends[1]),

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.runtime.arrays import BoolArray
 from pinnray.solvers.identification.field import IdentifiedField
 from pinnray.solvers.identification.model import EXACT, Response, ResponseModel
 from pinnray.solvers.problem import Problem, contact_ends
@@ -53,12 +52,6 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
     )
 
 
-def _loaded(model: ResponseModel) -> BoolArray:
-    """Mask of the unknowns that are in proportion to the load, shape (p,)."""
-    loaded = ("normal_force", "tangential_force", *model.unknowns.feet.names)
-    return np.isin(model.unknowns.names, loaded)
-
-
 def _response(model: ResponseModel, start: Response, share: float, shift: float) -> Response:
     """The response at a share of the contact's displacement, the contact shifted along x by mm.
 
@@ -66,7 +59,7 @@ def _response(model: ResponseModel, start: Response, share: float, shift: float)
     """
     names, into = model.unknowns.names, model.unknowns.directions[0]
     target = share * float(start.contact @ into)
-    force = _loaded(model)
+    force = np.isin(names, ("normal_force", "tangential_force", *model.unknowns.feet.names))
     direction, values = np.where(force, start.values, 0.0), np.where(force, 0.0, start.values)
     if "position" in names:
         values[names.index("position")] += shift

@@ -1,5 +1,6 @@
 """The unknowns of the inverse problem, their priors, and the finger and contact that they describe."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import log
@@ -8,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pinnray.geometry.mesh.wall_motion import WallMotion
-from pinnray.geometry.registration import PARTS, Homography, Pictures
+from pinnray.geometry.picture_frame import PARTS, Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Parameter
-from pinnray.solvers.assimilation.pictures import picture_parameters
+from pinnray.solvers.assimilation.picture_frames import picture_parameters, pictures_of
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
 from pinnray.solvers.identification.boundary import Feet, FrontTraction
 from pinnray.solvers.problem import Material, Problem, contact_ends
@@ -36,11 +37,6 @@ neo-Hookean law up to strains of 0.3 (L. R. G. Treloar, The physics of rubber el
 chapter 5), and in plane strain so does every incompressible body of Mooney and Rivlin, whose two invariants
 are one there. With odds of 3 to 1, noise decided, and the force of a film was 12 % off."""
 LAWS = tuple(LAW_ODDS)
-
-
-def log_prior(law: LawName) -> float:
-    """Logarithm of a law's odds before the markers are seen."""
-    return log(LAW_ODDS.get(law, 1.0))
 
 
 def doubt_of_the_plane(problem: Problem) -> float:
@@ -97,7 +93,7 @@ class Unknowns:
         self.traction, self.motion = FrontTraction(problem.mesh), WallMotion.of(problem.mesh)
         self.feet = Feet(problem.mesh, held="feet" not in names)
         seen = problem.observations
-        self._centre = np.zeros(2) if seen is None else seen.points.mean(axis=0)
+        self.centre = np.zeros(2) if seen is None else seen.points.mean(axis=0)
         self._pictures = [] if seen is None else picture_parameters(seen)
         finger = [name for name in names if name not in (*WALLS, "feet") or name in self.motion.names]
         if problem.load.friction:
@@ -171,39 +167,36 @@ class Unknowns:
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
             feet=np.array([named.get(name, 0.0) for name in self.feet.names]),
-            pictures=Pictures(*(self.homography(picture, named) for picture in ("pressed", "drawn"))),
+            pictures=pictures_of(self.centre, named),
         )
 
     def slopes(self, values: FloatArray) -> HypothesisSlopes:
         """Derivatives of the hypothesis of values, shape (p,)."""
         named, material = self._named(values), self.material(values)
-        parts = {picture: [f"{picture}_{part}" for part in PARTS] for picture in ("pressed", "drawn")}
-        known = (
-            *NAMES,
-            SHARE,
-            *self.motion.names,
-            *self.feet.names,
-            *parts["pressed"],
-            *parts["drawn"],
-        )
-        by = {name: np.zeros(len(self.names)) for name in known}
-        by |= dict(zip(self.names, np.eye(len(self.names)), strict=True))
+        count = len(self.names)
+        by: dict[str, FloatArray] = defaultdict(lambda: np.zeros(count))
+        by |= zip(self.names, np.eye(count), strict=True)
         young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
         normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
         along = by["tangential_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
+
+        def stacked(names: Sequence[str]) -> FloatArray:
+            """Derivatives (p, k) of k numbers, of which those that are no unknowns have none."""
+            return np.array([by[name] for name in names]).reshape(-1, count).T
+
         return HypothesisSlopes(
             position=by["position"],
             width=by["width"],
             force=np.stack([by["normal_force"], along], axis=1) @ self.directions,
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
-            changes=np.array([by[name] for name in self.motion.names]).reshape(-1, len(self.names)).T,
+            changes=stacked(self.motion.names),
             softness=by["base_compliance"] / young - compliance / young**2 * by["young"],
-            feet=np.array([by[name] for name in self.feet.names]).reshape(-1, len(self.names)).T,
-            pressed=np.stack([by[name] for name in parts["pressed"]], axis=1),
-            drawn=np.stack([by[name] for name in parts["drawn"]], axis=1),
+            feet=stacked(self.feet.names),
+            pressed=stacked([f"pressed_{part}" for part in PARTS]),
+            drawn=stacked([f"drawn_{part}" for part in PARTS]),
         )
 
     def material(self, values: FloatArray) -> Material:
@@ -211,10 +204,6 @@ class Unknowns:
         named = self._named(values)
         changed = {name: value for name, value in named.items() if name in ("young", "poisson")}
         return self.problem.material.model_copy(update=changed)
-
-    def homography(self, picture: str, named: Mapping[str, float]) -> Homography:
-        """The homography of `pressed` or `drawn` pictures with values by name, zero for the rest."""
-        return Homography(self._centre, np.array([named.get(f"{picture}_{part}", 0.0) for part in PARTS]))
 
     def _named(self, values: FloatArray) -> dict[str, float]:
         return dict(zip(self.names, map(float, values), strict=True))

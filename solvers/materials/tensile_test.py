@@ -5,24 +5,37 @@ the least-squares modulus is Σ s σ / Σ s² with the stress s of a bar of unit
 is the one at which the transverse stress vanishes.
 """
 
-import csv
+import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from scipy.optimize import brentq
 
-from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.tables import percent, read_table
 from pinnray.solvers.elasticity import LawName, lame_constants, stress_of
 from pinnray.solvers.problem import Material
 
 LAWS: tuple[LawName, ...] = ("linear", "neo-hookean", "st-venant-kirchhoff")
-STRAINS = {"strain": 1.0, "strain_percent": 0.01, "strain_%": 0.01}
-STRESSES = {"stress_MPa": 1.0, "stress_kPa": 1e-3, "stress_Pa": 1e-6}
-"""Columns that are read, with the factor to a ratio and to MPa."""
+UNITS = {
+    "strain": {"": 1.0, "ratio": 1.0, "mm/mm": 1.0, "-": 1.0, "percent": 0.01, "%": 0.01},
+    "stress_MPa": {"mpa": 1.0, "n/mm2": 1.0, "n/mm²": 1.0, "kpa": 1e-3, "pa": 1e-6, "psi": 6.894757e-3},
+}
+"""Units of the columns that are read, in lower case, with the factor to a ratio and to MPa."""
+TITLES = {
+    name: rf"(?:(?:nominal|engineering|eng\.?|tensile|axial)[\s_]+)*{word}[\s_/,]*(?:in\s+)?"
+    rf"[(\[]?\s*(?P<unit>|{'|'.join(map(re.escape, UNITS[name]))})\s*[)\]]?"
+    for name, word in (("strain", "(?:strain|dehnung)"), ("stress_MPa", "(?:stress|spannung)"))
+}
+"""Titles of the columns, in English and German; those of true strain and stress are none."""
+MOST_RATIO = 10.0
+"""Strain from which on a column without a unit must be per cent: no elastomer is drawn so far."""
+FALL = 0.03
+"""Fall of the stress, over its peak, from which on a test is not one rising curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,30 +117,63 @@ def nominal_stress(law: LawName, strain: FloatArray, poisson: float) -> FloatArr
 
 
 def read_tensile_test(path: Path) -> TensileTest:
-    """Read a CSV file with a column of nominal strain and one of nominal stress, units in their names.
+    """Read a table with a column of nominal strain and one of nominal stress, units in their titles.
+
+    Of a test that goes back or falls, as after the break, the first loading up to the peak counts, with a
+    warning.
 
     Raises:
-        UserError: If a column is missing, a cell is no number, or there are fewer than three points.
+        UserError: If a column or its unit is missing, a cell is no number, there are fewer than three points,
+            or strains without a unit are too large for ratios.
     """
-    try:
-        table = pd.read_csv(path, comment="#", sep=None, engine="python", skipinitialspace=True)
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror or error}") from None
-    except (ValueError, csv.Error) as error:  # no table, or no text
-        raise UserError(f"{path} is no table of a tensile test: {' '.join(str(error).split())}") from None
-    columns = []
-    for known in (STRAINS, STRESSES):
-        name = next((each for each in table.columns if each in known), None)
-        if name is None:
-            there = ", ".join(map(str, table.columns))
-            raise UserError(f"{path}: a column {' or '.join(known)} is needed; there is {there}")
-        values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64) * known[name]
-        if not np.isfinite(values).all():
-            row = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise UserError(f"{path}: {name} of row {row + 1} is {table[name][row]!r}, which is no number")
-        columns.append(values)
-    strain, stress = columns
+    table = read_table(path, "tensile test", TITLES)
+    values = np.array(table.numbers()).reshape(-1, 2)
+    strain, stress = values[np.isfinite(values[:, 0])].T
+    strain = strain * _factor(path, "strain", table.titles["strain"])
+    stress = stress * _factor(path, "stress_MPa", table.titles["stress_MPa"])
     loaded = strain > 0
-    if loaded.sum() < 3:
+    strain, stress = strain[loaded], stress[loaded]
+    if len(strain) and strain.max() >= MOST_RATIO and _unit("strain", table.titles["strain"]) == "":
+        raise UserError(
+            f"{path}: strains up to {strain.max():g} are not ratios; are they per cent? Then call the column "
+            "strain_percent, else strain_ratio"
+        )
+    kept = _first_loading(strain, stress)
+    if kept.sum() < 3:
         raise UserError(f"{path}: three points or more with a strain above zero are needed")
-    return TensileTest(strain[loaded], stress[loaded], str(path))
+    if not kept.all():
+        fault = "its strain goes back" if (np.diff(strain) < 0).any() else "its stress falls after the peak"
+        warnings.warn(
+            f"{path}: {fault}; of its {len(kept)} points the {kept.sum()} of the loading up to the peak "
+            f"count, to a strain of {percent(float(strain[kept].max()))} and {stress[kept].max():.4g} MPa",
+            stacklevel=2,
+        )
+    return TensileTest(strain[kept], stress[kept], str(path))
+
+
+def _unit(name: str, title: str) -> str:
+    found = re.fullmatch(TITLES[name], title, re.I)
+    return found["unit"].lower() if found else ""
+
+
+def _factor(path: Path, name: str, title: str) -> float:
+    """Factor of a column to a ratio or to MPa, by the unit in its title."""
+    if (unit := _unit(name, title)) not in UNITS[name]:
+        raise UserError(f"{path}: the column {title!r} says no unit; call it {name}, or with another unit")
+    return UNITS[name][unit]
+
+
+def _first_loading(strain: FloatArray, stress: FloatArray) -> BoolArray:
+    """Points of the first loading up to the peak of the stress; all if they lie on one rising curve.
+
+    Args:
+        strain: In the order of the test or, on one curve, in any other, shape (n,).
+        stress: Likewise.
+    """
+    along = stress[np.argsort(strain, kind="stable")]
+    falls = np.maximum.accumulate(along) - along
+    if not falls.max(initial=0) > FALL * stress.max(initial=0):
+        return np.ones(len(strain), dtype=bool)
+    ahead = strain > np.maximum.accumulate(np.append(0.0, strain[:-1]))
+    peak = int(np.where(ahead, stress, -np.inf).argmax())
+    return np.asarray(ahead & (np.arange(len(strain)) <= peak))

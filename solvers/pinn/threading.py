@@ -68,11 +68,9 @@ def pool() -> Iterator[ThreadPoolExecutor | _ThisThread]:
         return
     _keep_freed_memory()
     threads = torch.get_num_threads()
-    with (
-        torch_threads(1),
-        threadpool_limits(1, user_api="blas"),
-        ExitStack() as stack,
-    ):
+    with threadpool_limits(1, user_api="blas"), ExitStack() as stack:
+        stack.callback(torch.set_num_threads, threads)
+        torch.set_num_threads(1)
         made: ThreadPoolExecutor | _ThisThread = _ThisThread()
         if threads > 1:
             executor = ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,))
@@ -96,17 +94,6 @@ def _keep_freed_memory() -> None:
         trim_threshold, mmap_threshold, size = -1, -3, 2**25
         mallopt(trim_threshold, 8 * size)
         mallopt(mmap_threshold, size)
-
-
-@contextmanager
-def torch_threads(count: int) -> Iterator[int]:
-    """Set torch's number of threads to `count`, unchanged if that is 0, and yield the number."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(count or before)
-    try:
-        yield count or before
-    finally:
-        torch.set_num_threads(before)
 
 
 PATCH = 192

@@ -19,7 +19,7 @@ from pinnray.geometry.mesh.boundary import evenly_spaced_points
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.misfit import standard_deviations
-from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
+from pinnray.solvers.assimilation.picture_frames import FramedData, FreePictures
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import (

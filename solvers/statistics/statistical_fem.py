@@ -30,7 +30,7 @@ import numpy as np
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import standard_deviations
-from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
+from pinnray.solvers.assimilation.picture_frames import FramedData, FreePictures
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.lagrange import LagrangeField

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.pictures import FramedData, FreePictures
+from pinnray.solvers.assimilation.picture_frames import FramedData, FreePictures
 from pinnray.solvers.energy_and_force import energy_and_force
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import DisplacementField, Solution, Status, Uncertainty

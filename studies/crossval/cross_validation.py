@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -15,13 +14,11 @@ from pinnray.comparison.evaluation.truths import experiment_source
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED
+from pinnray.geometry.picture_frame import FIXED
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.atomic import write_json
 from pinnray.runtime.content_hash import content_hash, has_source, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
-from pinnray.runtime.output_folder import check_resumable_folder, locked
 from pinnray.runtime.processes.child import ProcessFailed
 from pinnray.runtime.processes.pool import Pool, known_to_children
 from pinnray.runtime.stages import Stages
@@ -35,8 +32,8 @@ from pinnray.studies.crossval.scores import Sample, sample_table
 from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant, visible_markers
 from pinnray.studies.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from pinnray.studies.sweep.measurement import Measurement
-from pinnray.studies.sweep.store import opened
-from pinnray.studies.sweep.sweep import JOURNAL, run_tasks
+from pinnray.studies.sweep.store import resumed
+from pinnray.studies.sweep.sweep import run_tasks
 
 DEFINITION = "definition.json"
 Case = tuple[str, str]
@@ -60,7 +57,6 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
     study.check()
     given = study.measurements and visible_markers(study.measurements)
     definition = study.definition(given)
-    check_resumable_folder(study.out / DEFINITION, definition, job="cross-validation")
     with stages.stage("mesh"):
         mesh = finger_mesh(study.design, settings=study.mesh)
         if mesh.moduli is not None:
@@ -72,12 +68,11 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
         for remark in [*problem_remarks(problem), *remarks]:
             warnings.warn(remark, stacklevel=2)
     load_cases = load_cases_of(problem, others=LOAD in study.schemes and given is None)
-    study.out.mkdir(parents=True, exist_ok=True)
     threads = max(1, cores() // min(study.processes, len(study.variants)))
-    with locked(study.out), ExitStack() as stack:
-        write_json(study.out / DEFINITION, definition)  # first: a folder without it is taken for someone's
-        journal = stack.enter_context(opened(study.out / JOURNAL))
-        pool = stack.enter_context(Pool(study.processes, threads=threads))
+    with (
+        resumed(study.out / DEFINITION, definition, job="cross-validation") as (journal, _),
+        Pool(study.processes, threads=threads) as pool,
+    ):
         truths: dict[str, dict[str, list[TrueField]]] = {}
         if given:
             observations = {(given.label, given.label): [[given]] * study.seeds}

@@ -14,13 +14,13 @@ from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, PARTS, Homography, Registration
+from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.problem import Load, Material
-from pinnray.solvers.solver import Solver, check_load, check_name, with_law
+from pinnray.solvers.solver import Solver, check_law, check_load, check_name, with_law
 from pinnray.studies.crossval.folds import ALL, SCHEMES
 
 SIZES = MeshSettings(size=0.5)
@@ -61,9 +61,9 @@ def changed(solver: Solver, **changes: object) -> Solver:
 def solver_variants(
     solvers: Sequence[Solver], material: Material, *, fixed: Sequence[str] = ()
 ) -> list[SolverVariant]:
-    """A variant for each solver, and two more for one that can choose the weight of the markers in a fold.
+    """A variant for each solver, and one more for one that can choose the weight of the markers in a fold.
 
-    Those choose it from the markers that are given: by leave-one-out errors, or by the evidence.
+    That one chooses it by the leave-one-out errors of the markers that are given.
 
     Args:
         solvers: The solvers.
@@ -75,9 +75,8 @@ def solver_variants(
         variants.append(SolverVariant(solver.name, solver))
         chooses = isinstance(solver, MarkerSettings)
         if chooses and solver.name not in fixed and with_law(material, solver).law == "linear":
-            for choice in ("left-out", "evidence"):
-                chosen = changed(solver, weights="precision", choose=choice)
-                variants.append(SolverVariant(f"{solver.name} {choice}", chosen))
+            chosen = changed(solver, weights="precision", choose="left-out")
+            variants.append(SolverVariant(f"{solver.name} left-out", chosen))
     return variants
 
 
@@ -102,7 +101,6 @@ class CrossvalStudy:
             each draw chooses; the observations say so.
         measurements: Marker displacements from elsewhere; None for the virtual experiment.
         processes: Solvers run at a time.
-        picture_formats: Formats of the pictures besides PNG.
     """
 
     design: Finger
@@ -119,7 +117,6 @@ class CrossvalStudy:
     frame: Registration = FIXED
     measurements: Observations | None = None
     processes: int = field(default_factory=cores)
-    picture_formats: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", mesh_sizes(self.design, self.mesh, SIZES))
@@ -166,12 +163,11 @@ class CrossvalStudy:
 
     def check(self) -> None:
         """Raise a `UserError` for a study that cannot be done, before anything is computed."""
-        if self.layouts and self.measurements:
-            raise UserError("layouts: markers that were measured are where they are; name no layouts")
-        if not self.frame.fixed and self.measurements:
-            raise UserError("frame: the file of the measurements says how well their pictures are known")
-        if tuple(self.truths) != (SLIDING.name,) and self.measurements:
-            raise UserError("a truth is for a simulated experiment; with measurements name none")
+        simulated = self.layouts or not self.frame.fixed or tuple(self.truths) != (SLIDING.name,)
+        if simulated and self.measurements:
+            raise UserError(
+                "truths, layouts and frame are of a simulated experiment; with measurements name none"
+            )
         check_truths(self.truth_names, self.design)
         _check_distinct("layouts: a layout", self.layouts)
         for layout, points in self.markers.items():
@@ -195,6 +191,7 @@ class CrossvalStudy:
             raise UserError(
                 f"noise {self.noise:g}: give a standard deviation of zero or more, at most 100 mm"
             )
+        check_law([variant.solver for variant in self.variants], self.material)
         for variant in self.variants:
             solver = variant.solver
             check_name(solver.name)

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from pathlib import Path
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.atomic import write_arrays
 from pinnray.runtime.cache import cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
@@ -148,18 +146,6 @@ class TrueField:
     force: float  # magnitude, N/mm
     position: float  # abscissa where it acts, before the load, mm
 
-    @classmethod
-    def load(cls, path: Path) -> "TrueField":
-        """Read the file that `save` wrote."""
-        with np.load(path) as archive:
-            content = dict(archive)
-        force, position = (float(content.pop(name)) for name in ("force", "position"))
-        return cls(SampledField(**content), force, position)
-
-    def save(self, path: Path) -> None:
-        """Write atomically."""
-        write_arrays(path, {**vars(self.sampled), "force": self.force, "position": self.position})
-
 
 @dataclass(frozen=True)
 class TruthTask:
@@ -211,11 +197,9 @@ def simulate_truth(task: TruthTask, _: object = None) -> dict[str, TrueField]:
 
     return {
         layout: cached(
-            cache_folder() / f"truth-{content_hash([*parts, points.tolist()])}.npz",
+            cache_folder() / f"truth-{content_hash([*parts, points.tolist()])}.pickle",
             "the virtual experiment",
             partial(sampled, points),
-            TrueField.load,
-            TrueField.save,
         )
         for layout, points in study.markers.items()
     }

@@ -54,13 +54,13 @@ class Inputs:
         base: Parameters of the finger that the study does not vary.
 
     Raises:
-        UserError: If the study is of drawings.
+        UserError: If the study is of a drawing.
     """
 
     def __init__(self, study: Study, base: Mapping[str, Any]) -> None:
-        if "section" in {*study.fixed, *study.varied}:
+        if "section" in base:
             raise UserError(
-                f"the sweep {study.name} is of drawings, and an emulator needs the parameters of a design; "
+                f"the sweep {study.name} is of a drawing, and an emulator needs the parameters of a design; "
                 "sweep a design, or solve the drawing itself"
             )
         self.study = study
@@ -68,11 +68,7 @@ class Inputs:
         self.base = own | {name: least for name, least in LEAST_MARKERS.items() if name not in study.varied}
 
     def read(self, settings: Mapping[str, str]) -> dict[str, Value]:
-        """A finger from texts.
-
-        Raises:
-            UserError: If a text is no value of its parameter; `fault` tells all other faults.
-        """
+        """A finger from texts; see `fault`."""
         named = [(SYMBOLS.get(name, name), text) for name, text in settings.items()]
         return {
             name: _read(name, self.study.varied[name], text) if name in self.study.varied else text
@@ -85,12 +81,9 @@ class Inputs:
         Raises:
             UserError: If it cannot; the message begins with `where`.
         """
-        try:
-            finger = self.read(settings)
-            if fault := self.fault(finger):
-                raise UserError(fault)
-        except UserError as error:
-            raise UserError(f"{where}{error}") from None
+        finger = self.read(settings)
+        if fault := self.fault(finger):
+            raise UserError(f"{where}{fault}")
         return finger
 
     def fault(self, finger: Mapping[str, Value]) -> str | None:
@@ -222,18 +215,13 @@ def _contains(name: str, values: Range, value: Value) -> bool:
 
 
 def _read(name: str, values: Range, text: str) -> Value:
-    """The value of a parameter in a text."""
-    if values.values is not None:
-        if found := [each for each in values.values if _text(each).lower() == text.strip().lower()]:
-            return found[0]
-        if not _is_number(values):
-            return text.strip()
+    """The choice or number that a text stands for; a text that is neither stays, for `fault` to tell."""
+    choices, text = values.values or (), text.strip()
     try:
         number = float(text)
     except ValueError:
-        raise UserError(f"{name} = {text.strip()!r} is no number; give {_in_words(name, values)}") from None
+        return next((each for each in choices if _text(each).lower() == text.lower()), text)
     whole = name in WHOLE and number.is_integer()
-    choices = values.values or ()
     return next((each for each in choices if each == number), int(number) if whole else number)
 
 
@@ -246,10 +234,6 @@ def _in_words(name: str, values: Range) -> str:
 
 
 def _text(value: Value) -> str:
-    return (
-        str(value).lower()
-        if isinstance(value, bool)
-        else f"{value:g}"
-        if not isinstance(value, str)
-        else value
-    )
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else f"{value:g}"

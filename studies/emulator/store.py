@@ -1,22 +1,20 @@
 """The emulator of a sweep's folder, which is fitted once and kept in the cache."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
-import numpy as np
-
-from pinnray.runtime.atomic import write_arrays
 from pinnray.runtime.cache import cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.machine import package_versions
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.text_files import read_json
-from pinnray.studies.emulator.emulator import Emulator, Learnt, fitted_emulator
-from pinnray.studies.emulator.gaussian_process import GaussianProcess
+from pinnray.studies.emulator.emulator import Emulator, fitted_emulator
 from pinnray.studies.emulator.inputs import Inputs
-from pinnray.studies.sweep.sweep import STUDY_FILE, Sweep, load_sweep
+from pinnray.studies.sweep.sweep import STUDY_FILE, load_sweep
 
-PARTS = ("inputs", "weights", "factor", "lengths", "numbers")
+Fitted = TypeVar("Fitted")
 
 
 def emulator_of(folder: Path, stages: Stages | None = None) -> Emulator:
@@ -31,45 +29,26 @@ def emulator_of(folder: Path, stages: Stages | None = None) -> Emulator:
     """
     sweep = load_sweep(folder)
     inputs = Inputs(sweep.study, read_json(folder / STUDY_FILE, "sweep").get("finger", {}))
-    return cached(
-        cache_folder() / f"emulator-{digest_of(sweep, inputs)}.npz",
-        "the fit of the emulator",
-        partial(fitted_emulator, sweep, inputs, stages),
-        partial(load, inputs=inputs),
-        save,
-    )
+    known = [(sweep.samples[each.number], each.values) for each in sweep.good]
+    return kept(inputs, known, sources_digest(__name__), partial(fitted_emulator, sweep, inputs, stages))
 
 
-def digest_of(sweep: Sweep, inputs: Inputs) -> str:
-    """SHA-256 of everything that an emulator of the sweep depends on, in hexadecimal."""
-    return content_hash(
+def kept(inputs: Inputs, known: object, program: str, fit: Callable[[], Fitted]) -> Fitted:
+    """What a fit gives, from the cache if it has been fitted to the same samples by the same program.
+
+    Args:
+        inputs: Of the study.
+        known: The samples and their results, ready for JSON.
+        program: Digest of the sources of the fit.
+        fit: Fits it.
+    """
+    digest = content_hash(
         {
-            "study": sweep.study.model_dump(mode="json", exclude={"samples"}),
+            "study": inputs.study.model_dump(mode="json", exclude={"samples"}),
             "base": inputs.base,
-            "samples": [(sweep.samples[each.number], each.values) for each in sweep.good],
+            "known": known,
             "versions": package_versions(),
-            "program": sources_digest(__name__),
+            "program": program,
         }
     )
-
-
-def save(emulator: Emulator, file: Path) -> None:
-    """Write an emulator atomically."""
-    arrays = {"names": np.array(list(emulator.learnt)), "count": np.array(emulator.count)}
-    for name, learnt in emulator.learnt.items():
-        arrays[f"{name}.positive"] = np.array(learnt.positive)
-        arrays |= {f"{name}.{part}": getattr(learnt.process, part) for part in PARTS}
-    write_arrays(file, arrays)
-
-
-def load(file: Path, inputs: Inputs) -> Emulator:
-    """The emulator in a file."""
-    with np.load(file) as arrays:
-        learnt = {
-            name: Learnt(
-                GaussianProcess(*(arrays[f"{name}.{part}"] for part in PARTS)),
-                bool(arrays[f"{name}.positive"]),
-            )
-            for name in arrays["names"].tolist()
-        }
-        return Emulator(inputs, learnt, int(arrays["count"]))
+    return cached(cache_folder() / f"emulator-{digest}.pickle", "the fit of the emulator", fit)

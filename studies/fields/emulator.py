@@ -16,7 +16,8 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.elasticity import LawName
-from pinnray.solvers.physics import Load, Material
+from pinnray.solvers.load import Load
+from pinnray.solvers.material import Material
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import with_law
@@ -195,8 +196,7 @@ class FieldEmulator:
     @property
     def young(self) -> float:
         """Young's modulus of which `numbers` are, MPa."""
-        middle = {name: sum(values.ends) / 2 for name, values in self.study.varied.items() if name == "young"}
-        return self.inputs.physics(middle)[0].young
+        return self.inputs.physics(self.study.middle)[0].young
 
     @cached_property
     def law(self) -> LawName:

@@ -14,11 +14,12 @@ from pinnray.runtime.html import Packed
 from pinnray.runtime.machine import package_versions
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.lagrange import LagrangeSpace
-from pinnray.solvers.physics import Physics
+from pinnray.solvers.load import Physics
 from pinnray.studies.emulator.inputs import WIDE
 from pinnray.studies.fields.emulator import FieldEmulator
 from pinnray.studies.fields.gaussian_processes import Block
 from pinnray.studies.fields.reader import FIGURES
+from pinnray.studies.sweep.job import LEAST_MARKERS
 from pinnray.studies.sweep.study import PHYSICS, Range, Value, unit_of
 
 STEP = 2e-5
@@ -26,7 +27,7 @@ STEP = 2e-5
 strain of 4 %."""
 
 LARGEST = 0.75
-"""Stress of the last colour over the root mean square of the samples' largest one: few walls reach it."""
+"""Least stress of the last colour over the root mean square of the samples' largest one."""
 
 TITLES = {
     "force": "Grip force",
@@ -70,10 +71,12 @@ def write_explorer(emulator: FieldEmulator, path: Path) -> Path:
 def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
     """Everything that the browser needs, with arrays' places in the packed numbers."""
     study, mesh, reader = emulator.study, emulator.mesh, emulator.reader
-    middle = _middle(emulator)
+    middle = {name: round(value, 9) for name, value in study.middle.items()}
     material, load = emulator.inputs.physics(middle)
     unit = material.model_copy(update={"young": 1.0}).lame
     shape = emulator.inputs.parameters(middle)
+    own = {name: value for name, value in study.fixed.items() if name in Parameters.model_fields}
+    own |= LEAST_MARKERS if emulator.inputs.moves else {}  # those of the design may not fit thin walls
     lower = np.tril_indices(emulator.field.landmarks)
     return {
         "name": study.name,
@@ -93,9 +96,9 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
             "contact_position": shape.contact_abscissa,
             "friction": load.friction,
             "poisson": material.poisson,
-            **{name: value for name, value in study.fixed.items() if name in Parameters.model_fields},
+            **own,
         },
-        "shapeNames": [name for name in (*study.varied, *study.fixed) if name in Parameters.model_fields],
+        "shapeNames": [*(name for name in study.varied if name in Parameters.model_fields), *own],
         "baseYoung": emulator.young,
         "lame": [unit.λ, unit.μ],
         "figures": [
@@ -184,8 +187,3 @@ def _parameter(name: str, values: Range, middle: Value) -> dict[str, Any]:
         "factor": name in ("young", "depth"),
         "shape": name not in PHYSICS,
     }
-
-
-def _middle(emulator: FieldEmulator) -> dict[str, Value]:
-    """The finger in the middle of the ranges."""
-    return {name: round(sum(values.ends) / 2, 9) for name, values in emulator.study.varied.items()}

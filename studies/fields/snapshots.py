@@ -116,12 +116,9 @@ class Snapshots:
     @cached_property
     def factors(self) -> FloatArray:
         """Young's modulus of every sample over that in the middle of the range, shape (s,)."""
-        middle = {
-            name: sum(values.ends) / 2 for name, values in self.known.study.varied.items() if name == "young"
-        }
         physics = self.known.inputs.physics
         own = np.array([physics(each)[0].young for each in self.known.samples])
-        return own / physics(middle)[0].young
+        return own / physics(self.known.study.middle)[0].young
 
     @property
     def shares(self) -> FloatArray:

@@ -11,14 +11,14 @@ from pinnray.runtime.errors import UserError
 from pinnray.studies.optimum.question import Question
 from pinnray.studies.sweep.job import StudyJob, Task
 
-COMMAND = "compare with the options in {}"
-"""What a reader is told to do with a problem; the front door knows the option."""
+COMMAND = "pinnray compare --from {}"
+"""Solves the problem in a file."""
 
 PROBLEMS = "problems"
 """Folder of the problems, beside that of the designs."""
 
 
-def write_designs(job: StudyJob[Question], task: Task, path: Path, command: str = COMMAND) -> Path:
+def write_designs(job: StudyJob[Question], task: Task, path: Path) -> Path:
     """Write the design of a task's finger, and under the same name in `problems` the whole problem.
 
     `compare` takes its options from there and solves the finger as the search did, wherever the file lies.
@@ -27,7 +27,6 @@ def write_designs(job: StudyJob[Question], task: Task, path: Path, command: str 
         job: Of the search.
         task: Of the finger.
         path: Of the design.
-        command: That solves the problem in a file, `{}`, for a remark.
 
     Returns:
         The path of the design.
@@ -35,7 +34,7 @@ def write_designs(job: StudyJob[Question], task: Task, path: Path, command: str 
     changed = changed_parameters(job, task)
     problem = path.parent.with_name(PROBLEMS) / path.name
     remark = (
-        f"# The shape alone; with load, material and solver: {command.format(f'{PROBLEMS}/{problem.name}')}"
+        f"# The shape alone; with load, material and solver: {COMMAND.format(f'{PROBLEMS}/{problem.name}')}"
     )
     lines = [f"{name} = {json.dumps(value)}" for name, value in changed.items()]
     write_text(path, "\n".join([remark, *lines]) + "\n")

@@ -41,8 +41,6 @@ def write_front(
     folder: Path,
     record: dict[str, Any],
     formats: Collection[str] = (),
-    *,
-    command: str = COMMAND,
 ) -> tuple[list[Path], list[Path]]:
     """Write the table, design files, pictures and page of a front.
 
@@ -52,14 +50,13 @@ def write_front(
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
         formats: Of the pictures besides PNG.
-        command: That solves the problem in a file, `{}`.
 
     Returns:
         Page, table and pictures, and a design file for each run on the front.
     """
     tasks = {run: job.task(run, optimum.samples[run]) for run in optimum.front}
     designs = [
-        write_designs(job, task, folder / "front" / f"{place:02d}.toml", command)
+        write_designs(job, task, folder / "front" / f"{place:02d}.toml")
         for place, task in enumerate(tasks.values(), start=1)
     ]
     table = front_table(optimum).to_csv(index=False, lineterminator="\n", float_format="%.6g")
@@ -77,7 +74,7 @@ def write_front(
     pages = write_page(
         folder / PAGE,
         f"Front of {optimum.study.name}",
-        front_sentences(optimum, command),
+        front_sentences(optimum),
         [*page_tables(optimum), failure_grid(optimum)],
         drawn,
         f"{FILES}. Started {record['started']}.",
@@ -86,13 +83,8 @@ def write_front(
     return [*pages, folder / "front.csv"], designs
 
 
-def front_sentences(optimum: Optimum, command: str = COMMAND) -> list[str]:
-    """The search in sentences.
-
-    Args:
-        optimum: The search.
-        command: That solves the problem in a file, `{}`.
-    """
+def front_sentences(optimum: Optimum) -> list[str]:
+    """The search in sentences."""
     question = optimum.study
     senses = " and ".join(f"{sense} {name}" for name, sense in question.objectives.items())
     limits = []
@@ -111,7 +103,7 @@ def front_sentences(optimum: Optimum, command: str = COMMAND) -> list[str]:
         f"front: none of them is beaten in every objective by another run.{itself} "
         "An emulator proposed fingers; all numbers here are the solver's.",
         "front/01.toml is the shape of the first finger of the table, for `pinnray design`. "
-        f"`{command.format('problems/01.toml')}` solves it with load, material and solver of this search.",
+        f"`{COMMAND.format('problems/01.toml')}` solves it with load, material and solver of this search.",
     ]
 
 

@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 
-from pinnray.comparison.figures.style import HALO, axes_at, write_heading
-from pinnray.runtime.arrays import FloatArray, IntArray
-from pinnray.runtime.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.comparison.figures import body
+from pinnray.comparison.figures.canvas import Extent
+from pinnray.comparison.figures.layout import HALO, axes_at, write_heading
+from pinnray.geometry.mesh.boundary import edge_paths
+from pinnray.runtime.figure import CONTACT, MUTED, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.problem import Problem, contact_ends, front_points
 from pinnray.solvers.solution import Solution
@@ -60,35 +61,30 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
         optimum: The search.
         solutions: Solutions of the runs to draw, by their numbers.
     """
-    shapes: list[tuple[int, FloatArray, FloatArray, IntArray]] = []
-    for run, solution in solutions.items():
-        mesh = solution.problem.mesh
-        moved = mesh.points + solution.displacement(mesh.points)
-        shapes.append((run, mesh.points, moved, mesh.boundary_edges))
+    meshes = {run: solution.problem.mesh for run, solution in solutions.items()}
+    moved = {run: mesh.points + solutions[run].displacement(mesh.points) for run, mesh in meshes.items()}
     ends = {run: cylinder_at_end(solution.problem) for run, solution in solutions.items()}
-    circles = {run: circle for run, circle in ends.items() if circle is not None}
-    every = np.concatenate([points for _, rest, moved, _ in shapes for points in (rest, moved)])
-    low, high = every.min(axis=0) - 1, every.max(axis=0) + 1
-    for circle in circles.values():  # at least its lower half
-        low = np.minimum(low, np.subtract(circle.center, circle.radius))
-        high = np.maximum(high, circle.center)
-    columns = 2
-    rows = -(-len(shapes) // columns)
-    width = (WIDTH - 0.3) / columns
-    height = (width - 0.1) * (high[1] - low[1]) / (high[0] - low[0])
-    label = 0.42
-    with figure(0.55 + rows * (height + label)) as drawn:
+    halves = [  # at least the lower half of a cylinder is seen
+        np.subtract(each.center, [[each.radius, each.radius], [-each.radius, 0]])
+        for each in ends.values()
+        if each
+    ]
+    extent = Extent.around(*(mesh.points for mesh in meshes.values()), *moved.values(), *halves, margin=1)
+    columns, label = 2, 0.42
+    width = (WIDTH - 0.3) / columns - 0.1
+    height = width * extent.height / extent.width
+    with figure(0.55 + -(-len(meshes) // columns) * (height + label)) as drawn:
         write_heading(drawn, "Fingers on the front", "grey: at rest; black: under the load; all to one scale")
-        for place, (run, rest, moved, edges) in enumerate(shapes):
+        for place, (run, mesh) in enumerate(meshes.items()):
             row, column = divmod(place, columns)
-            box = (0.1 + column * (width + 0.1), 0.5 + row * (height + label) + label, width - 0.1, height)
+            box = (0.1 + column * (width + 0.2), 0.5 + row * (height + label) + label, width, height)
             axes = axes_at(drawn, box)
-            axes.add_collection(LineCollection(list(rest[edges]), colors="#b0b0b0", linewidths=0.6))
-            axes.add_collection(LineCollection(list(moved[edges]), colors=INK, linewidths=0.8))
-            if run in circles:
-                axes.add_patch(circles[run])
-            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-            axes.set_axis_off()
+            body.prepare(axes, extent)
+            paths = edge_paths(mesh.boundary_edges)
+            body.draw_outline(axes, paths, mesh.points, colour="#b0b0b0", width=0.6)
+            body.draw_outline(axes, paths, moved[run], width=0.8)
+            if circle := ends[run]:
+                axes.add_patch(circle)
             values = optimum.measurements[run].values
             text = ", ".join(f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.objectives)
             axes.set_title(f"{optimum.place(run)}:  {text}", size=SMALL, loc="left")

@@ -1,7 +1,6 @@
-"""Objectives and constraints of an optimisation, and their TOML file."""
+"""Objectives and constraints of an optimisation, as its file describes them."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal, Self, TypeVar, cast
 
 import numpy as np
@@ -9,8 +8,6 @@ from pydantic import Field, model_validator
 
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.errors import UserError
-from pinnray.runtime.text_files import read_toml
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.studies.sweep.study import Study
 
@@ -61,13 +58,22 @@ class Question(Study):
     constraints: dict[str, Limit] = Field(default_factory=dict)
     runs: int = bounded(120, FEWEST, 100_000, "", "", "Number of runs of the solver")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _start(cls, values: Any) -> Any:
+        if not isinstance(values, Mapping):
+            return values
+        if said := [name for name in ("sampling", "samples") if name in values]:
+            raise ValueError(f"{said[0]} belongs to a study; the search chooses its samples: give runs")
+        runs = values.get("runs", cls.model_fields["runs"].default)
+        start = max(runs // 3, ENOUGH) if isinstance(runs, int) else ENOUGH
+        return {**values, "sampling": "sobol", "samples": start}
+
     @model_validator(mode="after")
     def _known(self) -> Self:
         for name in (*self.objectives, *self.constraints):
             if name not in QUANTITIES:
                 raise ValueError(f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}")
-        if "section" in {*self.fixed, *self.varied}:
-            raise ValueError("a drawing has no parameters to optimise; give a design")
         return self
 
     @property
@@ -88,33 +94,3 @@ class Question(Study):
     def allows(self, values: Mapping[str, float]) -> bool:
         """Whether every constraint is obeyed."""
         return all(excess <= 0 for excess in self.excesses(values))
-
-
-def load_question(path: Path) -> Question:
-    """The question in a TOML file: a study without sampling, with objectives, constraints and runs.
-
-    Raises:
-        UserError: If it cannot be read, or something in it is wrong.
-    """
-    content = read_toml(path, "question")
-    try:
-        return question_of({"name": path.stem, **content})
-    except UserError as error:
-        raise UserError(f"question {path}: {error}") from None
-
-
-def question_of(given: Mapping[str, Any]) -> Question:
-    """The question that a dictionary describes, as its TOML file would.
-
-    Raises:
-        UserError: If something in it is wrong.
-    """
-    content = dict(given)
-    own: dict[str, Any] = {
-        name: content.pop(name) for name in ("objectives", "constraints", "runs") if name in content
-    }
-    if said := [name for name in ("sampling", "samples") if name in content]:
-        raise UserError(f"{said[0]} belongs to a study; the search chooses its samples: give runs")
-    runs = own.get("runs", 120)
-    start = max(runs // 3, ENOUGH) if isinstance(runs, int) else ENOUGH
-    return Question(**{**content, **own, "sampling": "sobol", "samples": start})

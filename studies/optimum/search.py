@@ -11,7 +11,6 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import brief
-from pinnray.runtime.output_folder import check_resumable_folder, locked
 from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.text_files import read_json
@@ -22,9 +21,9 @@ from pinnray.studies.optimum.question import ENOUGH, Question
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.store import Journal, opened
+from pinnray.studies.sweep.store import Journal, resumed
 from pinnray.studies.sweep.study import Value
-from pinnray.studies.sweep.sweep import JOURNAL, Sweep, finish
+from pinnray.studies.sweep.sweep import Sweep, finish
 
 QUESTION_FILE, FINGERS_FILE = "question.json", "fingers.json"
 
@@ -71,14 +70,10 @@ def search_front(job: StudyJob[Question], stages: Stages | None = None) -> Optim
         "constraints": {name: limit.model_dump() for name, limit in question.constraints.items()},
         "runs": question.runs,
     }
-    check_resumable_folder(job.out / QUESTION_FILE, definition, job="search", free={"study.name"})
-    job.out.mkdir(parents=True, exist_ok=True)
     with (
-        locked(job.out),
-        opened(job.out / JOURNAL) as journal,
+        resumed(job.out / QUESTION_FILE, definition, job="search", free={"study.name"}) as (journal, _),
         Pool(job.processes) as pool,
     ):
-        write_json(job.out / QUESTION_FILE, definition)
         journal.forget("failed")
         file, start = job.out / FINGERS_FILE, len(samples(question))
         if not file.exists():

@@ -8,8 +8,7 @@ from math import floor
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from pinnray.geometry.cache import drawn_finger, finger_mesh
-from pinnray.geometry.drawing.description import description_beside, load_description
+from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import finger_from
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
@@ -18,6 +17,7 @@ from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.finger.rules import markers_apart, markers_fit
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.content_hash import sources_digest
+from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver
@@ -85,9 +85,7 @@ class Task:
 def field_base(study: Study, definition: Mapping[str, Any]) -> dict[str, Any]:
     """The definition of the finger in the middle of a study's ranges, whose mesh follows all others."""
     shape = {name: value for name, value in study.fixed.items() if name in Parameters.model_fields}
-    middle = {
-        name: sum(values.ends) / 2 for name, values in study.varied.items() if name in Parameters.model_fields
-    }
+    middle = {name: value for name, value in study.middle.items() if name in Parameters.model_fields}
     return {**definition, **shape, **LEAST_MARKERS, **middle, "name": study.name}
 
 
@@ -101,7 +99,7 @@ S = TypeVar("S", bound=Study)
 
 @dataclass(frozen=True)
 class StudyJob(Generic[S]):
-    """A study to run, and its output folder; reads the design and the drawings of the study once.
+    """A study to run, and its output folder; reads the design of the study once.
 
     Attributes:
         study: The study.
@@ -121,13 +119,15 @@ class StudyJob(Generic[S]):
         """The task of a sample.
 
         Raises:
-            UserError: If a file cannot be read, or the solver does not take the load.
+            UserError: If a file cannot be read, the solver does not take the load, or a drawing is varied.
         """
         study = self.study
         settings = study.settings_of(sample)
         given = {**study.fixed, **sample}
         values = {name: value for name, value in given.items() if not name.startswith(f"{study.solver}.")}
         shape = {name: value for name, value in values.items() if name not in PHYSICS}
+        if shape and not isinstance(self._base, Design):
+            raise UserError(f"of a drawn finger a study changes material and load, not {next(iter(shape))}")
         checkpoints, definition = None, {**self._base.definition(), **shape}
         if isinstance(self._base, Design) and not study.settings_alone:
             definition |= {key: least for key, least in LEAST_MARKERS.items() if key not in study.varied}
@@ -137,7 +137,7 @@ class StudyJob(Generic[S]):
             definition["name"] = f"{study.name}-{number}"
         return Task(
             number,
-            self._drawing(shape) if "section" in shape else definition,
+            definition,
             MeshSettings(size=study.mesh_size),
             {name: value for name, value in values.items() if name in PHYSICS},
             study.solver,
@@ -191,17 +191,3 @@ class StudyJob(Generic[S]):
             check_load(study.made_solver(), physics_of({"load": kind})[1])
         near = self.folder / study.design
         return self.finger or load_design(near if near.suffix == ".toml" and near.is_file() else study.design)
-
-    @cached_property
-    def _drawn(self) -> dict[tuple[str, ...], dict[str, Any]]:
-        return {}
-
-    def _drawing(self, shape: Mapping[str, Value]) -> dict[str, Any]:
-        """The definition of a drawn finger."""
-        lines = tuple(f"{name} = {value}" for name, value in shape.items() if name != "section")
-        key = (str(shape["section"]), *lines)
-        if key not in self._drawn:
-            file = self.folder / key[0]
-            drawn = drawn_finger(file, load_description(description_beside(file), lines))
-            self._drawn[key] = drawn.definition()
-        return self._drawn[key]

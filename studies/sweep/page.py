@@ -8,9 +8,9 @@ from pinnray.runtime.figure import Figure
 from pinnray.runtime.html import write_html
 from pinnray.runtime.tables import TextTable
 from pinnray.studies.sweep.pictures import SHOWN, draw_maps, draw_pairs
-from pinnray.studies.sweep.sensitivity import sensitivities, sensitivity_grid
 from pinnray.studies.sweep.sweep import Sweep
 from pinnray.studies.sweep.tables import (
+    correlation_grid,
     failure_grid,
     known_quantities,
     quantity_grid,
@@ -84,7 +84,7 @@ def write_sweep(
     tables = [quantity_grid(sweep), failure_grid(sweep)]
     if len(sweep.good) > 1 and not sweep.study.settings_alone:
         drawn["pairs"] = (draw_pairs(sweep), "Quantities over the varied parameters, a dot for each finger.")
-        tables.append(sensitivity_grid(sensitivities(sweep, SHOWN)))
+        tables.append(correlation_grid(sweep, SHOWN))
     note = f"{FILES}. Started {record['started']}."
     title = f"Sweep {sweep.study.name}"
     return files + write_page(folder / PAGE, title, sweep_sentences(sweep), tables, drawn, note, formats)
@@ -104,8 +104,8 @@ def sweep_sentences(sweep: Sweep) -> list[str]:
     ]
     if found > good:
         sentences.append(
-            f"{found - good} have none, for the reasons in the table below. Statistics, pictures and "
-            "sensitivities are of the converged ones."
+            f"{found - good} have none, for the reasons in the table below. Statistics and pictures are "
+            "of the converged ones."
         )
     return [*sentences, *(f"{remark}." for remark in sweep.remarks)]
 

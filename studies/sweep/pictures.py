@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.patches import Rectangle
 
-from pinnray.comparison.figures.style import HALO, axes_at, write_heading
+from pinnray.comparison.figures.layout import HALO, axes_at, write_heading
 from pinnray.runtime.figure import INK, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.studies.sweep.study import Value, title, unit_of

@@ -23,7 +23,7 @@ def samples(study: Study) -> list[dict[str, Value]]:
     """
     names = list(study.varied)
     if study.sampling == "grid":
-        axes = [grid_values(name, study.varied[name]) for name in names]
+        axes = [_choices(name, study.varied[name]) or () for name in names]
         if (count := prod(map(len, axes))) > MOST:
             raise UserError(f"the grid has {count:,} samples; at most {MOST:,} can be run")
         return [dict(zip(names, values, strict=True)) for values in product(*axes)]
@@ -58,15 +58,6 @@ def place_of(name: str, values: Range, value: Value) -> float:
         return (choices.index(value) + 0.5) / len(choices)
     low, high = values.ends
     return (float(value) - low) / (high - low)
-
-
-def grid_values(name: str, values: Range) -> Sequence[Value]:
-    """The values of a parameter on a grid."""
-    if values.count is None and (choices := _choices(name, values)) is not None:
-        return choices
-    low, high = values.ends
-    ends = np.linspace(low, high, values.count or 2)
-    return sorted({round(value) for value in ends}) if name in WHOLE else [float(value) for value in ends]
 
 
 def _choices(name: str, values: Range) -> Sequence[Value] | None:

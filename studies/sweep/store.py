@@ -6,13 +6,17 @@ is in it as a whole or not at all.
 
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.output_folder import check_resumable_folder, locked
 from pinnray.studies.sweep.measurement import Measurement
+
+JOURNAL = "journal.sqlite"
 
 _NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")
 """End of a rollback journal that names another file. Source: SQLite, pager.c, `aJournalMagic`."""
@@ -48,12 +52,12 @@ class Journal:
                 "insert into samples values (?, ?, ?, ?, ?)", (*row, json.dumps(measurement.values))
             )
 
-    def forget(self, state: str, message: str = "") -> int:
-        """Remove the samples that ended in a state, with a message that starts so; return their number."""
+    def forget(self, state: str, message: str = "") -> None:
+        """Remove the samples whose state and message start so."""
         with self._connection:
-            return self._connection.execute(
-                "delete from samples where state = ? and message like ?", (state, f"{message}%")
-            ).rowcount
+            self._connection.execute(
+                "delete from samples where state like ? and message like ?", (f"{state}%", f"{message}%")
+            )
 
     def numbers(self) -> set[Any]:
         """Numbers of the samples that have a result."""
@@ -68,6 +72,22 @@ class Journal:
             Measurement(number, state, message, seconds, json.loads(values))
             for number, state, message, seconds, values in rows
         ]
+
+
+@contextmanager
+def resumed(
+    file: Path, definition: Mapping[str, Any], *, job: str, free: Collection[str] = ()
+) -> Iterator[tuple[Journal, dict[str, Any]]]:
+    """The journal beside the definition of a study, which is written, while no other process uses the folder.
+
+    For the arguments see `check_resumable_folder`; with the journal come the entries that it returns.
+    """
+    before = check_resumable_folder(file, definition, job=job, free=free)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with locked(file.parent):
+        write_json(file, dict(definition))  # first: a folder without it is taken for someone's
+        with opened(file.with_name(JOURNAL)) as journal:
+            yield journal, before
 
 
 @contextmanager

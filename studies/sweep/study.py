@@ -19,13 +19,10 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_toml
 from pinnray.solvers.problem import Load, Material, Physics
 from pinnray.solvers.registry import make_solver
-from pinnray.solvers.solver import Solver, Traits
+from pinnray.solvers.solver import Solver, Traits, check_law
 
 PHYSICS = tuple(Physics.model_fields)
 """Parameters of material and load."""
-
-DRAWN = ("depth", "contact", "contact_width")
-"""Parameters of a drawing that a study can change."""
 
 WHOLE = tuple(name for name, field in Parameters.model_fields.items() if field.annotation is int)
 """Parameters of a design that are whole numbers."""
@@ -44,14 +41,12 @@ class Range(CheckedModel):
         low: Smallest value (`from` in the file).
         high: Largest value (`to`).
         step: Distance of the values, counted from `low`, such as that of a printer; None leaves any value.
-        count: Number of values on a grid, evenly spaced; None on no grid.
         values: The choices instead.
     """
 
     low: float | None = Field(default=None, alias="from")
     high: float | None = Field(default=None, alias="to")
     step: float | None = Field(default=None, gt=0)
-    count: int | None = bounded(None, 2, MOST, "", "", "Number of values on a grid")
     values: tuple[Value, ...] | None = Field(default=None, min_length=1)
 
     @property
@@ -64,7 +59,7 @@ class Range(CheckedModel):
     def _one_kind(self) -> Self:
         ends = (self.low, self.high)
         if self.values is not None:
-            if ends != (None, None) or self.count is not None or self.step is not None:
+            if ends != (None, None) or self.step is not None:
                 raise ValueError("give either values, or from and to")
             if len(set(map(repr, self.values))) < len(self.values):
                 raise ValueError("a value is given twice")
@@ -112,6 +107,20 @@ class Study(CheckedModel):
     fixed: dict[str, Value] = Field(default_factory=dict)
     varied: dict[str, Range]
 
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """The one in a TOML file.
+
+        Raises:
+            UserError: If it cannot be read, or something in it is wrong.
+        """
+        kind = cls.__name__.lower()
+        content = read_toml(path, kind)
+        try:
+            return cls(**{"name": path.stem, **content})
+        except UserError as error:
+            raise UserError(f"{kind} {path}: {error}") from None
+
     @model_validator(mode="before")
     @classmethod
     def _ranges(cls, values: Any) -> Any:
@@ -135,7 +144,7 @@ class Study(CheckedModel):
         settings = self.settings_of(self.varied)
         for name in (*self.fixed, *self.varied):
             if name.removeprefix(f"{self.solver}.") not in settings:
-                _check_name(name, drawn="section" in {*self.fixed, *self.varied})
+                _check_name(name)
         if both := sorted(self.fixed.keys() & self.varied.keys()):
             raise ValueError(f"{both[0]} is both fixed and varied; give it once")
         for name, values in self.varied.items():
@@ -148,7 +157,10 @@ class Study(CheckedModel):
         if self.strokes is not None:
             self._check_fields()
         ends = {name: (values.values or (values.low,))[0] for name, values in settings.items()}
-        self.made_solver({name: value for name, value in ends.items() if value is not None})
+        solver = self.made_solver({name: value for name, value in ends.items() if value is not None})
+        laws = self.varied["law"].values if "law" in self.varied else None
+        for law in laws or [self.fixed[name] for name in self.fixed if name == "law"]:
+            check_law([solver], physics_of({"law": law})[0])
         return self
 
     def _check_fields(self) -> None:
@@ -162,6 +174,11 @@ class Study(CheckedModel):
             raise ValueError(
                 f"strokes: {choices[0]} is a choice, between which no mesh moves; make a study of each"
             )
+
+    @property
+    def middle(self) -> dict[str, float]:
+        """The middle of every range of numbers."""
+        return {name: sum(each.ends) / 2 for name, each in self.varied.items() if each.low is not None}
 
     @property
     def settings_alone(self) -> bool:
@@ -179,19 +196,6 @@ class Study(CheckedModel):
         if Traits.of(solver).assimilates:
             raise UserError(f"solver {self.solver} needs measured markers, which a study does not have")
         return solver
-
-
-def load_study(path: Path) -> Study:
-    """The study in a TOML file.
-
-    Raises:
-        UserError: If it cannot be read, or something in it is wrong.
-    """
-    content = read_toml(path, "study")
-    try:
-        return Study(**{"name": path.stem, **content})
-    except UserError as error:
-        raise UserError(f"study {path}: {error}") from None
 
 
 def physics_of(values: Mapping[str, Any]) -> tuple[Material, Load]:
@@ -231,14 +235,9 @@ def _range(name: str, entry: Any) -> Range:
         raise ValueError(f"varied.{name}: {error}") from None
 
 
-def _check_name(name: str, *, drawn: bool) -> None:
+def _check_name(name: str) -> None:
     """Refuse a parameter that the study cannot change."""
-    if name in PHYSICS or name == "section":
-        return
-    if drawn:
-        if name not in DRAWN:
-            raise ValueError(f"{name}: of a drawing a study changes {', '.join(DRAWN)}, material and load")
-    elif name not in Parameters.model_fields or name == "name":
+    if name not in (*PHYSICS, *Parameters.model_fields) or name == "name":
         hint = unknown_parameter(name, Parameters)
         raise ValueError(f"{hint}; of material and load there are {', '.join(PHYSICS)}")
 
@@ -246,7 +245,7 @@ def _check_name(name: str, *, drawn: bool) -> None:
 def _check_range(name: str, values: Range, sampling: str) -> None:
     """Refuse values that the parameter or the sampling does not have."""
     if values.values is None:
-        if name in ("plane", "law", "load", "slide", "section", "rib_reference", "marker_layout"):
+        if name in ("plane", "law", "load", "slide", "rib_reference", "marker_layout"):
             raise ValueError(f"{name} has no numbers between two others; give values = [...]")
         for end in () if "." in name else (values.low, values.high):
             low, high = parameter_limits(name)
@@ -254,12 +253,8 @@ def _check_range(name: str, values: Range, sampling: str) -> None:
                 raise ValueError(
                     f"{name} = {end:g} is outside its range, {low:g} to {high:g} {unit_of(name)}"
                 )
-        if sampling == "grid" and not (values.count or values.step or name in WHOLE):
-            raise ValueError(f"{name}: a grid needs the number of values, such as count = 5")
-        if sampling != "grid" and values.count is not None:
-            raise ValueError(f"{name}: count belongs to sampling = 'grid'")
-        if sampling == "grid" and values.step is not None and values.count is not None:
-            raise ValueError(f"{name}: give either count or step")
+        if sampling == "grid" and not (values.step or name in WHOLE):
+            raise ValueError(f"{name}: a grid needs the distance of the values, such as step = 5")
         numbers = (values.low or 0, values.high or 0, values.step or 1)
         if name in WHOLE and not all(float(number).is_integer() for number in numbers):
             raise ValueError(f"{name} is a whole number; give whole ends and steps")

@@ -1,7 +1,6 @@
 """Run a study: every sample once, whatever happens to the workers or to the program."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -11,9 +10,7 @@ from typing import Any
 
 from pinnray.comparison.evaluation.deformed_body import ADVICE
 from pinnray.comparison.evaluation.plausibility import LOOKS_LIKE
-from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.output_folder import check_links, check_resumable_folder, locked
 from pinnray.runtime.processes.child import ProcessFailed
 from pinnray.runtime.processes.pool import Input, Pool
 from pinnray.runtime.stages import Stages
@@ -22,13 +19,13 @@ from pinnray.solvers.solver import Progress, silent
 from pinnray.studies.sweep.job import StudyJob, Task
 from pinnray.studies.sweep.measurement import Measurement, sampled
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.store import Journal, opened
+from pinnray.studies.sweep.store import JOURNAL, Journal, opened, resumed
 from pinnray.studies.sweep.study import Study, Value
 
-STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
+STUDY_FILE = "sweep.json"
 
 FEW = 5
-"""Samples that a remark names."""
+"""Samples that a remark or a row of a table names."""
 
 DEATHS = 8
 """Deaths of its worker after which a sample counts as failed, for any process may be killed by chance."""
@@ -65,9 +62,14 @@ class Sweep:
         for fault, advice in (*ADVICE.items(), (LOOKS_LIKE, "check the units of the study")):
             having = [each.number for each in self.measurements if fault in each.message]
             if having:
-                few = ", ".join(map(str, having[:FEW])) + (" ..." if having[FEW:] else "")
-                found.append(f"{len(having)} of {len(self.samples)} samples ({few}): {fault}; {advice}")
+                which = f"{len(having)} of {len(self.samples)} samples ({first_of(having)})"
+                found.append(f"{which}: {fault}; {advice}")
         return found
+
+
+def first_of(numbers: Sequence[int]) -> str:
+    """The first few numbers of samples."""
+    return ", ".join(map(str, numbers[:FEW])) + (" ..." if numbers[FEW:] else "")
 
 
 def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
@@ -88,16 +90,10 @@ def run_sweep(job: StudyJob[Study], stages: Stages | None = None) -> Sweep:
         free.add("study.samples")  # which may be continued
     if trainings := job.study.settings_alone:
         free.add("study.varied")  # the trainings of another grid go on from their checkpoints
-    check_resumable_folder(job.out / STUDY_FILE, definition, job="sweep", free=free)
-    job.out.mkdir(parents=True, exist_ok=True)
-    with locked(job.out), ExitStack() as stack:
-        before = _study_in(job.out) if (job.out / JOURNAL).exists() else job.study
-        if trainings and before.varied != job.study.varied:
-            (job.out / JOURNAL).unlink()
-        write_json(job.out / STUDY_FILE, definition)  # first: a folder without it is taken for someone's
-        journal = stack.enter_context(opened(job.out / JOURNAL))
-        journal.forget("failed")
-        if before.time_limit != job.study.time_limit:
+    with resumed(job.out / STUDY_FILE, definition, job="sweep", free=free) as (journal, before):
+        other = before.get("study.varied") != definition["study"]["varied"]
+        journal.forget("" if trainings and other else "failed")
+        if before.get("study.time_limit") != job.study.time_limit:
             journal.forget("not converged", OUT_OF_TIME)
         with stages.stage("samples") as progress, Pool(job.processes) as pool:
             finish(tasks, journal, pool, progress, job.study.time_limit)
@@ -181,7 +177,6 @@ def load_sweep(folder: Path) -> Sweep:
     if not (folder / JOURNAL).is_file():
         raise UserError(f"{folder} holds no sweep; make one by `pinnray sweep STUDY.toml`")
     study = _study_in(folder)
-    check_links(folder)
     every = samples(study)
     with opened(folder / JOURNAL) as journal:
         found = [each for each in journal.measurements() if each.number < len(every)]

@@ -1,6 +1,7 @@
 """The samples of a sweep as a table: Parquet and CSV, with units in the headings."""
 
 import re
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
@@ -8,14 +9,12 @@ import numpy as np
 import pandas as pd
 
 from pinnray.runtime.atomic import write_bytes, write_text
-from pinnray.runtime.tables import TextTable, plain
+from pinnray.runtime.tables import NONE, TextTable
 from pinnray.solvers.finger_figures import QUANTITIES, Quantity, heading
 from pinnray.studies.sweep.quantities import TRAINING
+from pinnray.studies.sweep.sampling import places_of
 from pinnray.studies.sweep.study import title
-from pinnray.studies.sweep.sweep import Sweep
-
-FEW = 5
-"""Numbers of samples that the table of failures lists for a reason."""
+from pinnray.studies.sweep.sweep import Sweep, first_of
 
 
 def known_quantities(sweep: Sweep) -> dict[str, Quantity]:
@@ -44,7 +43,7 @@ def write_frame(frame: pd.DataFrame, path: Path) -> list[Path]:
     frame.to_parquet(buffer, engine="pyarrow", index=False)
     files = [path.with_suffix(".parquet"), path.with_suffix(".csv")]
     write_bytes(files[0], buffer.getvalue())
-    write_text(files[1], frame.map(plain).to_csv(index=False, lineterminator="\n"))
+    write_text(files[1], frame.to_csv(index=False, lineterminator="\n"))
     return files
 
 
@@ -62,6 +61,22 @@ def quantity_grid(sweep: Sweep) -> TextTable:
     return TextTable(title, headings, rows, left=("quantity", "unit", "meaning"))
 
 
+def correlation_grid(sweep: Sweep, names: Sequence[str]) -> TextTable:
+    """Rank correlation of quantities with the varied parameters over the converged samples."""
+    parameters = list(sweep.study.varied)
+    rows = [places_of(sweep.study, sweep.samples[each.number]) for each in sweep.good]
+    values = pd.DataFrame([each.values for each in sweep.good], columns=list(names), dtype=float)
+    found = pd.concat([pd.DataFrame(rows, columns=parameters), values], axis=1).corr("spearman")
+    shown = found.loc[list(names), parameters].dropna(how="all")
+    texts = shown.map(lambda share: f"{share:+.2f}" if np.isfinite(share) else NONE)
+    caption = (
+        "Spearman's rank correlation: +1 where the quantity always grows with the parameter, −1 where it "
+        "always falls; near 0 where it does not follow the parameter, or goes both ways (see the picture)."
+    )
+    rows, title = texts.reset_index().values.tolist(), "Which parameter matters"
+    return TextTable(title, ["quantity", *parameters], rows, caption)
+
+
 def failure_grid(sweep: Sweep) -> TextTable:
     """Samples without a result, and those that did not converge: counts of each reason."""
     reasons: dict[tuple[str, str], list[int]] = {}
@@ -70,8 +85,7 @@ def failure_grid(sweep: Sweep) -> TextTable:
             reasons.setdefault((each.state, _kind_of(each.message)), []).append(each.number)
     rows: list[tuple[str, ...]] = []
     for (state, reason), numbers in sorted(reasons.items(), key=lambda entry: -len(entry[1])):
-        few = ", ".join(map(str, numbers[:FEW])) + (" ..." if numbers[FEW:] else "")
-        rows.append((state, str(len(numbers)), reason, few))
+        rows.append((state, str(len(numbers)), reason, first_of(numbers)))
     headings = ("state", "samples", "reason", "numbers")
     return TextTable("Samples without a result", headings, rows, left=("state", "reason", "numbers"))
 

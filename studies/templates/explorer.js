@@ -121,7 +121,7 @@
     return { x: [all.x[0] - 4, all.x[1] + 6], y: [all.y[0] - 0.75 * manifest.stroke, all.y[1] + 1.2 * manifest.stroke + 4] };
   })();
 
-  function picture({ points, moved, stress }) {
+  function picture({ points, moved, stress, figures }) {
     const width = canvas.clientWidth;
     const scale = width / (range.x[1] - range.x[0]);
     const height = scale * (range.y[1] - range.y[0]);
@@ -130,7 +130,8 @@
     const middle = { scale, x: (range.x[0] + range.x[1]) / 2, y: (range.y[0] + range.y[1]) / 2 };
     const at = view(middle, [width / 2, height / 2]);
     const { triangles } = mesh;
-    const most = manifest.colourStress * (values.young / manifest.baseYoung);
+    const { value: largest } = figures.find(({ name }) => name === "von_mises");
+    const most = Math.max(manifest.colourStress * (values.young / manifest.baseYoung), largest);
     const share = (t) => (stress[triangles[3 * t]] + stress[triangles[3 * t + 1]] + stress[triangles[3 * t + 2]]) / (3 * most);
     outline(context, manifest.outlines, placed(points, undefined, at), ink("--rule"));
     const places = placed(points, moved, at);
@@ -154,7 +155,7 @@
     context.setLineDash([]);
     seen(context, markers.map(([x, y, u, v]) => [x + u, y + v]), at);
     const title = width > 500 ? "von Mises stress" : "stress";
-    colourBar(context, [8, height], Math.min(0.5 * width, 260), manifest.colours, ["0", `${digits(most)} MPa`, title]);
+    colourBar(context, [8, height], Math.min(0.5 * width, 260), manifest.colours, ["0", `≥ ${digits(most)} MPa`, title]);
     scaleBar(context, [width - 8, height], scale, 0.15 * width);
   }
 
@@ -250,7 +251,7 @@
     toml: () => ["[options]", `design = "${manifest.design}"`, `law = "${manifest.law}"`, 'load = "cylinder"',
       ...loads.map((name) => `${name} = ${values[name]}`), `mesh-size = ${manifest.meshSize}`,
       `set = [${shapes().map((name) => `"${name}=${values[name]}"`).join(", ")}]`, 'solvers = "fem-nonlinear"'].join("\n"),
-    python: () => `pr.solve("fem-nonlinear", "${manifest.design}", size=${manifest.meshSize}, load="cylinder", law="${manifest.law}", `
+    python: () => `pr.solve("${manifest.design}", "fem-nonlinear", size=${manifest.meshSize}, load="cylinder", law="${manifest.law}", `
       + [...loads, ...shapes()].map((name) => `${name}=${values[name]}`).join(", ") + ")",
   };
   for (const button of document.querySelectorAll("[data-copy]")) {

@@ -1,19 +1,23 @@
 """The force from a film: its file, its picture, the live frames, the options."""
 
 import csv
-import importlib
 import json
-import os
+from threading import Event
 
 import cv2
 import numpy as np
 import pytest
 
 from pinnray.cli import main
-from pinnray.film.force_estimate import FrameForce, LiveForce, force_row
-from pinnray.film.publication import FrameLine, Publisher, frame_lines
+from pinnray.film.force_estimate import FrameForce, force_row, force_tracker
+from pinnray.film.live_force import LiveForce, frame_lines
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
+from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.identification.tracker import ForceReading
+from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.vision.frames.frame import Frame
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.tracking.frame_tracker import FrameDetections
@@ -60,6 +64,17 @@ def test_a_row_has_forces_for_the_depth_and_nothing_where_nothing_is_known():
     assert first.keys() == second.keys()
 
 
+def test_the_interval_counts_that_a_finger_is_not_plane():
+    """As that of `fem-id`: half of the difference between the plane states."""
+    finger = Design()
+    mesh = finger_mesh(finger, settings=MeshSettings(size=3.0))
+    moved = FemSolver(estimate=False).solve(Problem(mesh, load=Load(displacement=(None, -3.0)))).at_markers()
+    tracker = force_tracker(mesh, finger, Material(), finger.markers)
+    seen, deviations = np.ones(len(moved), dtype=bool), np.full_like(moved, 0.005)
+    found = tracker.update(moved, deviations, seen)
+    assert found.high - found.size > 1.95 * 0.5 * 0.4**2 * found.size
+
+
 class Recorder:
     """Stands for a force tracker: keeps what it is given."""
 
@@ -77,13 +92,17 @@ def seen(places, hidden=(), noise=0.08):
     return FrameDetections(discs, discs, places, SCALE * places)
 
 
+def frame(number):
+    return Frame(number, number / 30, np.zeros((2, 2), dtype=np.uint8))
+
+
 def followed(frames):
     recorder = Recorder()
-    with LiveForce(recorder, DEPTH) as force:
-        for number, frame in enumerate(frames):
-            force.watch(Frame(number, number / 30, np.zeros((2, 2), dtype=np.uint8)), frame)
-            while len(recorder.given) <= number:  # so that none is passed over
-                pass
+    force = LiveForce(recorder, DEPTH)
+    for number, detections in enumerate(frames):
+        force.watch(frame(number), detections)
+        while len(recorder.given) <= number:  # so that none is passed over
+            pass
     return recorder.given, force
 
 
@@ -98,7 +117,7 @@ def test_a_finger_at_rest_takes_no_more_memory_with_every_frame():
     kept = []
     for count in (3, 30):
         _, force = followed(count * [seen(REST)])
-        kept.append(sum(np.size(each) for name, each in vars(force).items() if name != "forces"))
+        kept.append(sum(np.size(each) for name, each in vars(force).items() if name != "_forces"))
     assert kept[0] == kept[1]
 
 
@@ -111,43 +130,66 @@ def test_live_displacements_are_from_the_mean_of_the_frames_at_rest_that_show_th
     np.testing.assert_allclose(given[3][0][:, 1], [1 + 0.02 / 3, 1.0, 1 + 0.02 / 3], rtol=1e-9)
     # 0.08 pixels are 0.01 mm; the mean of so many frames adds as small a part of the variance.
     np.testing.assert_allclose(given[3][1][:, 0], 0.01 * np.sqrt(1 + 1 / np.array([3, 2, 3])), rtol=1e-9)
-    assert [each.frame for each in force.forces] == [0, 1, 2, 3]
-    assert force.live_rate.passed_over == 0
-    assert force.live_rate.rate > 0
+    assert [each.frame for each in force.finished()] == [0, 1, 2, 3]
+    assert force.passed_over == 0
+
+
+class Slow(Recorder):
+    """Takes its time until it may go on."""
+
+    def __init__(self):
+        super().__init__()
+        self.started, self.go_on = Event(), Event()
+
+    def update(self, displacements, deviations, visible):
+        self.started.set()
+        assert self.go_on.wait(10)
+        return super().update(displacements, deviations, visible)
+
+
+def test_frames_that_come_while_a_force_is_sought_are_passed_over_but_for_the_newest():
+    slow = Slow()
+    force = LiveForce(slow, DEPTH)
+    force.watch(frame(0), seen(REST))
+    assert slow.started.wait(10)
+    assert force.newest() is None
+    for number in (1, 2, 3):
+        force.watch(frame(number), seen(REST))
+    slow.go_on.set()
+    assert [each.frame for each in force.finished()] == [0, 3]
+    assert force.passed_over == 2
+    assert force.newest().frame == 3
+
+
+def test_an_error_of_the_estimate_ends_the_tracking():
+    class Broken:
+        def update(self, *_):
+            raise UserError("no force")
+
+    force = LiveForce(Broken(), DEPTH)
+    force.watch(frame(0), seen(REST))
+    with pytest.raises(UserError, match="no force"):
+        force.finished()
+    with pytest.raises(UserError, match="no force"):
+        force.newest()
 
 
 def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(capsys):
-    recorder = Recorder()
-    with LiveForce(recorder, DEPTH) as force, Publisher("-") as publisher:
-        see = frame_lines(force, publisher)
-        see(Frame(0, 0.0, np.zeros((2, 2), dtype=np.uint8)), seen(REST))
-        while not force.forces:
-            pass
-        see(Frame(1, 0.1, np.zeros((2, 2), dtype=np.uint8)), seen(REST - np.array([0.0, 1.0]), hidden=[1]))
-    text = capsys.readouterr().out.splitlines()
-    first, second = (FrameLine.model_validate_json(line) for line in text)
-    raw, schema = json.loads(text[1]), FrameLine.model_json_schema()
-    assert raw["schema"] == 2
-    assert raw.keys() == schema["properties"].keys()
-    assert (first.frame, first.time_s, first.status) == (0, 0.0, "")
-    assert second.markers_mm == ((10.0, -2.0), None, (80.0, -4.0))
-    assert second.moved_mm == ((0.0, -1.0), None, (0.0, -1.0))
-    assert second.status == "hidden: marker 2"
-    assert second.force is not None
-    assert (second.force["frame"], second.force["N_per_mm"]) == (0, 0.1)
-    assert second.force["N_per_mm_high"] == pytest.approx(0.11)
-
-
-def test_a_reader_that_has_gone_is_told_in_one_line():
-    importlib.import_module("pinnray.solvers.petsc")  # which would end the process at a closed pipe
-    reading_end, writing_end = os.pipe()
-    os.close(reading_end)
-    frame = Frame(0, 0.0, np.zeros((2, 2), dtype=np.uint8))
-    with Publisher(f"/dev/fd/{writing_end}") as publisher:
-        see = frame_lines(None, publisher)
-        with pytest.raises(UserError, match=r"the reader of \S+ has gone"):
-            see(frame, seen(REST))
-    os.close(writing_end)
+    force = LiveForce(Recorder(), DEPTH)
+    see = frame_lines(force, publish=True)
+    see(frame(0), seen(REST))
+    while force.newest() is None:
+        pass
+    assert see(frame(1), seen(REST - np.array([0.0, 1.0]), hidden=[1])).startswith(
+        "force 2.00 N (1.80 to 2.20)"
+    )
+    first, second = (json.loads(line) for line in capsys.readouterr().out.splitlines())
+    assert (first["schema"], first["frame"], first["time_s"], first["status"]) == (2, 0, 0.0, "")
+    assert second["markers_mm"] == [[10.0, -2.0], None, [80.0, -4.0]]
+    assert second["moved_mm"] == [[0.0, -1.0], None, [0.0, -1.0]]
+    assert second["status"] == "hidden: marker 2"
+    assert second["force"]["N_per_mm"] == 0.1
+    assert second["force"]["N_per_mm_high"] == pytest.approx(0.11)
 
 
 @pytest.fixture(scope="module")
@@ -203,11 +245,11 @@ def test_the_same_film_through_a_pipe_live(film, tmp_path, monkeypatch, capsys):
     out = tmp_path / "out"
     with (tmp_path / "pictures").open() as pipe:
         monkeypatch.setattr("sys.stdin", pipe)
-        options = ["--live", "--force", "--publish", str(tmp_path / "lines"), "--out", str(out)]
-        assert main(["track", "-", *_camera(film), *options]) == 0
-    lines = [FrameLine.model_validate_json(line) for line in (tmp_path / "lines").read_text().splitlines()]
-    assert [line.frame for line in lines] == list(range(12))
-    published = {line.force["frame"]: line.force for line in lines if line.force}
+        assert main(["track", "-", *_camera(film), "--force", "--publish", "--out", str(out)]) == 0
+    said = capsys.readouterr()
+    lines = [json.loads(line) for line in said.out.splitlines()]
+    assert [line["frame"] for line in lines] == list(range(12))
+    published = {line["force"]["frame"]: line["force"] for line in lines if line["force"]}
     for row in rows_of(out / "force.csv"):
         if row["frame"] in map(str, published):  # the last one comes after the last line
             assert published[int(row["frame"])]["N_per_mm"] == pytest.approx(float(row["N_per_mm"]), rel=1e-9)
@@ -218,7 +260,7 @@ def test_the_same_film_through_a_pipe_live(film, tmp_path, monkeypatch, capsys):
     numbers = [int(row["frame"]) for row in rows_of(out / "force.csv")]
     assert numbers == sorted(set(numbers))
     assert numbers[-1] == 11
-    assert "Force of the indenter on a finger 20 mm deep" in capsys.readouterr().out
+    assert "Force of the indenter on a finger 20 mm deep" in said.err
 
 
 def _camera(film):

@@ -13,7 +13,7 @@ from pinnray.film import predicted_frame
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.geometry.registration import Homography
+from pinnray.geometry.picture_frame import Homography
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Problem
 from pinnray.vision.frames.sources import open_frames

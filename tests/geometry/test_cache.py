@@ -3,16 +3,15 @@
 import os
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
 
-from pinnray.geometry import Design, MeshSettings, UserError, cache, cad_files, finger_mesh
+from pinnray.geometry import Design, MeshSettings, UserError, cache, finger_mesh
 from pinnray.geometry.cache import cache_key, drawn_finger
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.cache import cache_folder
+from pinnray.runtime.cache import cache_folder, check_writable, share_cache
 from pinnray.runtime.processes.pool import Pool, child_environment
 from pinnray.runtime.processes.worker import Task, perform
 
@@ -78,7 +77,7 @@ def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPa
         return cache_key((design or Design()).digest, MeshSettings(**settings).model_dump())
 
     keys = {key(), key(Design(rib_angle=19)), key(size=0.3), key(corner_size=0.1)}
-    monkeypatch.setattr("pinnray.geometry.cache._version", lambda package: "0")
+    monkeypatch.setattr("pinnray.geometry.cache.package_version", lambda package: "0")
     keys.add(key())
     assert len(keys) == 5
     assert key(Design(name="x")) in keys
@@ -104,11 +103,30 @@ def test_the_worker_stays_and_follows_a_change_of_folder(tmp_path, monkeypatch):
     assert finger_mesh(drawn, settings=COARSE, cache_dir=Path("cache")).areas.sum() == pytest.approx(600)
 
 
-def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_path: Path) -> None:
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    with pytest.warns(RuntimeWarning, match=r"file/cache \(Not a directory\), .* set PINNRAY_CACHE"):
-        mesh = finger_mesh(Design(), settings=COARSE, cache_dir=blocked / "cache")
+@pytest.mark.parametrize("place", ["/proc/cache", "/dev/null/cache"])
+@pytest.mark.parametrize("variable", ["PINNRAY_CACHE", "XDG_CACHE_HOME", "HOME"])
+def test_where_no_cache_can_be_written_a_temporary_one_serves_libraries_too(
+    variable: str, place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("PINNRAY_CACHE", "XDG_CACHE_HOME", "MPLCONFIGDIR"):
+        monkeypatch.setenv(name, "")  # so that it is as before, afterwards
+        monkeypatch.delenv(name)
+    monkeypatch.setenv(variable, place)
+    with pytest.warns(RuntimeWarning, match=r"cannot write to the cache .* set PINNRAY_CACHE to a folder"):
+        share_cache()
+    folder = cache_folder()  # warns no more
+    check_writable(folder)
+    assert os.environ["XDG_CACHE_HOME"] == str(folder)
+    assert os.environ["MPLCONFIGDIR"] == str(folder / "matplotlib")
+
+
+def test_a_full_cache_is_a_warning_and_the_mesh_is_there(tmp_path: Path, monkeypatch) -> None:
+    def full(mesh: TriangleMesh, path: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(TriangleMesh, "save", full)
+    with pytest.warns(RuntimeWarning, match=r"cache folder .* \(No space left on device\), .* is repeated"):
+        mesh = finger_mesh(Design(), settings=COARSE, cache_dir=tmp_path)
     assert len(mesh.markers) == 9
 
 
@@ -135,37 +153,17 @@ def test_a_full_disk_in_the_worker_names_the_place(full_disk, task, end):
 @pytest.mark.parametrize(
     ("variables", "expected"),
     [
-        ({"PINNRAY_CACHE": "/a", "XDG_CACHE_HOME": "/b"}, "/a"),  # ours wins
-        ({"XDG_CACHE_HOME": "/b"}, "/b/pinn-ray"),
-        ({"HOME": "/home/me"}, "/home/me/.cache/pinn-ray"),
+        ({"PINNRAY_CACHE": "a", "XDG_CACHE_HOME": "b"}, "a"),  # ours wins
+        ({"XDG_CACHE_HOME": "b"}, "b/pinn-ray"),
+        ({"HOME": "me"}, "me/.cache/pinn-ray"),
     ],
 )
-def test_cache_folder(variables: dict[str, str], expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cache_folder(variables: dict[str, str], expected: str, tmp_path: Path, monkeypatch) -> None:
     for name in ("PINNRAY_CACHE", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     for name, value in variables.items():
-        monkeypatch.setenv(name, value)
-    assert cache_folder() == Path(expected)
-
-
-def test_cad_files_come_from_the_cache_the_second_time(tmp_path, monkeypatch):
-    first = cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
-    monkeypatch.setattr("pinnray.geometry.cache.run_task", None)
-    second = cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
-    assert sorted(path.name for path in (tmp_path / "two").iterdir()) == ["section.svg"]
-
-
-@pytest.mark.parametrize("name", ["../up", "/tmp/up", "a/b"])
-def test_cad_files_of_a_foreign_cache_stay_in_the_output_folder(name: str, tmp_path: Path) -> None:
-    cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
-    (entry,) = (tmp_path / "cache").glob("*.npz")
-    with zipfile.ZipFile(entry, "a") as archive:
-        archive.writestr(f"{name}.npy", "written")
-    with pytest.warns(RuntimeWarning, match="the cached file is damaged"):
-        cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
-    assert not (tmp_path / "up").exists()
-    assert [path.name for path in (tmp_path / "two").rglob("*")] == ["section.svg"]
+        monkeypatch.setenv(name, str(tmp_path / value))
+    assert cache_folder() == tmp_path / expected
 
 
 def test_import_needs_neither_cadquery_nor_gmsh() -> None:

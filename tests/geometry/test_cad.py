@@ -53,7 +53,7 @@ def test_markers_are_inlaid_flush_with_the_side_face() -> None:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("cad")
-    files = cad_files(Design(), folder / "out", cache_dir=folder / "cache")
+    files = cad_files(Design(), folder / "out")
     return {file.name: file for file in files}
 
 

@@ -16,7 +16,7 @@ from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.mesher import build_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem

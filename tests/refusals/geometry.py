@@ -21,7 +21,7 @@ from pinnray.geometry.drawing.formats.msh import _numbers as msh_numbers
 from pinnray.geometry.drawing.formats.planes import plane_of
 from pinnray.geometry.drawing.load import finger_from_file, read_drawing
 from pinnray.geometry.mesh.quadrature import triangle_rule
-from pinnray.geometry.registration import Registration
+from pinnray.geometry.picture_frame import Registration
 from pinnray.runtime.text_files import read_json, read_toml
 from tests.geometry.drawing.files import (
     BEAM,
@@ -52,12 +52,11 @@ FILES: dict[str, str | bytes] = {
     "head.msh": "$MeshFormat",
     "broken.toml": "height = = 3",
     "utf-16.toml": b"\xff\xfeh\x00",
-    "beyond float.toml": "height = " + "9" * 400,
+    "beyond-float.toml": "height = " + "9" * 400,
     "beyond python.toml": "height = " + "9" * 5000,
     "nested.toml": "height = " + "[" * 3000 + "]" * 3000,
     "cut.json": '{"a": [',
     "nested.json": '{"a": ' + "[" * 100_000 + "]" * 100_000 + "}",
-    "beyond float.json": '{"a": ' + "9" * 400 + "}",
 }
 
 read_workspace, read_settings = partial(read_json, what="workspace"), partial(read_toml, what="settings")

@@ -25,8 +25,8 @@ from pinnray.solvers.elasticity import (
 from pinnray.solvers.fem.adaptive_refinement import adapted
 from pinnray.solvers.finger_figures import figures_of
 from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.load import Physics
 from pinnray.solvers.materials import TensileTest, fitted, preset, read_tensile_test
-from pinnray.solvers.physics import Physics
 from pinnray.solvers.pinn.finite_basis.energy import piola_stress_and_tangent
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
@@ -42,6 +42,10 @@ FILES = {
     "text.csv": "strain,stress_MPa\n0.1,1\n0.2,x\n0.3,2\n",
     "short.csv": "strain,stress_MPa\n0,0\n0.2,1\n",
     "empty.csv": "",
+    "true.csv": "True strain,stress_MPa\n0.1,1\n",
+    "unit.csv": "strain,stress\n0.1,1\n0.2,2\n0.3,3\n",
+    "percent.csv": "strain,stress_MPa\n10,1\n20,2\n30,3\n",
+    "longer.csv": "strain,stress_MPa\n0.1,1,23\n",
 }
 
 

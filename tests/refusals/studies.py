@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from pinnray.geometry.finger.design import Design
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material
 from pinnray.studies.crossval.folds import load_cases_of
 from pinnray.studies.crossval.study import CrossvalStudy, solver_variants
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.emulator.store import emulator_of
-from pinnray.studies.optimum.question import Question, load_question
+from pinnray.studies.optimum.question import Question
 from pinnray.studies.optimum.search import search_front
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.store import opened
-from pinnray.studies.sweep.study import Study, load_study
+from pinnray.studies.sweep.study import Study
 from pinnray.studies.sweep.sweep import load_sweep
 from tests.refusals.compare import markers, pressed
 from tests.studies.emulator.sweeps import solved_sweep
@@ -35,7 +35,7 @@ def study(text: str = RIBS, head: str = "samples = 4\n") -> Study:
     """The study of a file with a table of what is varied below other lines."""
     path = Path("mine.toml")
     path.write_text(head + text, encoding="utf-8")
-    return load_study(path)
+    return Study.load(path)
 
 
 def varied(text: str, head: str = "samples = 4\n") -> Study:
@@ -63,7 +63,7 @@ def question(
     path = Path("ask.toml")
     tables = {"objectives": objectives, "constraints": limits, "varied": ranges}
     path.write_text(head + "".join(f"[{name}]\n{text}\n" for name, text in tables.items()), encoding="utf-8")
-    return load_question(path)
+    return Question.load(path)
 
 
 def moving(

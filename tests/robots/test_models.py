@@ -9,7 +9,7 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.mjcf import Damping, chain_mjcf
 from pinnray.robots.simulation import chain_front
-from pinnray.robots.solid_files import write_vtk
+from pinnray.robots.solid_files import write_solid
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.robots.springs import Springs
 from tests.solvers.conftest import SHORT
@@ -79,10 +79,11 @@ def test_mujoco_has_the_masses_springs_and_places_of_the_chain(front, chain, spr
 
 def test_the_tetrahedra_fill_the_body_and_name_the_nodes_of_its_boundaries(section, tmp_path):
     body = SolidMesh.of(section, 2)
-    write_vtk(tmp_path / "finger.vtk", body)
+    write_solid(tmp_path, body)
     grid = pyvista.read(tmp_path / "finger.vtk")
     assert grid.volume == pytest.approx(MM**3 * section.areas.sum() * section.depth)
     assert grid.volume == pytest.approx(body.volume)
+    assert pyvista.read(tmp_path / "finger.stl").volume == pytest.approx(body.volume)  # normals outward
     base, front = grid.points[grid["base"] == 1], grid.points[grid["front"] == 1]
     assert len(base) == 3 * len(np.unique(section.boundary("base")))
     assert np.abs(base[:, 0]).max() < 1e-9

@@ -13,6 +13,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.output_folder import (
     MARK,
     check_output,
+    check_same_job,
     locked,
     replaced_folder,
     take_training,
@@ -149,13 +150,13 @@ def test_our_own_result_an_empty_folder_and_none_may_be_replaced(out, tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda out: (out / "notes.txt").write_text("mine"), "holds notes.txt, which no run has written"),
+        (lambda out: (out / "notes.txt").write_text("mine"), "holds notes.txt, which no run.json"),
         (lambda out: (out / "solutions" / "mine.npz").write_text(""), "holds solutions/mine.npz"),
-        (lambda out: (out / "run.json").write_text("{}"), "is damaged"),  # another program's run.json
-        (lambda out: (out / "run.json").write_text("[1]"), "is damaged"),
-        (lambda out: (out / "run.json").write_bytes(b"\xff"), "is damaged"),
-        (lambda out: (out / "run.json").write_text('{"files_sha256": {'), "is damaged, .* files of yours"),
-        (lambda out: (out / "run.json").unlink(), r"holds solutions/fem.npz, and it has no run.json"),
+        (lambda out: (out / "run.json").write_text("{}"), "which no run.json there lists"),  # of others
+        (lambda out: (out / "run.json").write_text("[1]"), "which no run.json there lists"),
+        (lambda out: (out / "run.json").write_bytes(b"\xff"), "which no run.json there lists"),
+        (lambda out: (out / "run.json").write_text('{"files_sha256": {'), "holds run.json, which"),
+        (lambda out: (out / "run.json").unlink(), "holds solutions/fem.npz, which"),
     ],
 )
 def test_what_no_comparison_wrote_is_not_lost(out, spoil, message):
@@ -164,43 +165,31 @@ def test_what_no_comparison_wrote_is_not_lost(out, spoil, message):
         check_output(out)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("run.partial", r"run\.partial would be replaced, but it is not of an unfinished run"),
-        (".run.previous", r"run\.previous would be replaced, but no run has left it"),
-    ],
-)
-def test_a_folder_that_no_unfinished_run_has_left_is_not_lost(out, name, message):
+def test_a_folder_that_no_unfinished_run_has_left_is_not_lost(out):
     """It may be the user's, or the result of a design called `run.partial`."""
-    mine = out.with_name(name)
+    mine = out.with_name("run.partial")
     mine.mkdir()
     (mine / "thesis.tex").write_text("mine")
-    with pytest.raises(UserError, match=message):
+    with pytest.raises(UserError, match="partial would be replaced, but it is not of an unfinished run"):
         attempt(out)
     assert tree(mine) == {"thesis.tex": "mine"}
     assert (out / "run.json").is_file()
 
 
-@pytest.mark.parametrize("place", ["solutions", "training", "training/pinn-std", "."])
-def test_a_link_in_an_unfinished_folder_of_others_loses_no_file(tmp_path, place):
-    """It would have been followed: what lay there was removed, and the solutions were written there."""
+@pytest.mark.parametrize("place", ["solutions", "training", "training/pinn-std"])
+def test_a_link_in_an_unfinished_folder_is_not_followed(tmp_path, place):
+    """What lay there was removed, and the solutions were written there."""
     mine, partial = tmp_path / "mine", tmp_path / "out.partial"
     mine.mkdir()
     (mine / "thesis.tex").write_text("mine")
-    (mine / MARK).touch()
     (partial / place).parent.mkdir(parents=True, exist_ok=True)
     (partial / place).symlink_to(mine, target_is_directory=True)
     (partial / MARK).touch()
-    with pytest.raises(UserError, match="is a link, which no run has made"):
-        attempt(tmp_path / "out", keep=("pinn-std",), solutions=("fem",))
+    attempt(tmp_path / "out", keep=("pinn-std",), solutions=("fem",))
     assert tree(mine) == {"thesis.tex": "mine"}
 
 
-def test_a_link_in_a_result_of_others_is_not_followed_and_a_file_is_not_replaced(out):
-    (out / "training").symlink_to(out.parent, target_is_directory=True)
-    with pytest.raises(UserError, match=r"run/training is a link, which no run has made"):
-        check_output(out)
+def test_a_file_is_not_replaced(out):
     with pytest.raises(UserError, match="is a file"):
         check_output(out / "run.json")
 
@@ -210,6 +199,17 @@ def test_the_folder_that_one_stands_in_is_not_pulled_away(out, monkeypatch, insi
     monkeypatch.chdir(out / inside)
     with pytest.raises(UserError, match="cannot run inside it"):
         check_output(out)
+
+
+def test_the_finished_run_of_another_job_is_not_replaced_unasked(out):
+    content = json.loads((out / "run.json").read_text())
+    (out / "run.json").write_text(json.dumps(content | {"options": {"stroke": 5.0, "set": ["N=4"]}}))
+    usual = {"design": "default", "set": []}
+    check_same_job(out, {"stroke": 5.0, "set": ("N=4",), "pictures": "pdf", "design": "default"}, usual)
+    check_same_job(out.with_name("absent"), {"stroke": 6.0}, usual)
+    for other, said in [({"stroke": 5.0}, "set"), ({"set": ["N=4"], "truth": "stvk"}, "stroke, truth")]:
+        with pytest.raises(UserError, match=rf"finished run of another job \(other {said}\); .*--out .*run "):
+            check_same_job(out, other, usual)
 
 
 class Killed(BaseException):

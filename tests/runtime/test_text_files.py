@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from pinnray.runtime.text_files import parse_toml, read_json, read_toml
+from pinnray.runtime.text_files import read_json, read_toml
 
 
 @pytest.mark.parametrize(
@@ -16,7 +16,3 @@ def test_a_byte_order_mark_is_no_fault(read: Callable[[Path, str], Any], text: s
     path = tmp_path / "file"
     path.write_bytes(b"\xef\xbb\xbf" + text.encode())
     assert read(path, "file") == {"rib_count": 5}
-
-
-def test_a_text_may_have_lists_and_tables() -> None:
-    assert parse_toml("a = [[1, 2.5], [3, 4]]\n[b]\nc = true") == {"a": [[1, 2.5], [3, 4]], "b": {"c": True}}

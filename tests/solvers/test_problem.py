@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pinnray.geometry.finger.design import Design
-from pinnray.geometry.registration import Registration
+from pinnray.geometry.picture_frame import Registration
 from pinnray.solvers.problem import Load, Material, Problem, contact_ends, contact_functional, contact_nodes
 from tests.solvers.conftest import observed_at
 

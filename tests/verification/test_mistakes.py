@@ -56,7 +56,7 @@ def test_wrong_law_of_finite_strain(monkeypatch):
 
 @pytest.mark.parametrize("case", [COOK, KIRSCH], ids=lambda case: case.name)
 def test_plane_strain_for_plane_stress(case, monkeypatch):
-    monkeypatch.setattr("pinnray.solvers.physics.lame_constants", plane_strain_always)
+    monkeypatch.setattr("pinnray.solvers.material.lame_constants", plane_strain_always)
     assert not passes(case.measure(), degree=2, plane="stress")
 
 

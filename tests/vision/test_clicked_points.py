@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.runtime.errors import UserError
 from pinnray.vision.clicked_points import Clicks, clicked_points, read_clicks
 
@@ -83,7 +83,8 @@ def test_noise_of_repeats(tmp_path):
     clicks = read_clicks(path)
     assert len(clicks.places) == len(MARKERS)
     assert clicks.noise == pytest.approx(1.5 / 2, rel=0.25)  # a mean of four
-    assert found(clicks, clicks).reason == "the repeats"
+    pressed = Clicks(picture(MARKERS + MOVED, 0.2).places, None, tuple(range(9)))
+    assert found(clicks, pressed).reason == "the repeats"
 
 
 def test_numbered_points_are_those_of_their_number(tmp_path):
@@ -96,8 +97,88 @@ def test_numbered_points_are_those_of_their_number(tmp_path):
         path.write_text("\n".join(["x,y,point", *rows]))
         lists.append(read_clicks(path))
     np.testing.assert_allclose(found(*lists).observations.displacements, MOVED, atol=1e-9)
-    with pytest.raises(UserError, match="numbered in one picture only: 0, 1, 2"):
+    with pytest.raises(UserError, match="of one picture are numbered, those of the other are not"):
         found(lists[0], picture(MARKERS, 0.2))
+
+
+def swapped(one: int, other: int) -> np.ndarray:
+    order = np.arange(9)
+    order[[one, other]] = order[[other, one]]
+    return order
+
+
+@pytest.mark.parametrize("numbered", [False, True])
+@pytest.mark.parametrize("scale", ["same", "lengths", (0.2, 0.2)])
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        (swapped(6, 7), "with 7 and 8 exchanged"),
+        (swapped(0, 8), "with 1 and 9 exchanged"),
+        (np.arange(9)[::-1], "in reverse"),
+        (np.roll(np.arange(9), 2), "in the order 3 4 5 6 7 8 9 1 2"),
+        (np.random.default_rng(3).permutation(9), "in the order"),
+    ],
+)
+def test_a_pressed_list_in_another_order_is_told_and_put_right_unless_it_is_numbered(
+    order, said, scale, numbered
+):
+    numbers = tuple(range(1, 10)) if numbered else ()
+    rest, pressed = picture(MARKERS, 0.2), picture(MARKERS + MOVED, 0.2, order=order)
+    result = found(*(Clicks(each.places, None, numbers) for each in (rest, pressed)), scale=scale)
+    (remark,) = result.remarks
+    assert said in remark
+    right = MOVED if not numbered else (MARKERS + MOVED)[order] - MARKERS
+    if scale != "lengths":  # whose scale is that of the lines between the points
+        np.testing.assert_allclose(result.observations.displacements, right, atol=1e-9)
+
+
+@pytest.mark.parametrize("shown", [MOVED, 3 * MOVED, 0 * MOVED + [0.3, -5.0], MOVED + np.array([4.0, 9.0])])
+def test_a_right_list_is_left_as_it_is(shown):
+    noise = np.random.default_rng(4).normal(0, 0.3, MARKERS.shape)
+    result = found(picture(MARKERS, 0.2), picture(MARKERS + shown + noise, 0.2))
+    assert result.remarks == ()
+    np.testing.assert_allclose(result.observations.displacements, shown + noise, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pressed", "said"),
+    [
+        (picture(MARKERS, 0.2), "both lists have the same points"),
+        (picture(MARKERS, 0.2, order=slice(None, None, -1)), "both lists have the same points"),
+        (picture(MARKERS + MOVED, 0.2, flip=False), "y runs the other way in the pressed list"),
+        (picture(MARKERS + MOVED, 2.0), " times closer together"),
+        (picture(MARKERS + MOVED, 0.02), " times farther apart"),
+    ],
+)
+def test_a_pressed_list_of_another_kind_is_refused(pressed, said):
+    with pytest.raises(UserError) as caught:
+        found(picture(MARKERS, 0.2), pressed)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("numbered", [False, True])
+@pytest.mark.parametrize("blank", [False, True])
+@pytest.mark.parametrize("where", ["at rest", "in the pressed picture"])
+def test_a_point_that_is_missing_in_one_picture_is_left_out_and_named(where, blank, numbered):
+    lists = []
+    for name, places in (("at rest", MARKERS), ("in the pressed picture", MARKERS + MOVED)):
+        pixels, numbers = picture(places, 0.2).places, np.arange(1, 10)
+        if name == where:
+            kept = numbers != 4
+            pixels = np.where(kept[:, None], pixels, np.nan) if blank and not numbered else pixels[kept]
+            numbers = numbers[kept]
+        lists.append(Clicks(pixels, None, tuple(numbers.tolist()) if numbered else ()))
+    result = found(*lists)
+    assert f"left out, as missing {where}: point 4" in result.remarks
+    assert result.observations.visible.tolist() == [n != 3 for n in range(9)]
+    seen = result.observations.visible
+    np.testing.assert_allclose(result.observations.displacements[seen], MOVED[seen], atol=1e-9)
+
+
+def test_a_row_without_numbers_is_a_missing_point_and_german_excel_is_read(tmp_path):
+    path = tmp_path / "clicks.csv"
+    path.write_text("\ufeffx;y\n1,5;2\nnan;nan\n3;4,25\n5;6\n", encoding="utf-8")
+    np.testing.assert_array_equal(read_clicks(path).places, [[1.5, 2], [np.nan] * 2, [3, 4.25], [5, 6]])
 
 
 TRACKPY = "frame,particle,x,y,mass\n" + "\n".join(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, FREE, HAND_HELD, Registration
+from pinnray.geometry.picture_frame import FIXED, FREE, HAND_HELD, Registration
 from pinnray.vision.measurements import read_measurements, write_measurements
 
 HEADER = "x_mm,y_mm,u_mm,v_mm"

@@ -1,10 +1,8 @@
 """Camera model: projection of points to pixels with lens distortion, and removal of the distortion.
 
 A pinhole behind a lens, by OpenCV: x to the right, y down, z away from the camera; the centre of the first
-pixel is (0, 0). The lens "brown" has radial and tangential distortion (D. C. Brown, "Close-range camera
-calibration", Photogrammetric Engineering 37, 1971); "fisheye", for angles of view beyond about 100 degrees,
-is a polynomial in the angle to the axis (J. Kannala, S. S. Brandt, "A generic camera model and calibration
-method for conventional, wide-angle, and fish-eye lenses", IEEE TPAMI 28, 2006, eq. 6).
+pixel is (0, 0). The lens has radial and tangential distortion (D. C. Brown, "Close-range camera calibration",
+Photogrammetric Engineering 37, 1971), which serves up to angles of view of about 100 degrees.
 Units: mm in space, pixels in the image.
 """
 
@@ -19,8 +17,8 @@ from numpy.typing import ArrayLike
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 
-LENSES = {"brown": ("k1", "k2", "p1", "p2", "k3"), "fisheye": ("k1", "k2", "k3", "k4")}
-"""Names of the distortion coefficients by the name of the lens."""
+INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+"""Names of a camera's `intrinsics`: focal lengths, principal point, distortion."""
 
 
 class Pose(NamedTuple):
@@ -39,7 +37,7 @@ class Projection(NamedTuple):
     Attributes:
         pixels: Shape (n, 2).
         by_point: Derivative by the points in the camera's frame, shape (n, 2, 3), pixels per mm.
-        by_intrinsics: Derivative by the camera's `intrinsics`, shape (n, 2, intrinsics).
+        by_intrinsics: Derivative by the camera's `intrinsics`, shape (n, 2, 9).
     """
 
     pixels: FloatArray
@@ -55,13 +53,12 @@ class Camera:
         width, height: Of its images, pixels.
         fx, fy: Focal lengths, pixels.
         cx, cy: Principal point, pixels.
-        distortion: Coefficients of the lens, in the order of `LENSES`.
-        model: Name of the lens in `LENSES`.
+        distortion: Coefficients of the lens: k1, k2, p1, p2, k3.
         covariance: Of `intrinsics`, in rows; None if it is not known.
 
     Raises:
-        UserError: If a number is not finite, a size or a focal length is not above zero, or there are more or
-            fewer coefficients than the lens has.
+        UserError: If a number is not finite, a size or a focal length is not above zero, or there are not
+            five coefficients.
     """
 
     width: int
@@ -71,17 +68,12 @@ class Camera:
     cx: float
     cy: float
     distortion: tuple[float, ...] = (0.0,) * 5
-    model: str = "brown"
     covariance: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.model not in LENSES:
-            raise UserError(f"no lens model is called {self.model!r}; there are: {', '.join(LENSES)}")
-        coefficients = self.intrinsic_names[4:]
-        if len(self.distortion) != len(coefficients):
+        if len(self.distortion) != len(INTRINSICS[4:]):
             raise UserError(
-                f"distortion has {len(self.distortion)} numbers; for the model {self.model} it must have "
-                f"{', '.join(coefficients)}"
+                f"distortion has {len(self.distortion)} numbers; it must have {', '.join(INTRINSICS[4:])}"
             )
         if not np.isfinite([*self.matrix.ravel(), *self.distortion]).all():
             raise UserError("a camera holds a number that is not finite")
@@ -89,12 +81,7 @@ class Camera:
             if (value := getattr(self, name)) <= 0:
                 raise UserError(f"the camera's {name} is {value:g}; it must be above zero")
         if self.covariance is not None:
-            _check_covariance(np.array(self.covariance, dtype=np.float64), self.intrinsic_names)
-
-    @property
-    def intrinsic_names(self) -> tuple[str, ...]:
-        """Names of `intrinsics`."""
-        return ("fx", "fy", "cx", "cy", *LENSES[self.model])
+            _check_covariance(np.array(self.covariance, dtype=np.float64))
 
     @property
     def intrinsics(self) -> FloatArray:
@@ -143,25 +130,18 @@ class Camera:
         behind = ~(points[:, 2] > 0)
         if behind.any():
             raise UserError(f"{behind.sum()} of {len(points)} points are not in front of the camera")
-        count, intrinsics = len(points), len(self.intrinsic_names)
-        if not count:
-            return Projection(np.empty((0, 2)), np.empty((0, 2, 3)), np.empty((0, 2, intrinsics)))
-        fisheye = self.model == "fisheye"
-        project = cv2.fisheye.projectPoints if fisheye else cv2.projectPoints
-        pixels, derivatives = project(points[:, None], *IDENTITY, self.matrix, np.array(self.distortion))
+        if not (count := len(points)):
+            return Projection(np.empty((0, 2)), np.empty((0, 2, 3)), np.empty((0, 2, len(INTRINSICS))))
+        pixels, derivatives = cv2.projectPoints(
+            points[:, None], *IDENTITY, self.matrix, np.array(self.distortion)
+        )
+        # OpenCV's columns: rotation, shift, f, c, distortion.
         by_all = np.asarray(derivatives, dtype=np.float64).reshape(count, 2, -1)
-        # OpenCV's columns: fisheye f, c, k, rotation, shift, skew; brown rotation, shift, f, c, k.
-        by_point, first = (by_all[:, :, 11:14], 0) if fisheye else (by_all[:, :, 3:6], 6)
         seen = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-        return Projection(seen, by_point, by_all[:, :, first : first + intrinsics])
-
-    def distort(self, pixels: ArrayLike) -> FloatArray:
-        """Pixels of a pinhole camera to pixels behind the lens; shapes (n, 2)."""
-        plane = self._on_plane(np.asarray(pixels, dtype=np.float64).reshape(-1, 2))
-        return self.project(np.column_stack([plane, np.ones(len(plane))]))
+        return Projection(seen, by_all[:, :, 3:6], by_all[:, :, 6:])
 
     def undistort(self, pixels: ArrayLike) -> FloatArray:
-        """Pixels behind the lens to pixels of a pinhole camera, the inverse of `distort`; shapes (n, 2).
+        """Pixels behind the lens to pixels of a pinhole camera; shapes (n, 2).
 
         Newton's method on every point, to 1e-10 pixels; OpenCV's own inverse does not notice a fold.
 
@@ -191,11 +171,12 @@ class Camera:
         return np.asarray((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
 
 
-def _check_covariance(covariance: FloatArray, names: tuple[str, ...]) -> None:
-    size = len(names)
+def _check_covariance(covariance: FloatArray) -> None:
+    size = len(INTRINSICS)
     if covariance.shape != (size, size) or not (np.diag(covariance) >= 0).all():
         raise UserError(
-            f"the covariance must be {size} rows of {size} numbers, its diagonal from 0: {', '.join(names)}"
+            f"the covariance must be {size} rows of {size} numbers, its diagonal from 0: "
+            + ", ".join(INTRINSICS)
         )
     if not (np.isfinite(covariance).all() and np.array_equal(covariance, covariance.T)):
         raise UserError("the covariance of the intrinsics must be finite and symmetric")

@@ -16,17 +16,10 @@ import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.calibration.board_views import FEWEST_VIEWS, MAX_NAMED, coverage, find_views, unusable
+from pinnray.vision.calibration.board_views import FEWEST_VIEWS, coverage, find_views, unusable
 from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera_fit import fit_camera, held_out_rms, rms
 from pinnray.vision.calibration.chessboard import Board
-from pinnray.vision.calibration.lens_fit import (
-    LENS_CHOICES,
-    LensChoice,
-    UnusableViewsError,
-    fit_lens,
-    held_out_rms,
-    rms,
-)
 from pinnray.vision.frames.frame import GreyImage
 
 LEAST_COVERAGE = 0.6
@@ -69,21 +62,21 @@ class Calibration:
 
 
 def calibrate_camera(
-    images: Iterable[tuple[str, GreyImage]], board: Board, *, lens: LensChoice = LENS_CHOICES[0]
+    images: Iterable[tuple[str, GreyImage]], board: Board, *, k3: bool = False
 ) -> Calibration:
     """Calibrate a camera from photographs of a board.
 
     Args:
         images: Names and grey photographs, all of one size; only one is in memory at a time.
         board: In the photographs.
-        lens: Model to fit.
+        k3: Whether to fit the third radial coefficient of the lens; else it is 0.
 
     Raises:
         UserError: If the sizes differ, fewer than 4 photographs show the board, or they do not determine the
             camera.
     """
     views, size, left_out = find_views(images, board)
-    return calibrate_views(views, board, size, lens=lens, left_out=left_out)
+    return calibrate_views(views, board, size, k3=k3, left_out=left_out)
 
 
 def calibrate_views(
@@ -91,46 +84,35 @@ def calibrate_views(
     board: Board,
     size: tuple[int, int],
     *,
-    lens: LensChoice = LENS_CHOICES[0],
+    k3: bool = False,
     left_out: Mapping[str, str] = MappingProxyType({}),
 ) -> Calibration:
     """Calibrate a camera from the corners of a board in images of `size`, (width, height).
 
-    Views that do not determine the board's pose are left out, and so are those that are no image of it.
+    Views that do not determine the board's pose are left out.
 
     Args:
         views: By name, in the order of `board.corners`, shape (n, 2), pixels; NaN where one was not seen.
         board: In the images.
         size: Of the images, pixels.
-        lens: Model to fit.
+        k3: Whether to fit the third radial coefficient of the lens; else it is 0.
         left_out: Reasons why other photographs are not used, by name.
 
     Raises:
         UserError: If there are fewer than 4 views, or they do not determine the camera.
     """
-    weak = {
-        name: unusable(view)
-        for name, view in views.items()
-        if not board.determines_pose(np.isfinite(view[:, 0]))
-    }
-    views, left_out = _without(views, left_out, weak)
+    able = {name: view for name, view in views.items() if board.determines_pose(np.isfinite(view[:, 0]))}
+    weak = {name: unusable(view) for name, view in views.items() if name not in able}
+    views, left_out = able, {**left_out, **weak}
     _check_enough(views, left_out, board)
-    try:
-        fitted = fit_lens(list(views.values()), board, size, lens)
-    except UnusableViewsError as error:
-        names = [list(views)[number] for number in error.numbers]
-        views, left_out = _without(
-            views, left_out, dict.fromkeys(names, "its corners are no image of the board")
-        )
-        _check_enough(views, left_out, board)
-        fitted = fit_lens(list(views.values()), board, size, lens)
     corners = list(views.values())
+    fitted = fit_camera(corners, board, size, k3=k3)
     calibration = Calibration(
         camera=fitted.camera,
         board=board,
         views=views,
         residuals=dict(zip(views, fitted.residuals, strict=True)),
-        held_out_rms=held_out_rms(corners, board, fitted.camera, lens),
+        held_out_rms=held_out_rms(corners, board, fitted.camera, k3=k3),
         coverage=coverage(corners, size),
         left_out=left_out,
     )
@@ -138,44 +120,16 @@ def calibrate_views(
     return calibration
 
 
-def _without(
-    views: Mapping[str, FloatArray], left_out: Mapping[str, str], reasons: Mapping[str, str]
-) -> tuple[dict[str, FloatArray], dict[str, str]]:
-    """Views without some, and these among those that are left out."""
-    return {name: view for name, view in views.items() if name not in reasons}, {**left_out, **reasons}
-
-
 def _check_enough(views: Mapping[str, FloatArray], left_out: Mapping[str, str], board: Board) -> None:
     if len(views) >= FEWEST_VIEWS:
         return
     missing = f"no board of {board} was found"
-    others = [f"{name}: {reason}" for name, reason in left_out.items() if reason != missing]
+    weak = [f"{name}: {reason}" for name, reason in left_out.items() if reason != missing]
+    advice = f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
     raise UserError(
         f"{len(views)} of {len(views) + len(left_out)} photographs show the board of {board}; "
-        + (
-            f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
-            if views or others
-            else "count them"
-        )
-        + "".join(f"; {other}" for other in others[:MAX_NAMED])
+        + "; ".join([advice if views or weak else "count them", *weak])
     )
-
-
-def better_lens(
-    calibration: Calibration, lens: LensChoice, *, ratio: float = 0.8
-) -> tuple[LensChoice, float] | None:
-    """A lens whose held-out error is below `ratio` times that of the calibration, and this error, pixels."""
-    camera, corners = calibration.camera, list(calibration.views.values())
-    errors = {}
-    for other in LENS_CHOICES:
-        if other != lens:
-            try:
-                fitted = fit_lens(corners, calibration.board, (camera.width, camera.height), other).camera
-                errors[other] = held_out_rms(corners, calibration.board, fitted, other)
-            except UserError:
-                continue
-    best = min(errors, key=errors.__getitem__, default=lens)
-    return (best, errors[best]) if errors.get(best, np.inf) < ratio * calibration.held_out_rms else None
 
 
 def _warn(calibration: Calibration) -> None:

@@ -11,7 +11,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_json
-from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera import INTRINSICS, Camera
 from pinnray.vision.calibration.camera_calibration import Calibration
 
 
@@ -63,14 +63,14 @@ def load_camera(path: Path) -> Camera:
         raise UserError(f"{path}: a camera has image_width, image_height, camera_matrix and more")
     width, height = (_number(content, name, path) for name in ("image_width", "image_height"))
     matrix = _matrix(content, "camera_matrix", path, sizes=(9,)).reshape(3, 3)
-    model = "fisheye" if content.get("fisheye_model") else "brown"
-    sizes = (4,) if model == "fisheye" else (4, 5)
-    distortion = _matrix(content, "distortion_coefficients", path, sizes=sizes)
-    coefficients = tuple(np.resize([*distortion, 0.0], max(sizes)).tolist())
+    if content.get("fisheye_model"):
+        raise UserError(f"{path}: its lens is a fisheye, which is not read; calibrate with pinnray calibrate")
+    distortion = _matrix(content, "distortion_coefficients", path, sizes=(4, 5))
+    coefficients = tuple(np.resize([*distortion, 0.0], 5).tolist())
     fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     try:
-        camera = Camera(width, height, fx, fy, cx, cy, coefficients, model)
-        return replace(camera, covariance=_covariance(content, len(camera.intrinsic_names), path))
+        camera = Camera(width, height, fx, fy, cx, cy, coefficients)
+        return replace(camera, covariance=_covariance(content, len(INTRINSICS), path))
     except UserError as error:
         raise UserError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
 
@@ -85,12 +85,12 @@ def _content(camera: Camera) -> dict[str, object]:
     content: dict[str, object] = {
         "image_width": camera.width,
         "image_height": camera.height,
-        "fisheye_model": int(camera.model == "fisheye"),
+        "fisheye_model": 0,
         "camera_matrix": _entry(camera.matrix.tolist()),
         "distortion_coefficients": _entry([camera.distortion]),
     }
     if camera.covariance is not None:
-        content["intrinsics"] = list(camera.intrinsic_names)
+        content["intrinsics"] = list(INTRINSICS)
         content["intrinsics_standard_deviations"] = _entry([camera.standard_deviations or ()])
         content["intrinsics_covariance"] = _entry(camera.covariance)
     return content
@@ -103,17 +103,11 @@ def _entry(rows: Sequence[Sequence[float]]) -> dict[str, object]:
 
 
 def _covariance(content: Mapping[str, Any], size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:
-    """The covariance in the file, or a diagonal one from standard deviations, or None."""
+    """The covariance in the file, or None."""
     if "intrinsics_covariance" in content:
         covariance = _matrix(content, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
-    elif "intrinsics_standard_deviations" in content:
-        deviations = _matrix(content, "intrinsics_standard_deviations", path, sizes=(size,))
-        if (deviations < 0).any():
-            raise UserError("a standard deviation is below zero")
-        covariance = np.diag(deviations**2)
-    else:
-        return None
-    return tuple(map(tuple, covariance.tolist()))
+        return tuple(map(tuple, covariance.tolist()))
+    return None
 
 
 def _number(content: Mapping[str, Any], name: str, path: Path) -> int:

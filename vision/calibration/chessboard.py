@@ -18,11 +18,8 @@ RADII = (2.5, 12.0)
 """Smallest and largest radius of the pixels that a corner is fitted to."""
 LARGE = 1600
 """Longer side of an image, pixels, above which corners are first searched in a smaller one."""
-SEARCHES = ((1, 0), (2, 0), (1, cv2.CALIB_CB_EXHAUSTIVE))
-"""Factors by which an image is shrunk and OpenCV's flags, until a board is found.
-
-The smaller image sharpens a blurred board; the exhaustive search finds boards that a fisheye bends.
-"""
+SEARCHES = (1, 2)
+"""Factors by which an image is shrunk until a board is found: the smaller image sharpens a blurred board."""
 LEAST_RANK = 0.01
 """Eighth singular value of a homography's equations over the first, below which points do not determine it.
 
@@ -82,22 +79,21 @@ class Board:
         calibration", BMVC 2018, as in OpenCV; then `pinnray.vision.calibration.corner_refinement`.
         """
         shrink = max(1.0, max(image.shape) / LARGE)
-        for factor, flags in SEARCHES:
-            if (guesses := self._guesses(image, factor * shrink, flags)) is not None:
+        for factor in SEARCHES:
+            if (guesses := self._guesses(image, factor * shrink)) is not None:
                 break
         else:
             return None
         refined = self.refine(image, guesses, EDGE * self.square)
         seen = np.isfinite(refined[:, 0]).reshape(self.rows, self.columns)
-        # OpenCV adds rows to smaller boards; its exhaustive search also has false corners in true rows.
-        whole = seen.all() if flags else seen.any(axis=0).all() and seen.any(axis=1).all()
-        return refined if whole else None
+        # OpenCV adds rows to smaller boards.
+        return refined if seen.any(axis=0).all() and seen.any(axis=1).all() else None
 
-    def _guesses(self, image: GreyImage, shrink: float, flags: int) -> FloatArray | None:
+    def _guesses(self, image: GreyImage, shrink: float) -> FloatArray | None:
         """Corners that OpenCV finds in an image shrunk by a factor, shape (n, 2), pixels of the image."""
         small = _smaller(image, shrink)
         found, corners = cv2.findChessboardCornersSB(
-            small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY | flags
+            small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
         )
         if not found:
             return None

@@ -23,6 +23,8 @@ VOTES = (5.0, 8.0)
 """Limits of the gradients that must point at a centre: twice the least radius, a third of the edge."""
 EDGE = 100.0
 """Canny's higher threshold; the blurred mask's edges have 160 or more whatever the light."""
+LARGEST = 25.0
+"""Largest radius of a marker in the picture of a colour, pixels."""
 LEAST_FILL = 0.4
 """Share of the colour within a circle minus that around it: 1 for a whole marker, about 0 for a corner."""
 
@@ -74,27 +76,20 @@ def propose_circles(
     return found[order][_first_of_overlapping(found[order])] + (x0, y0, 0)
 
 
-def highlight_colour(
-    image: Image, colour: Colour, circles: FloatArray | None = None, *, radius: float = 25.0
-) -> tuple[Image, float]:
+def highlight_colour(image: Image, colour: Colour) -> tuple[Image, float]:
     """Draw a picture to check a colour by eye.
 
     Args:
         image: Shape (h, w) or (h, w, 3).
         colour: Drawn in magenta; the rest is pale.
-        circles: x, y and radius, shape (n, 3), pixels, drawn in green.
-        radius: Largest radius that is searched for, pixels.
 
     Returns:
         The picture, shape (h, w, 3), and the share of its pixels that have the colour.
     """
-    mask = colour.mask(np.asarray(cv2.medianBlur(image, 3), dtype=np.uint8), radius)
+    mask = colour.mask(np.asarray(cv2.medianBlur(image, 3), dtype=np.uint8), LARGEST)
     coloured = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
     picture = cv2.addWeighted(coloured, 0.5, np.full_like(coloured, 255), 0.5, 0)
     picture[mask > 0] = (200, 0, 200)
-    for x, y, r in np.empty((0, 3)) if circles is None else circles:
-        centre = (round(16 * x), round(16 * y))  # with 4 bits behind the point
-        cv2.circle(picture, centre, round(16 * (r + 2)), (0, 140, 0), 1, cv2.LINE_AA, shift=4)
     return np.asarray(picture, dtype=np.uint8), float(mask.mean()) / 255
 
 

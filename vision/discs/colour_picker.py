@@ -1,4 +1,4 @@
-"""Range of a marker's colour from an example: a click into the marker, or a rectangle within it."""
+"""Range of a marker's colour from a click into it."""
 
 from collections.abc import Sequence
 
@@ -29,7 +29,7 @@ def pick_colour(image: Image, place: Sequence[float]) -> ColourRange:
 
     Args:
         image: Shape (h, w), for L* alone, or (h, w, 3).
-        place: x, y of a point in the marker, or x0, y0, x1, y1 of a rectangle that it mostly fills, pixels.
+        place: x, y of a point in the marker, pixels.
 
     Raises:
         UserError: If the place is not in the image, or there is no patch of one colour.
@@ -57,16 +57,13 @@ def _lab(image: Image) -> FloatArray:
 def _example(lab: FloatArray, place: Sequence[float]) -> BoolArray:
     """Mask of similar pixels that are connected to the place, shape (h, w)."""
     height, width = lab.shape[:2]
-    if len(place) not in (2, 4) or not np.isfinite(place).all():
-        raise UserError(f"a place is x,y or x0,y0,x1,y1 in pixels, not {','.join(map(str, place))}")
     where = ",".join(f"{value:g}" for value in place)
-    corners = np.rint(np.resize(place, 4)).astype(int)
-    (x0, x1), (y0, y1) = sorted(corners[::2].tolist()), sorted(corners[1::2].tolist())
-    if x0 < 0 or y0 < 0 or x1 >= width or y1 >= height:
+    if len(place) != 2 or not np.isfinite(place).all():
+        raise UserError(f"a place is x,y in pixels, not {where}")
+    x, y = np.rint(place).astype(int).tolist()
+    if not (0 <= x < width and 0 <= y < height):
         raise UserError(f"{where} is not within the image of {width}x{height} pixels")
-    if len(place) == 2:
-        x0, y0, x1, y1 = max(x0 - 1, 0), max(y0 - 1, 0), x1 + 1, y1 + 1
-    chosen = np.s_[y0 : y1 + 1, x0 : x1 + 1]
+    chosen = np.s_[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
     alike = (np.abs(lab - np.median(lab[chosen], axis=(0, 1))) <= ALIKE).all(axis=2)
     _, patches = cv2.connectedComponents(alike.astype(np.uint8), connectivity=4)
     example = alike & np.isin(patches, patches[chosen])

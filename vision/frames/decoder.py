@@ -1,7 +1,6 @@
 """Decodes picture files into images of 8 bits, page by page."""
 
 import re
-import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -15,7 +14,7 @@ from cv2.typing import MatLike
 from PIL import Image as PictureFile
 
 from pinnray.runtime.errors import UserError
-from pinnray.vision.frames.formats import PNG, TIFF, UNREAD, is_unread, pages
+from pinnray.vision.frames.formats import DAMAGED, PNG, TIFF, UNREAD, is_unread, pages
 from pinnray.vision.frames.frame import Image
 
 JPEG, PNG_END = b"\xff\xd8", b"\0\0\0\0IEND\xaeB`\x82"
@@ -119,7 +118,7 @@ def _check_png(content: bytes, label: str) -> None:
     try:
         with warnings.catch_warnings(action="ignore"), PictureFile.open(BytesIO(content)) as picture:
             picture.verify()
-    except (OSError, SyntaxError, LookupError, ValueError, struct.error, PictureFile.DecompressionBombError):
+    except DAMAGED:
         raise UserError(f"cannot read {label}: one of its parts is damaged, or it is too large") from None
 
 

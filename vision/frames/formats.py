@@ -1,7 +1,14 @@
 """Formats of picture files: those that are not read, and the numbers of pages."""
 
 import re
+import struct
+import warnings
 from collections.abc import Sequence
+from contextlib import suppress
+from io import BytesIO
+
+from PIL import Image as PictureFile
+from PIL import ImageSequence
 
 from pinnray.runtime.errors import UserError
 
@@ -22,8 +29,10 @@ read them, and one calibration fits all.
 _BRANDS = frozenset(b"heic heix heim heis hevc hevx mif1 msf1 mif2 avif avis crx".split())
 SUBFILE, _SMALLER, _MASK = 254, 1, 4
 """A TIFF page's tag NewSubfileType, and its bits: a smaller copy of another page, a mask of one."""
-DESCRIPTION = 8192
-"""Bytes at the start of a TIFF in which ImageJ writes how many images it has."""
+DESCRIPTION = 270
+"""A TIFF page's tag ImageDescription, in which ImageJ writes how many images it has."""
+DAMAGED = (OSError, SyntaxError, LookupError, ValueError, struct.error, PictureFile.DecompressionBombError)
+"""Errors of Pillow for a picture that is damaged or too large."""
 
 
 def is_unread(content: bytes) -> bool:
@@ -46,53 +55,27 @@ def pages(content: bytes, label: str) -> Sequence[int]:
     Smaller copies and masks of other pages of a TIFF are left out.
 
     Raises:
-        UserError: If there are fewer than the file says; it names the file by `label`.
+        UserError: If there are fewer than ImageJ says in the file; it names the file by `label`.
 
-    Source: PNG specification, third edition, section 11.3.6.1; WebP container specification; TIFF 6.0,
-    section 2, and the BigTIFF design.
+    Source: TIFF 6.0, section 8, NewSubfileType.
     """
-    if content.startswith(PNG):
-        control = content.find(b"acTL", 0, content.find(b"IDAT"))
-        return range(max(1, int.from_bytes(content[control + 4 : control + 8], "big") if control > 0 else 1))
-    if content.startswith(b"RIFF"):
-        return range(max(1, _frames_of_webp(content)))
-    return _pages_of_tiff(content, label) or [0] if content.startswith(TIFF) else [0]
-
-
-def _frames_of_webp(content: bytes) -> int:
-    at, frames = len(b"RIFFsizeWEBP"), 0
-    while at + 8 <= len(content):
-        frames += content[at : at + 4] == b"ANMF"
-        size = int.from_bytes(content[at + 4 : at + 8], "little")
-        at += 8 + size + size % 2
-    return frames
-
-
-def _pages_of_tiff(content: bytes, label: str) -> list[int]:
-    little, big = content.startswith(b"II"), content[2:4] in (b"+\0", b"\0+")
-    offset, width, counts, entry = (8, 8, 8, 20) if big else (4, 4, 2, 12)
-
-    def number(at: int, size: int) -> int:
-        return int.from_bytes(content[at : at + size], "little" if little else "big")
-
-    kinds: list[int] = []
-    seen: set[int] = set()
-    at = number(offset, width)
-    cut = False
-    while at and at not in seen:
-        seen.add(at)
-        entries, start = number(at, counts), at + counts
-        if cut := start + entries * entry + width > len(content):
-            break
-        tags = {number(start + entry * k, 2): start + entry * k for k in range(entries)}
-        kinds.append(number(tags[SUBFILE] + entry - width, 4) if SUBFILE in tags else 0)
-        at = number(start + entries * entry, width)
-    whole = [page for page, kind in enumerate(kinds) if not kind & (_SMALLER | _MASK)]
-    said = re.search(rb"ImageJ=[^\0]*?images=(\d+)", content[:DESCRIPTION])
-    promised = int(said[1]) if said else len(kinds)
-    if promised > len(kinds) or (cut and len(kinds) > 1):
+    if not has_pages(content):
+        return [0]
+    kinds, promised = [], 0
+    with (
+        suppress(*DAMAGED),
+        warnings.catch_warnings(action="ignore"),
+        PictureFile.open(BytesIO(content)) as file,
+    ):
+        said = re.search(r"ImageJ=[^\0]*?images=(\d+)", str(getattr(file, "tag_v2", {}).get(DESCRIPTION)))
+        promised = int(said[1]) if said else 0
+        if not content.startswith(TIFF):
+            return range(getattr(file, "n_frames", 1))
+        for page in ImageSequence.Iterator(file):
+            kinds.append(getattr(page, "tag_v2", {}).get(SUBFILE, 0))
+    if promised > len(kinds):
         raise UserError(
             f"cannot read {label}: its end is missing, or it is a stack of more than 4 GB: {len(kinds)} of "
-            f"its {f'{promised} ' if said else ''}pages can be read; save it as single pictures"
+            f"its {promised} pages can be read; save it as single pictures"
         )
-    return whole
+    return [page for page, kind in enumerate(kinds) if not kind & (_SMALLER | _MASK)] or [0]

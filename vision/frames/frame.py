@@ -5,7 +5,7 @@ sensor read them: a rotation in a file's metadata is ignored, in films and in ph
 (`pinnray.vision.frames.sources`), so that one calibration fits both.
 """
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -83,18 +83,8 @@ class Frames:
             raise UserError(f"{name} has no frame that can be read")
         self._first = first
         self.size, self.simulated = _size(first.image), first.simulated
-        self._keep: Callable[[Image], None] = lambda image: None
-
-    def keep(self, write: Callable[[Image], None]) -> None:
-        """Give every image to a function too, before it is iterated: a camera or a pipe shows it once."""
-        self._keep = write
 
     def __iter__(self) -> Iterator[Frame]:
-        for frame in self._numbered():
-            self._keep(frame.image)
-            yield frame
-
-    def _numbered(self) -> Iterator[Frame]:
         yield Frame(0, 0.0, self._first.image)
         for number, captured in enumerate(self._images, start=1):
             if _size(captured.image) != self.size:

@@ -4,7 +4,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import partial
 from glob import has_magic
 from itertools import chain, count, islice
@@ -108,25 +108,18 @@ def _images_of_camera(index: int, capture: cv2.VideoCapture) -> ImageStream:
         capture.release()
 
 
-def photographs(sources: Iterable[Path], *, without: Sequence[str] = ()) -> Iterator[tuple[str, GreyImage]]:
+def photographs(sources: Iterable[Path]) -> Iterator[tuple[str, GreyImage]]:
     """Names and photographs, shape (height, width), as the sensor read them: never turned.
 
     Args:
         sources: Pictures, folders of them, patterns such as photos/*.jpg, or videos.
-        without: Names to leave out, with or without their folders.
 
     Raises:
-        UserError: If a source cannot be read, or there is no photograph of a name in `without`.
+        UserError: If a source cannot be read.
     """
-    absent = set(without)
     for name, image in chain.from_iterable(map(_images, sources)):
-        names = {name, Path(name).name}
-        if names.isdisjoint(without):
-            grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-            yield name, np.asarray(grey, dtype=np.uint8)
-        absent -= names
-    if absent:
-        raise UserError(f"there is no photograph {', '.join(sorted(absent))} to leave out")
+        grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+        yield name, np.asarray(grey, dtype=np.uint8)
 
 
 def _images(source: Path) -> Iterator[tuple[str, Image]]:

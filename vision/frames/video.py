@@ -35,10 +35,12 @@ from pinnray.vision.frames.frame import (
 
 MISSING_FRACTION = 0.02
 """Tolerance of a video's frame count, as a fraction: the number in its header may be that wrong."""
-ENCODERS = {"FFV1": ("ffv1", "bgr0"), "MJPG": ("mjpeg", "yuvj420p"), "mp4v": ("mpeg4", "yuv420p")}
-"""FFmpeg's name of a codec and its pixel format, by the codec's four letters."""
-CODECS = {".mkv": "FFV1", ".avi": "MJPG", ".mp4": "mp4v"}
-"""By the suffix of a video that is written. FFV1 is lossless."""
+CODECS = {
+    ".mkv": ("FFV1", "ffv1", "bgr0"),
+    ".avi": ("MJPG", "mjpeg", "yuvj420p"),
+    ".mp4": ("mp4v", "mpeg4", "yuv420p"),
+}
+"""Codec, FFmpeg's name of it and pixel format, by the suffix of a video that is written. FFV1 is lossless."""
 BY_SLICES = ("ffv1",)
 """Decoders whose threads share a frame: with a frame for each, FFmpeg 8 corrupts memory at a damaged one."""
 MIN_QUANTISER, BITS_PER_PIXEL = "3", 4
@@ -139,7 +141,7 @@ def _decoded(container: InputContainer) -> Iterator[av.VideoFrame]:
 
 @contextmanager
 def video_writer(
-    path: str | Path, size: tuple[int, int], rate: float, codec: str | None = None, *, comment: str = ""
+    path: str | Path, size: tuple[int, int], rate: float, *, comment: str = ""
 ) -> Iterator[Callable[[Image], None]]:
     """Writes a video with the function that it gives: every call appends a frame, grey or coloured.
 
@@ -150,7 +152,6 @@ def video_writer(
         path: Of the video.
         size: (width, height) of the frames, pixels.
         rate: Frames a second.
-        codec: ffv1, mjpg or mp4v; that of `CODECS` if not given.
         comment: Text in the file's metadata.
 
     Raises:
@@ -158,17 +159,14 @@ def video_writer(
         ShapeError: If a frame has another size.
     """
     path, (width, height) = Path(path), size
-    codecs = {name.lower(): name for name in ENCODERS}
     suffix = path.suffix.lower()
-    if suffix not in CODECS or (codec is not None and codec.lower() not in codecs):
+    if suffix not in CODECS:
         raise UserError(
-            f"cannot write the video {path}{f' as {codec}' if codec else ''}; "
-            "it can be .mkv (ffv1, lossless), .avi (mjpg) or .mp4 (mp4v)"
+            f"cannot write the video {path}; it can be .mkv (ffv1, lossless), .avi (mjpg) or .mp4 (mp4v)"
         )
     if not 0 < rate <= MAX_RATE or min(size) < 1:
         raise UserError(f"cannot write a video of {width}x{height} pixels, {rate:g} frames a second")
-    name = codecs[codec.lower()] if codec else CODECS[suffix]
-    encoder, pixel_format = ENCODERS[name]
+    name, encoder, pixel_format = CODECS[suffix]
     right, below = width % 2, height % 2
     written = 0
 

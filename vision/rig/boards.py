@@ -12,7 +12,6 @@ from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.calibration.charuco import DICTIONARIES, CharucoBoard
 from pinnray.vision.calibration.chessboard import Board
 from pinnray.vision.rig.shapes import Scene, Shape, rectangle
-from pinnray.vision.tracking.workspace import Workspace
 
 PAPER, INK, WALL = (0.90, 0.91, 0.90), (0.06, 0.06, 0.06), (0.35, 0.38, 0.40)
 MARGIN = 0.7
@@ -23,8 +22,6 @@ SIZE = (0.35, 0.65)
 """Length of the board's longer side over the image's."""
 RIM = 4.0
 """Between the board and the border of the image, pixels."""
-TILTED = 0.9
-"""Share of a picture's side that a board that stands upright in it may fill, so that it may be tilted."""
 TRIES = 150
 
 
@@ -56,17 +53,6 @@ def board_svg(board: Board) -> str:
         text-anchor="middle" fill="#606060">print at 100 %: a square is {board.square:g} mm</text>
 </svg>
 """
-
-
-def largest_square(board: Board, workspace: Workspace) -> float:
-    """Side of the largest squares, whole mm, of which a tilted board fits into a picture of the fiducials.
-
-    The picture is the rectangle around the fiducials with a sixteenth of its length beyond every side.
-    """
-    extent = np.ptp(workspace.points, axis=0) + workspace.fiducial_diameter
-    view = np.sort(extent + extent.max() / 8)
-    squares = np.sort([board.columns, board.rows]) + 1 + MARGIN
-    return float(max(1, np.floor(TILTED * min(view / squares))))
 
 
 def board_poses(board: Board, camera: Camera, count: int, *, seed: int = 0) -> list[Pose]:

@@ -15,8 +15,7 @@ from pinnray.vision.frames.frame import Image
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure, Light
 from pinnray.vision.rig.motion import Course, Motion
-from pinnray.vision.rig.occluders import share_seen
-from pinnray.vision.rig.render import mean_light, noise_of
+from pinnray.vision.rig.render import mean_light, noise_of, share_seen
 from pinnray.vision.rig.shapes import Shape, centroid
 
 STEP = 1.0

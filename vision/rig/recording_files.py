@@ -21,7 +21,7 @@ from pinnray.vision.rig.shapes import Scene
 from pinnray.vision.tracking.workspace import workspace_svg
 
 PICTURES = "png"
-FILES = {codec.lower(): f"video{suffix}" for suffix, codec in CODECS.items()} | {PICTURES: "frames"}
+FILES = {codec.lower(): f"video{suffix}" for suffix, (codec, *_) in CODECS.items()} | {PICTURES: "frames"}
 """File or folder of the frames by codec."""
 TRUTH_COLUMNS = (
     *("frame", "time_s", "load", "marker"),

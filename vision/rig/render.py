@@ -15,7 +15,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.rig.exposure import Exposure, Light
-from pinnray.vision.rig.shapes import Scene, seen_edges
+from pinnray.vision.rig.shapes import Scene, Shape, area, seen_edges
 
 
 def render(
@@ -120,6 +120,21 @@ def pixel_coverage(edges: FloatArray, size: tuple[int, int]) -> PixelCoverage:
     steps += np.bincount(place + 1, rise[seen] * before, minlength=len(steps))
     share = np.abs(np.cumsum(steps[:-1].reshape(height, width + 1), axis=1)[:, :width])
     return PixelCoverage(slice(top, top + height), slice(left, left + width), np.minimum(share, 1.0))
+
+
+def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: Pose) -> float:
+    """Share of a shape's image that is visible: inside the frame and not occluded, to a hundredth."""
+    size = (camera.width, camera.height)
+    edges = seen_edges(shape, camera, pose) + 0.5
+    whole = abs(area(edges))
+    rows, columns, left = pixel_coverage(edges, size)
+    for occluder in occluders:
+        hidden = np.zeros_like(left)
+        beside = seen_edges(occluder, camera, pose) + 0.5 - (columns.start, rows.start)
+        where = pixel_coverage(beside, (hidden.shape[1], hidden.shape[0]))
+        hidden[where.rows, where.columns] = where.share
+        left = left * (1 - hidden)
+    return float(left.sum() / whole)
 
 
 def _pieces(edges: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.geometry.registration import FIXED, Homography, Registration, nearest_similarity
+from pinnray.geometry.picture_frame import FIXED, Homography, Registration, nearest_similarity
 from pinnray.runtime.arrays import FloatArray
 
 LAID = Registration(turn=1.0, shift=1.0, scale=0.01)

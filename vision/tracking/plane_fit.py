@@ -57,7 +57,7 @@ def camera_plane(
     gain, inverse = _gain(jacobians[:, :6], covariances)
     # The fitted pose compensates errors of the intrinsics in part.
     follow = np.concatenate([-gain @ jacobians[:, 6:], np.eye(jacobians.shape[1] - 6)])
-    covariance = follow @ (camera.covariance or np.zeros((len(camera.intrinsic_names),) * 2)) @ follow.T
+    covariance = follow @ (camera.covariance or np.zeros((len(camera.intrinsics),) * 2)) @ follow.T
     covariance[:6, :6] += inverse * max(1.0, squares / (2 * len(points) - 6))
     residual = _rms(projection.points(pixels, pose) - points)
     parameters = np.append(pose, camera.intrinsics)

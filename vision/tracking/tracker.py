@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.disc_detector import FLOOR, DiscDetections
 from pinnray.vision.frames.frame import Frame, Frames

@@ -6,7 +6,7 @@ import numpy as np
 
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, Registration
+from pinnray.geometry.picture_frame import FIXED, Registration
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import model_validator
 
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_json
@@ -30,7 +31,7 @@ LARGEST = 1000.0
 """Largest diameter and distance of a workspace on a table, mm."""
 
 
-class Workspace(BaseModel):
+class Workspace(CheckedModel):
     """Fiducials around the finger, in the finger's frame: x to the tip, y out of the front.
 
     Attributes:
@@ -43,21 +44,12 @@ class Workspace(BaseModel):
         UserError: If there are fewer than four fiducials or they nearly lie on one line.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     fiducials: tuple[Point, ...]
-    fiducial_diameter: float = Field(default=4.0, gt=0, le=LARGEST)
-    marker_plane: float = Field(default=0.0, ge=-LARGEST, le=LARGEST)
+    fiducial_diameter: float = bounded(4.0, 0.1, LARGEST, "mm", "", "Diameter of every fiducial")
+    marker_plane: float = bounded(
+        0.0, -LARGEST, LARGEST, "mm", "", "Height of the markers' plane toward the camera"
+    )
     simulated: bool = False
-
-    def __init__(self, **values: object) -> None:
-        try:
-            super().__init__(**values)
-        except ValidationError as error:
-            first = error.errors()[0]
-            place = " ".join(".".join(map(str, first["loc"])).split())  # a key of a file may have line breaks
-            said = first["msg"].removeprefix("Value error, ")
-            raise UserError(f"workspace: {f'{place}: ' if place else ''}{said}") from None
 
     @model_validator(mode="after")
     def _determine_the_plane(self) -> Self:

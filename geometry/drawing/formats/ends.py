@@ -41,8 +41,8 @@ class Joined(NamedTuple):
 def joined(pieces: Sequence[Piece], tolerance: float = JOIN) -> Joined:
     """Pieces whose ends are nodes.
 
-    Equal ends are one node. A loose end is joined with the nearest other loose end within the tolerance, the
-    nearest first, so that short lines stay: no end is joined with more than one other.
+    Equal ends are one node. Two loose ends within the tolerance are joined if each is the nearest to the
+    other, so that short lines stay: no end is joined with more than one other.
     """
     ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
     node = _clusters(ends, cKDTree(ends).query_pairs(EQUAL, output_type="ndarray"))
@@ -54,7 +54,7 @@ def joined(pieces: Sequence[Piece], tolerance: float = JOIN) -> Joined:
     if len(lost):
         raise UserError(f"what is drawn at {place(places[lost[0]])} is smaller than {JOIN:g} mm; delete it")
     kept = [piece for piece, is_long in zip(pieces, long, strict=True) if is_long]
-    links, gaps = _matches(kept, nodes[long], places, tolerance)
+    links, gaps = _matches(nodes[long], places, tolerance)
     same = _clusters(places, links)
     _, first = np.unique(same, return_index=True)
     return Joined(kept, same[nodes[long]].astype(np.int64), places[first], gaps[gaps > JOIN])
@@ -65,27 +65,15 @@ def _clusters(points: FloatArray, pairs: IntArray) -> IntArray:
     return np.asarray(connected_components(links, directed=False)[1])
 
 
-def _matches(
-    pieces: Sequence[Piece], nodes: IntArray, places: FloatArray, tolerance: float
-) -> tuple[IntArray, FloatArray]:
-    """Pairs of loose ends (k, 2) that are one, with their distances, mm."""
-    loose = np.bincount(nodes.ravel(), minlength=len(places)) == 1
-    own = {
-        tuple(sorted(ends))
-        for ends, piece in zip(nodes.tolist(), pieces, strict=True)
-        if abs(piece.bulge) < 1
-    }
-    links, gaps, matched = list[IntArray](), list[float](), np.zeros(len(places), dtype=bool)
-    ends = np.flatnonzero(loose)
-    pairs = np.sort(ends[cKDTree(places[ends]).query_pairs(tolerance, output_type="ndarray")], axis=1)
-    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
-    for which in np.argsort(apart, kind="stable"):  # the nearest first
-        pair, gap = pairs[which], float(apart[which])
-        if not matched[pair].any() and tuple(pair.tolist()) not in own:
-            links.append(pair)
-            gaps.append(gap)
-            matched[pair] = True
-    return np.array(links, dtype=np.int64).reshape(-1, 2), np.array(gaps)
+def _matches(nodes: IntArray, places: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
+    """Pairs of loose ends (k, 2), each nearest to the other, that are one, with their distances, mm."""
+    ends = np.flatnonzero(np.bincount(nodes.ravel(), minlength=len(places)) == 1)
+    if len(ends) < 2:
+        return np.empty((0, 2), dtype=np.int64), np.empty(0)
+    apart, nearest = (found[:, 1] for found in cKDTree(places[ends]).query(places[ends], k=2))
+    numbers = np.arange(len(ends))
+    one = np.flatnonzero((nearest[nearest] == numbers) & (numbers < nearest) & (apart <= tolerance))
+    return np.stack([ends[one], ends[nearest[one]]], axis=1), apart[one]
 
 
 def check_extent(pieces: Sequence[Piece], scale: Scale) -> None:

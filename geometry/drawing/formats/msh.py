@@ -49,8 +49,8 @@ def read_msh(path: Path, units: str | None = None, tolerance: float | None = Non
     """The section of a Gmsh mesh of triangles or tetrahedra of first order, of any version of the format.
 
     A plane mesh gives its boundary, with the physical groups as labels; one with the groups `base` (or
-    `clamp`) and `contact` is kept as it is. The mesh of an extruded body gives the boundary of its end face;
-    sides in one line are joined.
+    `clamp`) and `contact` is kept as it is. The mesh of a body that is extruded along an axis gives the
+    boundary of its end face; sides in one line are joined.
 
     Args:
         path: The file.
@@ -100,7 +100,7 @@ def _extruded_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
     normals, areas = across / np.where(length > 0, length, 1)[:, None], length / 2
     corners = raw.points[raw.cells]
     volume = float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum()) / 6
-    for normal in _main_directions(normals, areas):
+    for normal in np.eye(3)[::-1]:
         heights = raw.points @ normal
         low, high = (float(end) for end in (heights[raw.cells].min(), heights[raw.cells].max()))
         flat = np.abs(normals @ normal) > 0.999
@@ -118,16 +118,7 @@ def _extruded_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
             note=f"MSH, extruded by {high - low:.6g} mm, at {plane_text(normal, low)}{gaps}",
             depth=high - low,
         )
-    raise UserError("its body is not extruded; give a mesh of the plane section")
-
-
-def _main_directions(normals: FloatArray, areas: FloatArray) -> list[FloatArray]:
-    """Directions that many faces share, by falling area; of equal ones, z before y before x."""
-    rounded = normals * np.sign(np.take_along_axis(normals, np.abs(normals).argmax(axis=1)[:, None], axis=1))
-    _, first, group = np.unique(np.round(rounded, 4), axis=0, return_index=True, return_inverse=True)
-    shares = np.bincount(group.ravel(), weights=areas)
-    order = np.argsort(-shares)[:12]
-    return [rounded[first[which]] for which in order]
+    raise UserError("its body is not extruded along an axis; give a mesh of the plane section")
 
 
 def _raw(path: Path, unit: float) -> RawMesh:

@@ -4,14 +4,12 @@ With `step_parts` and `pinnray.geometry.cad` the only module that imports CadQue
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import product
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import cadquery as cq
 import numpy as np
-from OCP.BRep import BRep_Tool
-from OCP.GeomLProp import GeomLProp_SLProps
 
 from pinnray.geometry.drawing.formats.closed_loops import closed_loops
 from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Scale
@@ -24,19 +22,41 @@ from pinnray.runtime.errors import UserError
 PARALLEL = 1e-6
 """Largest sine of the angle of two parallel directions."""
 
+SAME = 0.005
+"""Volume in which an extruded solid may differ from its section times its depth, as a share: for pockets."""
+
 
 class Cut(NamedTuple):
-    """A section of a solid, turned so that it lies across z."""
+    """A section of a solid or of a layer of it, turned so that it lies across z."""
 
     faces: Sequence[cq.Face]
     frame: cq.Location  # from the turned solid's frame into the file's
     offset: float  # of the section along z, mm
-    depth: float  # of the solid along z, mm
-    is_extruded: bool = True
+    depth: float  # of the solid or layer along z, mm
+
+    @property
+    def area(self) -> float:
+        """Area, mm^2."""
+        return float(sum(face.Area() for face in self.faces))
+
+    @property
+    def volume(self) -> float:
+        """Area times depth, mm^3."""
+        return self.area * self.depth
+
+    @property
+    def plane(self) -> str:
+        """The plane in words, such as `z = 6`."""
+        return plane_text(_array(cq.Plane(self.frame).zDir), self.offset)
 
 
 def read_step(
-    path: Path, units: str | None = None, tolerance: float | None = None, plane: str | None = None
+    path: Path,
+    units: str | None = None,
+    tolerance: float | None = None,
+    plane: str | None = None,
+    *,
+    depth_known: bool = False,
 ) -> Drawing:
     """The section of the one solid of a STEP file, with the markers that are parts called `marker-1`, ...
 
@@ -44,7 +64,12 @@ def read_step(
         path: The file.
         units: Unit in which the file's numbers are read; None means mm.
         tolerance: Largest gap between two ends that is closed, mm; None means 0.001 mm.
-        plane: Plane of the cut, such as `z = 6`; None means across an extruded solid.
+        plane: Plane of the cut, such as `z = 6`; None means across an extruded solid, or where the section
+            of another one is largest.
+        depth_known: Whether the depth is given, so that the solid need not be extruded.
+
+    Raises:
+        UserError: If the solid is not its section times its depth, and the depth is not given.
     """
     parts = parts_of(path)
     bodies = [part for part in parts if not part.is_marker]
@@ -58,7 +83,16 @@ def read_step(
     solid = _filled(bodies[0].solid, markers)
     scale = Scale(UNITS[units], units, "given") if units else Scale(origin="of the file")
     unit = scale.length
-    cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
+    turned, cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
+    apart = _apart(turned, cut)
+    if apart > SAME and not depth_known:
+        deep = _depths(_layers(turned, cut.frame))
+        sections = ", ".join(f"{area * unit**2:.4g} mm2 over {depth * unit:.4g} mm" for area, depth in deep)
+        raise UserError(
+            f"the solid is not extruded: across {cut.plane} its section is {sections}, and its volume "
+            f"{turned.Volume() * unit**3:.5g} mm3; give the depth of the finger and its plane, such as "
+            f'depth = {deep[0][1]:.4g} and plane = "{cut.plane}"'
+        )
     pieces = [
         piece
         for face in _united(cut.faces)
@@ -68,13 +102,13 @@ def read_step(
     ]
     discs = np.array([_disc(marker.moved(cut.frame.inverse)) for marker in markers]).reshape(-1, 4) * unit
     depth = f"{cut.depth * unit:.6g} mm"
-    how = f"extruded by {depth}" if cut.is_extruded else f"cut, {depth} across"
+    how = f"extruded by {depth}" if apart <= SAME else f"cut, {depth} across"
+    how += f" but for {100 * apart:.2g} % of the volume" if 1e-6 < apart <= SAME else ""
     closed = closed_loops(pieces, scale=scale, tolerance=tolerance)
-    normal = _array(cq.Plane(cut.frame).zDir)
     return Drawing(
         loops=closed.loops,
         unit=unit,
-        note=f"STEP, {how}, at {plane_text(normal, cut.offset)}{closed.note}",
+        note=f"STEP, {how}, at {cut.plane}{closed.note}",
         markers=discs[:, :2],
         marker_diameter=float(discs[:, 2].mean()) if markers else None,
         marker_height=float(discs[:, 3].mean()) if markers else None,
@@ -97,25 +131,57 @@ def _filled(body: cq.Solid, markers: Sequence[cq.Solid]) -> cq.Solid:
     return whole[0] if len(whole) == 1 else body
 
 
-def _across(solid: cq.Solid) -> Cut:
-    """The section of an extruded solid: of a box, across z, else across the smallest of its sides.
+def _across(solid: cq.Solid) -> tuple[cq.Shape, Cut]:
+    """The solid seen along the direction in which it is extruded, and its section: of a box, across z.
 
-    Pockets that do not reach half the depth, as for markers, are left out.
+    Of a solid that is not extruded, the direction in which one layer is about all of it.
     """
+    found = list[tuple[float, cq.Shape, Cut]]()
     for normal in sorted(_directions(solid), key=lambda normal: -abs(normal[2])):
         frame, turned = _turned(solid, normal)
-        if not _is_extruded(turned):
-            continue
         low, high = _extent(turned)
-        middle = _section(turned, 0.5 * (low + high))
-        area = sum(face.Area() for face in middle)
+        layer = max(_layers(turned, frame), key=lambda layer: layer.volume)
+        cut = layer._replace(depth=high - low)
         for offset in (low, high):  # a cap has the edges of the file
             cap = [face for face in turned.Faces() if np.abs(np.subtract(_extent(face), offset)).max() < 1e-6]
-            if abs(sum(face.Area() for face in cap) - area) < 1e-7 * area:
-                return Cut(cap, frame, offset, high - low)
-        if area * (high - low) > 0.5 * solid.Volume():
-            return Cut(middle, frame, 0.5 * (low + high), high - low)
-    raise UserError('the solid is not extruded; give the plane of the section, such as plane = "z = 6"')
+            if abs(sum(face.Area() for face in cap) - cut.area) < 1e-7 * cut.area:
+                cut = cut._replace(faces=cap, offset=offset)
+                break
+        if _apart(turned, cut) <= SAME:
+            return turned, cut
+        found.append((round(abs(layer.volume / solid.Volume() - 1), 1), turned, cut))
+    if not found:
+        raise UserError('the solid has no flat face; give depth, and the plane, such as plane = "z = 6"')
+    _, turned, cut = min(found, key=lambda each: each[0])
+    return turned, cut
+
+
+def _apart(turned: cq.Shape, cut: Cut) -> float:
+    """Volume in which a solid and its section times its depth differ, as a share of the solid's."""
+    low, volume = _extent(turned)[0], turned.Volume()
+    if abs(cut.volume - volume) > SAME * volume:
+        return abs(cut.volume - volume) / volume
+    lower, along = cq.Location(cq.Vector(0, 0, low - cut.offset)), cq.Vector(0, 0, cut.depth)
+    prisms = [cq.Solid.extrudeLinear(face.moved(lower), along) for face in cut.faces]
+    return (volume + cut.volume - 2 * sum(turned.intersect(prism).Volume() for prism in prisms)) / volume
+
+
+def _layers(turned: cq.Shape, frame: cq.Location) -> list[Cut]:
+    """Sections half way between the faces that lie across z, each with the distance of these faces."""
+    extents = [_extent(face) for face in turned.Faces()]
+    ends = [*_extent(turned), *(low for low, high in extents if high - low < 1e-5)]
+    found = []
+    for low, high in pairwise(sorted({round(height, 6) for height in ends})):
+        if high - low > 1e-4 and (faces := _section(turned, 0.5 * (low + high))):
+            found.append(Cut(faces, frame, 0.5 * (low + high), high - low))
+    return found
+
+
+def _depths(layers: Sequence[Cut]) -> list[tuple[float, float]]:
+    """Areas of sections, mm^2, from the largest on, and the depths, mm, over which they are so large."""
+    areas = np.array([layer.area for layer in layers]).round(3)
+    depths = np.array([layer.depth for layer in layers])
+    return [(area, float(depths[areas >= area].sum())) for area in np.unique(areas)[::-1].tolist()]
 
 
 def _directions(solid: cq.Solid) -> list[FloatArray]:
@@ -130,28 +196,8 @@ def _directions(solid: cq.Solid) -> list[FloatArray]:
     return found
 
 
-def _is_extruded(turned: cq.Shape) -> bool:
-    """Whether every face is parallel to z, or plane and across it."""
-    for face in turned.Faces():
-        slopes = [abs(float(normal[2])) for normal in _normals(face)]
-        if slopes and not (max(slopes) < PARALLEL or min(slopes) > 1 - PARALLEL):
-            return False
-    return True
-
-
-def _normals(face: cq.Face) -> Iterator[FloatArray]:
-    """Normals over a face, where they are defined: not at the tip of a cone or of a degenerate patch."""
-    low_u, high_u, low_v, high_v = face._uvBounds()
-    surface = GeomLProp_SLProps(BRep_Tool.Surface_s(face.wrapped), 1, 1e-9)
-    for u, v in product(np.linspace(low_u, high_u, 5), np.linspace(low_v, high_v, 5)):
-        surface.SetParameters(float(u), float(v))
-        if surface.IsNormalDefined():
-            normal = surface.Normal()
-            yield np.array([normal.X(), normal.Y(), normal.Z()])
-
-
-def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
-    """The cut of a solid with a plane; its depth is the solid's extent across the plane."""
+def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> tuple[cq.Shape, Cut]:
+    """A solid seen across a plane, and its section there; its depth is the solid's extent."""
     frame, turned = _turned(solid, normal)
     sign = float(np.sign(_array(cq.Plane(frame).zDir) @ normal))
     height = sign * offset
@@ -167,7 +213,7 @@ def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
         raise UserError(
             f"the plane {plane_text(normal, offset)} only touches the solid; move it into the solid"
         )
-    return Cut(faces, frame, height, high - low, _is_extruded(turned))
+    return turned, Cut(faces, frame, height, high - low)
 
 
 def _turned(solid: cq.Solid, normal: FloatArray) -> tuple[cq.Location, cq.Shape]:

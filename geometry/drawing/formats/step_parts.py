@@ -102,6 +102,9 @@ def _moved(solid: cq.Solid, place: gp_Trsf) -> cq.Shape:
 
 
 def _name(label: TDF_Label) -> str:
+    """Name of a label; asking for one that it lacks would end the process (CadQuery/OCP, issue 225)."""
     name = TDataStd_Name()
-    found = label.FindAttribute(TDataStd_Name.GetID_s(), name)
-    return str(name.Get().ToExtString()) if found else ""
+    if not label.IsAttribute(TDataStd_Name.GetID_s()):
+        return ""
+    label.FindAttribute(TDataStd_Name.GetID_s(), name)
+    return str(name.Get().ToExtString())

@@ -2,12 +2,9 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath
-from pinnray.runtime.exits import say
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
@@ -35,20 +32,13 @@ def command(
     """
     from pinnray.runtime.atomic import write_json, write_text
     from pinnray.vision.calibration.charuco import parse_board
-    from pinnray.vision.rig.boards import board_svg, largest_square
+    from pinnray.vision.rig.boards import board_svg
     from pinnray.vision.tracking.workspace import Workspace, default_workspace, workspace_svg
 
     design, _ = finger.read()
     chosen = parse_board(board, square, marker=marker, dictionary=dictionary)
     sheet = board_svg(chosen)
     workspace = Workspace(**{**default_workspace(design).model_dump(), "marker_plane": marker_plane})
-    fitting = largest_square(chosen, workspace)
-    if square > fitting:
-        say(
-            f"warning: a board of {square:g} mm squares is larger than the picture where the camera sees the "
-            "fiducials, and the film's focus holds for that distance only: give --square "
-            f"{fitting:g} or less"
-        )
     write_text(out / "fiducials.svg", workspace_svg(workspace, design))
     write_json(out / "fiducials.json", workspace.model_dump(mode="json"))
     write_text(out / "board.svg", sheet)

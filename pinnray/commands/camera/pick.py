@@ -5,18 +5,15 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OutputPath
 from pinnray.runtime.errors import UserError
 
 
-@quietable
 def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     *,
     at: str | None = None,
     colour: str | None = None,
-    radii: str | None = None,
     frame: int = 0,
     out: OutputPath = Path("out/pick.png"),
 ) -> int:
@@ -26,13 +23,12 @@ def command(
 
     Args:
         source: Picture, video, folder or glob of pictures, number of a camera, or - for a pipe.
-        at: Point X,Y in a marker, or rectangle X0,Y0,X1,Y1 inside it, pixels.
+        at: Point X,Y in a marker, pixels.
         colour: Colour to show instead: dark, or L*,L*:a*,a*:b*,b* as printed.
-        radii: Radii LEAST,LARGEST, pixels: draw the circles found between them.
         frame: Number of the frame, from 0.
         out: Output picture.
     """
-    from pinnray.vision.discs.circle_proposals import highlight_colour, propose_circles
+    from pinnray.vision.discs.circle_proposals import highlight_colour
     from pinnray.vision.discs.colour import read_colour
     from pinnray.vision.discs.colour_picker import pick_colour
     from pinnray.vision.frames.pictures import SUFFIXES, write_picture
@@ -42,18 +38,16 @@ def command(
         raise UserError(f"--out {out}: give the name of a picture, such as pick.png")
     if (at is None) == (colour is None):
         raise UserError("give either --at X,Y or --colour")
-    place = [] if at is None else read_numbers("--at", at, counts=(2, 4))
-    limits = [] if radii is None else read_numbers("--radii", radii, counts=(2,))
+    place = [] if at is None else read_numbers("--at", at, counts=(2,))
     with open_frames(source) as frames:
         image = next((found.image for found in frames if found.number == frame), None)
         if image is None:
             raise UserError(f"{source} has no frame {frame}")
     chosen = read_colour(colour) if colour is not None else pick_colour(image, place)
-    circles = propose_circles(image, chosen, radii=(limits[0], limits[1])) if limits else None
-    picture, share = highlight_colour(image, chosen, circles, radius=limits[1] if limits else 25.0)
+    picture, share = highlight_colour(image, chosen)
     write_picture(out, picture)
     print(f"--colour {chosen}")
-    print(f"{share:.2%} of the image" + ("" if circles is None else f", {len(circles)} circles"))
+    print(f"{share:.2%} of the image")
     print(out)
     return 0
 

@@ -4,12 +4,11 @@ from pathlib import Path
 from typing import cast, get_args
 
 from pinnray.commands.camera.pick import read_numbers
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import say
 
 
-@quietable
 def command(
     rest: Path,
     pressed: Path,
@@ -61,7 +60,9 @@ def command(
     write_measurements(out, found.observations)
     one, two = found.scales
     print(f"scale {one:.5g} mm per unit at rest, {two:.5g} pressed" + (", y down" if found.mirrored else ""))
-    if (found.order != range(len(found.order))).any():
+    for remark in found.remarks:
+        say(f"warning: {remark}")
+    if found.reordered:
         print("the points are in another order than the markers: each was given the nearest one")
     print(f"{found.misfit:.2g} mm from the drawing at rest (rms of a coordinate)")
     print(f"a clicked coordinate is known to {found.noise:.2g} mm, by {found.reason}")

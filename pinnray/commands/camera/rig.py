@@ -5,7 +5,6 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
-from pinnray.commands.quiet import quietable
 from pinnray.film.rig_settings import RigSettings
 from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
 from pinnray.runtime.errors import UserError
@@ -17,7 +16,6 @@ EXPOSURE = Parameter(name="*", group=Group("Exposure", sort_key=5))
 MOTION = Parameter(name="*", group=Group("Motion", sort_key=6))
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
@@ -38,7 +36,7 @@ def command(
 
     - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
     - pinnray rig --boards 20 --board 9x6 --square 8
-    - pinnray rig --moving 0 --cover 5=0.4 --codec mjpg --frame 640x480
+    - pinnray rig --moving 0 --codec mjpg --frame 640x480
 
     Args:
         solver: Solver of the filmed displacements; default: the finite-strain simulation of `compare`.

@@ -1,34 +1,35 @@
 """Track markers through a video."""
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Group, Parameter
 from rich.console import Console
-from rich.live import Live
 
-from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
-from pinnray.options.shared import FilmOptions, FingerOptions, Flag, OutputFlag, OutputPath
+from pinnray.options.shared import (
+    FilmOptions,
+    FingerOptions,
+    Flag,
+    MaterialOptions,
+    OutputFlag,
+    OutputPath,
+)
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
-from pinnray.solvers.physics import Material
 
 FORCE = Group("Force", sort_key=5)
 
 
-@quietable
 def command(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     *,
     finger: FingerOptions = FingerOptions(),
     options: FilmOptions = FilmSettings(),
     force: Annotated[bool, Parameter(group=FORCE, negative="")] = False,
-    elastic: Annotated[Material, Parameter(name="*", group=FORCE)] = Material(),
+    elastic: Annotated[MaterialOptions, Parameter(name="*", group=FORCE)] = MaterialOptions(),
     live: Flag = False,
-    publish: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    record: Path | None = None,
+    publish: Flag = False,
     without_video: OutputFlag = False,
     out: OutputPath = Path("out/track"),
 ) -> int:
@@ -40,70 +41,55 @@ def command(
 
     - pinnray track video.mkv --camera camera.json
     - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender
-    - pinnray track 0 --camera camera.json --live --force --young 11.4 --publish -
+    - pinnray track 0 --camera camera.json --force --young 11.4 --publish
 
     Args:
         source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
         force: Estimate the indenter's force and its place in every frame; with --live in the newest one. It
             is in proportion to Young's modulus; the markers correct Poisson's ratio and choose the law of
             finite strain unless --law gives one.
-        live: Show the displacements of every frame as it comes.
-        publish: With --live, write a line of JSON for every frame, with the newest force if --force: a file,
-            a named pipe, or - for the standard output, whose tables then go to standard error; default: none.
-        record: Keep the frames of a camera or a pipe as a video: .mkv (lossless), .avi or .mp4.
+        live: Show the newest force or, without --force, the displacements of every frame as it comes.
+        publish: As --live, and write a line of JSON for every frame, with the newest force if --force, to the
+            standard output; tables then go to standard error.
         without_video: Write no annotated video.
         out: Output folder.
     """
     from pinnray.comparison.pipeline.shared_mesh import shared_mesh
-    from pinnray.film.force_estimate import (
-        MESH,
-        LiveForce,
-        force_table,
-        force_tracker,
-        forces_of,
-        write_forces,
-    )
-    from pinnray.film.publication import Publisher, frame_lines, shown_line
+    from pinnray.film.force_estimate import MESH, force_table, force_tracker, forces_of, write_forces
+    from pinnray.film.live_force import LiveForce, frame_lines
     from pinnray.film.track_film import track_film, track_table
     from pinnray.runtime.machine import machine, package_versions
     from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
     from pinnray.runtime.stages import Stages
     from pinnray.solvers.registry import make_solver
 
-    if publish is not None and not live:
-        raise UserError("--publish is for --live")
     if elastic.model_fields_set and not force:
         raise UserError(f"--{min(elastic.model_fields_set)} is for --force")
     design, settings = finger.read(usual=MESH)
-    film, material = options.of(source), elastic if force else None
+    film, material = options.of(source), elastic.made() if force else None
     if material:
         finger.check_cost(design, settings, [make_solver("fem-id")])
     check_output(out)
-    console = Console(stderr=True)
-    forces, pace = [], None
+    console, live = Console(stderr=True), live or publish
+    forces, passed_over = [], None
     with replaced_folder(out) as folder:
-        with Stages(console, quiet=live) as stages, ExitStack() as stack:
+        with Stages(console) as stages:
             mesh = shared_mesh(design, settings, stages)[0] if material else None
             following = tracker = None
             if mesh is not None and material and live:
-                tracker = force_tracker(mesh, material, design.markers, design.marker_radius)
-                following = stack.enter_context(LiveForce(tracker, design.depth))
-            watch = None
-            if live:
-                line = stack.enter_context(Live(console=console, refresh_per_second=10))
-                published = [] if publish is None else [stack.enter_context(Publisher(publish))]
-                watch = frame_lines(following, shown_line(line, following), *published)
-            report = stack.enter_context(stages.stage("track"))
-            tracking, observations = track_film(
-                film, design, folder, report, video=not without_video, record=record, watch=watch
-            )
+                tracker = force_tracker(mesh, design, material, design.markers)
+                following = LiveForce(tracker, design.depth)
+            watch = frame_lines(following, publish=publish) if live else None
+            with stages.stage("track") as report:
+                tracking, observations = track_film(
+                    film, design, folder, report, video=not without_video, watch=watch
+                )
             if following is not None:
-                following.finish()
-                forces, pace = following.forces, following.live_rate
-        if mesh is not None and material and not live:
-            with Stages(console) as more, more.stage("force") as report:
-                tracker = force_tracker(mesh, material, observations.points, design.marker_radius)
-                forces = forces_of(tracking, tracker, report)
+                forces, passed_over = following.finished(), following.passed_over
+            elif mesh is not None and material:
+                with stages.stage("force") as report:
+                    tracker = force_tracker(mesh, design, material, observations.points)
+                    forces = forces_of(tracking, tracker, report)
         provenance = {"design": design.definition(), "versions": package_versions(), "machine": machine()}
         if tracker is not None and material:
             write_forces(folder, forces, design.depth)
@@ -111,15 +97,15 @@ def command(
                 "material": material.model_dump() | {"law": tracker.law},
                 "mesh": settings and settings.model_dump(),
                 "frames": len(forces),
-                "live": pace and pace._asdict(),
+                "passed_over": passed_over,
             }
         write_run(folder, provenance | {"seconds": stages.seconds})
     for warning in tracking.warnings:
         say(f"warning: {warning}")
-    said = console if publish == "-" else Console()
+    said = console if publish else Console()
     said.print(track_table(tracking, observations))
     if forces:
-        said.print(force_table(forces, design.depth, pace))
+        said.print(force_table(forces, design.depth, passed_over))
     for path in sorted(out.iterdir()):
         print(path, file=said.file)
     return 0

@@ -1,5 +1,6 @@
 """The main job: solve one finger with several solvers and compare them."""
 
+import re
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -7,9 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.film.film import FilmSettings
-from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
+from pinnray.options.file import (
+    OPTION,
+    given_options,
+    note_inputs,
+    note_versions,
+    read_options_file,
+    usual_options,
+)
 from pinnray.options.shared import (
     OUTPUT,
     Adapt,
@@ -27,10 +34,9 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 from pinnray.runtime.machine import cores
 
 if TYPE_CHECKING:
-    from pinnray.film.measured_film import MeasuredFilm
+    from pinnray.film.film import Film
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
@@ -45,6 +51,7 @@ def command(
     from_: Annotated[Path | None, Parameter(name=OPTION)] = None,
     out: OptionalOutputPath = None,
     pictures: Annotated[str, Parameter(group=OUTPUT)] = "",
+    width: Annotated[str | None, Parameter(group=OUTPUT)] = None,
     resume: OutputFlag = False,
     json_: Annotated[bool, Parameter(name="--json", group=OUTPUT)] = False,
 ) -> int:
@@ -72,8 +79,11 @@ def command(
         reference: Solver that the others are compared with; default fem, else the first.
         from_: File with options that the command line leaves out: TOML or JSON with a table `options`, or the
             run.json of an earlier run, which is repeated so; default: none.
-        out: Output folder; default out/DESIGN.
+        out: Output folder; default out/DESIGN, or out/DESIGN-MEASUREMENTS with the name of their file, unless
+            that holds the finished run of another job.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
+        width: Width of the pictures, such as 85mm (a journal's column) or 180mm (its page), whose type has 8
+            to 9 points; default 140mm.
         resume: Reuse solutions that an earlier run finished.
         json_: Print metrics.json and nothing else.
     """
@@ -84,7 +94,7 @@ def command(
     from pinnray.comparison.report.tables import body_table, marker_table
     from pinnray.options.preset_jobs import job_defaults
     from pinnray.options.solver_choice import spare_solvers
-    from pinnray.runtime.output_folder import RUN_FILE
+    from pinnray.runtime.output_folder import RUN_FILE, check_same_job
     from pinnray.runtime.stages import Stages
 
     earlier = read_options_file(from_) if from_ else None
@@ -93,11 +103,18 @@ def command(
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
     names = job_defaults(options.preset).solvers if solvers is None else solvers
+    given = given_options(
+        *(finger, physics, options, film),
+        **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
+        **{"reference": reference, "pictures": pictures, "width": width},
+    )
+    folder = out or _own_folder(design.name, measurements)
+    if out is None and not resume:
+        check_same_job(folder, given, usual_options(finger, physics, options, film))
     with nullcontext() if cores() < 2 else second_process(comma_list(names)) as pool:
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
         made, set_up = options.read(names), {text.partition(".")[0] for text in options.solver_set}
-        physics.check_law(made)
         finger.check_cost(design, mesh, made, simulated=measurements is None)
         job = Job(
             design=design,
@@ -110,14 +127,11 @@ def command(
             truth=_truth(truth, measurements),
             measurements=_measurements(measurements, film),
             reference=reference,
-            out=out or Path("out") / design.name,
+            out=folder,
             resume=resume,
             picture_formats=comma_list(pictures),
-            options=given_options(
-                *(finger, physics, options, film),
-                **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
-                **{"reference": reference, "pictures": pictures},
-            ),
+            picture_width=None if width is None else _millimetres(width),
+            options=given,
         )
         try:
             with Stages(Console(stderr=True), quiet=json_) as stages:
@@ -154,6 +168,22 @@ def command(
     return 0 if done else NOT_CONVERGED
 
 
+def _own_folder(name: str, measurements: str | None) -> Path:
+    """The output folder of a job that names none: that of its finger and its measurements."""
+    if measurements is None:
+        return Path("out") / name
+    source = re.sub(r"[^A-Za-z0-9._-]+", "-", Path(measurements).stem).strip("-.")
+    return Path("out") / f"{name}-{source or 'measurements'}"
+
+
+def _millimetres(text: str) -> float:
+    """A width in mm from a number with or without its unit."""
+    given = re.fullmatch(r"(\d+(?:\.\d+)?) *(mm|cm|in)?", text.strip())
+    if given is None:
+        raise UserError(f"--width {text}: give a number in mm, cm or in, such as 85mm")
+    return float(given[1]) * {"cm": 10.0, "in": 25.4}.get(given[2], 1.0)
+
+
 def _truth(name: str | None, measurements: str | None) -> str:
     """The name of what is simulated; nothing is where there are measurements."""
     from pinnray.comparison.evaluation.truths import SLIDING
@@ -163,12 +193,10 @@ def _truth(name: str | None, measurements: str | None) -> str:
     return SLIDING.name if name is None else name
 
 
-def _measurements(source: str | None, options: FilmSettings) -> "Path | MeasuredFilm | None":
+def _measurements(source: str | None, options: FilmSettings) -> "Path | Film | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
         if source is None and options.model_fields_set:
             raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
-        from pinnray.film.measured_film import MeasuredFilm
-
-        return None if source is None else MeasuredFilm(options.of(source))
+        return None if source is None else options.of(source)
     return existing(Path(source))

@@ -2,11 +2,9 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.runtime.exits import shown
 
 
-@quietable
 def command(run: Path, *more: Path) -> int:
     """Print the answers of a finished run, and where its report is.
 

@@ -2,8 +2,6 @@
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
-
 PRESET_MEANINGS = {
     "fast": "random hidden weights, output layer solved exactly",
     "local": "the same with small overlapping windows in place of gates",
@@ -12,7 +10,6 @@ PRESET_MEANINGS = {
 }
 
 
-@quietable
 def command() -> int:
     """List the solvers with their material laws, loads, presets and settings.
 

@@ -2,36 +2,32 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, comma_list
 from pinnray.runtime.errors import UserError
 
 STEP = "finger"
 """Name of the STEP file, beside which its clamp and contact lie."""
-CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf", "section.svg")
+CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf")
 PICTURE = "design.png"
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
     out: OutputPath = Path("out/cad"),
-    formats: str = "step,stl,dxf,svg",
+    formats: str = "step,stl,dxf",
 ) -> int:
-    """Draw the finger: CAD files of the body and its markers, and a dimensioned picture.
+    """Draw the finger: CAD files of the body and its markers, and a picture to scale.
 
     A .toml file has clamp, contact and markers as lines to change: those of finger.step or, with --section,
     of the drawing, with what was proposed.
 
     Args:
         out: Output folder.
-        formats: File formats, separated by commas: step, stl, dxf, svg.
+        formats: File formats, separated by commas: step, stl, dxf.
     """
-    from pinnray.comparison.figures.design_drawing import draw_design
     from pinnray.geometry.cache import cad_files
     from pinnray.geometry.drawing.drawn_finger import DrawnFinger, description_lines
-    from pinnray.geometry.finger.design import Design
     from pinnray.runtime.atomic import write_text
     from pinnray.runtime.exits import say
 
@@ -50,8 +46,7 @@ def command(
     write_text(lines, description_lines(chosen))
     if isinstance(chosen, DrawnFinger):
         say(f"note: {chosen.file} was read as {chosen.note}")
-    drawn = draw_design(chosen) if isinstance(chosen, Design) else chosen.plot()
-    picture = drawn.save(out / PICTURE)
+    picture = chosen.plot().save(out / PICTURE)
     for path in [*paths, lines, picture]:
         print(path)
     return 0

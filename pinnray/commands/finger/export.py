@@ -4,15 +4,12 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import FingerOptions, OutputPath, PhysicsOptions
 from pinnray.robots.export_settings import ExportSettings, Kind
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
-@quietable
 def command(
     kind: Kind,
     *,
@@ -31,7 +28,6 @@ def command(
         out: Output folder.
     """
     from pinnray.robots.export import SIZES
-    from pinnray.robots.score import score_table
     from pinnray.simulators import export
     from pinnray.solvers.registry import make_solver
 
@@ -41,8 +37,6 @@ def command(
     done = export(
         kind, chosen, out=out, size=mesh, material=material, load=load, progress=True, **dict(settings)
     )
-    if done.scores:
-        Console(soft_wrap=True).print(score_table(done.scores))
     for each in done.scores:
         print(f"{each.model}: {each.sentence}")
     for path in done.files:

@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OutputPath
 from pinnray.runtime.errors import UserError
 
 
-@quietable
 def command(
     test: Path | None = None,
     *,
@@ -17,8 +15,8 @@ def command(
 ) -> int:
     """Fit the elastic laws to a tensile test, or list the materials that are known.
 
-    The test is a CSV file with a column of nominal strain (strain or strain_percent) and one of nominal
-    stress (stress_MPa, stress_kPa or stress_Pa). Examples:
+    The test is a table with a column of nominal strain (strain or strain_percent) and one of nominal stress
+    (stress_MPa, stress_kPa or stress_Pa, or Engineering Stress (MPa)). Examples:
 
     - pinnray material
     - pinnray material strip.csv --poisson 0.49 --strain 0.3
@@ -56,11 +54,12 @@ def command(
     for part in (0.05, 0.1, 0.25, 0.5, 1.0):
         if measured.strain.min() <= part <= largest:
             print(f"secant modulus at {part:.0%}: {number(measured.secant(part), 4)} MPa")
-    best = fits[0].material
-    print(
-        f"--young {best.young:.5g} --poisson {poisson:g}"
-        + ("" if best.law == "linear" else f" --law {best.law}")
-    )
+    chosen = {"": fits[0]}
+    if fits[0].material.law == "linear":
+        finite = [fit for fit in fits if fit.material.law != "linear"][:1]
+        chosen = dict(zip(("small strain: ", "finite strain: "), [fits[0], *finite], strict=False))
+    for strains, fit in chosen.items():
+        print(f"{strains}--young {fit.material.young:.5g} --poisson {poisson:g} --law {fit.material.law}")
     if out is not None:
         from pinnray.comparison.figures.tensile_test import draw_tensile_test
 

@@ -2,13 +2,11 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import Adapt, FingerOptions, OutputPath, PhysicsOptions
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import NOT_CONVERGED
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),

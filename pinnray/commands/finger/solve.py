@@ -5,7 +5,6 @@ from math import hypot, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     Adapt,
     FingerOptions,
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from pinnray.solvers.finger_figures import FingerFigures
 
 
-@quietable
 def command(
     solver: str | None = None,
     *,
@@ -43,7 +41,7 @@ def command(
         strokes: Strokes at which to print the force, mm, separated by commas; default: the full one.
         out: VTU file of the fields.
     """
-    from pinnray.comparison.evaluation.certification import with_certificates
+    from pinnray.comparison.evaluation.certifier import with_certificates
     from pinnray.comparison.evaluation.deformed_body import with_body_checks
     from pinnray.comparison.evaluation.evaluation import evaluated
     from pinnray.comparison.evaluation.force_curves import force_curves, write_force_displacement
@@ -60,7 +58,7 @@ def command(
     from pinnray.solvers.finger_figures import NEAR_BREAK, break_answer
     from pinnray.solvers.problem import Problem
     from pinnray.solvers.registry import make_solver, unknown_solver
-    from pinnray.solvers.solver import Traits, solved, with_law
+    from pinnray.solvers.solver import check_asked, solved, with_law
     from pinnray.vision.measurements import read_measurements
 
     if not solver:
@@ -76,16 +74,14 @@ def command(
     chosen_solvers = options.read(solver)
     if len(chosen_solvers) != 1:
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
-    physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
     if at_strokes and "stops" in made.settings():
         made = make_solver(made.name, **made.settings() | {"stops": [each / travel for each in at_strokes]})
-    finger.check_cost(chosen, settings, [made])
     given = None
     if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)
-    if given and not Traits.of(made).assimilates:
-        raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
+    check_asked(made, material, given)
+    finger.check_cost(chosen, settings, [made])
     with Stages() as stages:
         triangles, adaptation = shared_mesh(
             chosen,
@@ -126,6 +122,8 @@ def command(
             say(f"warning: {said[:1].lower()}{said[1:-1]}")
         else:
             print(said)
+    if solution.identified:
+        print(solution.identified.advice)
     for path in written:
         print(path)
     whole = all(isfinite(force) for _, force in grip)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.text import Text
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import (
     FingerOptions,
     OptionalOutputPath,
@@ -15,20 +14,18 @@ from pinnray.options.shared import (
     comma_list,
     existing_table,
     going_on_from,
-    read_formats,
     read_processes,
 )
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 if TYPE_CHECKING:
-    from pinnray.solvers.physics import Material
+    from pinnray.solvers.material import Material
     from pinnray.studies.crossval.study import SolverVariant
 
 TEXTS = ("solver", "held out")
 """Headings of columns of words."""
 
 
-@quietable
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
@@ -43,7 +40,6 @@ def command(
     frame: str = "fixed",
     measurements: Path | None = None,
     processes: int | None = None,
-    pictures: str = "",
     out: OptionalOutputPath = None,
 ) -> int:
     """Score solvers on markers, loads and fields that they were not given.
@@ -66,10 +62,9 @@ def command(
             "turn 3 deg, shift 0.3 mm, scale 1 %".
         measurements: CSV file of marker displacements; default: simulated.
         processes: Solvers run at a time; default: one per core.
-        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/crossval-DESIGN.
     """
-    from pinnray.geometry.registration import Registration
+    from pinnray.geometry.picture_frame import Registration
     from pinnray.runtime.stages import Stages
     from pinnray.runtime.tables import terminal_table
     from pinnray.studies.crossval.cross_validation import cross_validate
@@ -96,10 +91,8 @@ def command(
         measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
         out=out or Path("out") / f"crossval-{design.name}",
         processes=read_processes(processes),
-        picture_formats=read_formats(pictures),
     )
     made = [variant.solver for variant in study.variants]
-    physics.check_law(made)
     finger.check_cost(design, mesh, made, simulated=True)
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")

@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import OptionalOutputPath
 from pinnray.runtime.errors import UserError
 
 
-@quietable
 def command(sweep: Path, *, out: OptionalOutputPath = None) -> int:
     """Write a page that shows the deformed finger at any load of a sweep, while sliders move.
 

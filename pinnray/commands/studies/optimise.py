@@ -4,11 +4,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 
 
-@quietable
 def command(
     question: Path,
     *,
@@ -26,18 +24,16 @@ def command(
     from pinnray.runtime.stages import Stages
     from pinnray.runtime.tables import terminal_table
     from pinnray.studies.optimum.page import front_table, text_table, write_front
-    from pinnray.studies.optimum.question import load_question
+    from pinnray.studies.optimum.question import Question
     from pinnray.studies.optimum.search import search_front
 
     formats = read_formats(options.pictures)
-    read = load_question(question)
+    read = Question.load(question)
     job = options.job(read, question, "optimum")
     with going_on_from(job.out), Stages() as stages:
         found = search_front(job, stages)
         with stages.stage("pictures"):
-            paths, designs = write_front(
-                found, job, job.out, stages.record(), formats, command="compare --from {}"
-            )
+            paths, designs = write_front(found, job, job.out, stages.record(), formats)
     columns = [0, *range(2, 2 + len(read.objectives))]  # the table in the file is too wide for a terminal
     shown = text_table("Fingers on the front", front_table(found).iloc[:, columns])
     Console().print(terminal_table(shown.title, shown.headings, shown.rows))

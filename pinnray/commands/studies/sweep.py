@@ -4,12 +4,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from pinnray.commands.quiet import quietable
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
-@quietable
 def command(
     study: Path,
     *,
@@ -26,12 +24,12 @@ def command(
     from pinnray.runtime.stages import Stages
     from pinnray.runtime.tables import terminal_table
     from pinnray.studies.sweep.page import write_sweep
-    from pinnray.studies.sweep.study import load_study
+    from pinnray.studies.sweep.study import Study
     from pinnray.studies.sweep.sweep import run_sweep
     from pinnray.studies.sweep.tables import failure_grid, quantity_grid
 
     formats = read_formats(options.pictures)
-    read = load_study(study)
+    read = Study.load(study)
     job = options.job(read, study, "sweep")
     with going_on_from(job.out), Stages() as stages:
         done = run_sweep(job, stages)

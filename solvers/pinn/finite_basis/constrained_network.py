@@ -14,7 +14,6 @@ from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION, NetworkEnergy
 from pinnray.solvers.pinn.finite_basis.load_conditions import load_conditions
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
 from pinnray.solvers.problem import Problem
 
 INVERSE_ITERATIONS = 3
@@ -56,16 +55,6 @@ class PointSprings(NamedTuple):
         weights = np.zeros((len(self.points), 2))
         weights[:, self.axes] = self.weights.T @ forces.reshape(-1, len(self.axes))
         return basis.slopes_of_values(self.points, weights, output)
-
-
-class LinearResponse(NamedTuple):
-    """Response of a network that is linearised at some output layer."""
-
-    residual: FloatArray  # First derivative of the energy there, shape (U,), N/mm
-    free: FloatArray  # Newton's step without springs, shape (U,), mm
-    unit: FloatArray  # Steps by unit forces of the springs, shape (n, U), mm per N/mm
-    damping: FloatArray  # Diagonal that regularised the second derivative, shape (U,), N/mm^2
-    negative: int  # Number of negative eigenvalues of the second derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,18 +103,13 @@ class ConstrainedNetwork:
         """The network with other neurons (3, m, c), the factor of the markers' weights held."""
         basis = replace(self.energy.basis, neurons=neurons)
         functionals = _functionals(self.springs, basis)
-        return replace(self, energy=self.energy.with_basis(basis), functionals=functionals, factor=factor)
+        return replace(self, energy=replace(self.energy, basis=basis), functionals=functionals, factor=factor)
 
     @property
     def zero_output(self) -> torch.Tensor:
         """The output layer without displacement."""
         basis = self.energy.basis
         return torch.zeros(basis.windows.count, 2, basis.per_window, dtype=torch.float64)
-
-    @property
-    def markers_at_rest(self) -> MarkerForces | None:
-        """The forces at the markers under the whole load, of a linear law; None without markers."""
-        return self.at_rest().markers
 
     @property
     def load_count(self) -> int:
@@ -159,7 +143,8 @@ class ConstrainedNetwork:
 
         With K the second derivative of the energy and r its first, y = K^-1 (-r) and x_k = K^-1 b_k for the
         functionals b_k; the step is y + f_k x_k with the forces f by which every spring with compliance s_k
-        is short of its target by s_k f_k.
+        is short of its target by s_k f_k. At its end the derivative of a quadratic energy is f_k b_k less the
+        damping's part, and the energy half of its product with the output layer.
 
         Args:
             output: Where the network is linearised.
@@ -169,31 +154,42 @@ class ConstrainedNetwork:
         Returns:
             None if a point of the quadrature is inside out.
         """
-        response = self.linear_response(output, shift)
-        return None if response is None else self.constrained_step(output, response, fraction)
-
-    def at_rest(self) -> NewtonIterate:
-        """The solution under the whole load, of a linear law."""
-        found = self.step(self.zero_output)
-        assert found is not None  # nothing is inside out at rest
-        return found
-
-    def linear_response(self, output: torch.Tensor, shift: float = REGULARISATION) -> LinearResponse | None:
-        """One factorisation, and one solve for every spring; None as in `step`."""
         if self.energy.quadratic and shift == REGULARISATION and not output.any():
             gradient, factors = output, self.energy.factors_at_rest
         else:
             gradient, hessian = self.energy.derivatives(output)
             if not torch.isfinite(gradient).all():
                 return None
-            factors = hessian.factorised(shift, definite=self.energy.material.law == "linear")
-        return self._responses(gradient, factors)
-
-    def _responses(self, gradient: torch.Tensor, factors: Factors) -> LinearResponse:
+            factors = hessian.factorised(shift, definite=self.energy.quadratic)
         residual = gradient.numpy().ravel()
         free, *responses = factors.solve(np.concatenate([-residual[None], self.functionals]))
         unit = np.reshape(responses, self.functionals.shape)
-        return LinearResponse(residual, free, unit, factors.damping, factors.negative)
+        springs = ConstrainedElimination(self.functionals, unit, self.compliance)
+        values = fraction * self.targets - springs.values(output.numpy())
+        markers = self._marker_forces(springs, values - springs.values(free))
+        factor = self.factor or (self.weighting.factor(markers) if self.weighting and markers else 1.0)
+        scaled = np.append(self.compliance[: self.load_count], self.compliance[self.load_count :] / factor)
+        springs = replace(springs, compliance=scaled)
+        change, forces = springs.solution(free, values)
+        decrement = abs(float((forces @ self.functionals - residual) @ change))
+        work = abs(float(fraction * self.targets @ forces))
+        reached = output + torch.from_numpy(change).view_as(output)
+        derivative = forces @ self.functionals - factors.damping * change
+        return NewtonIterate(
+            reached,
+            forces,
+            decrement / work if work else decrement,
+            markers,
+            factor,
+            springs.unstable(factors.negative),
+            0.5 * float(derivative @ reached.numpy().ravel()) if self.energy.quadratic else None,
+        )
+
+    def at_rest(self) -> NewtonIterate:
+        """The solution under the whole load, of a linear law."""
+        found = self.step(self.zero_output)
+        assert found is not None  # nothing is inside out at rest
+        return found
 
     def softest(self, output: torch.Tensor) -> FloatArray:
         """A soft direction at an output layer, of its shape, by inverse iteration under the constraints."""
@@ -205,36 +201,6 @@ class ConstrainedNetwork:
             found, _ = springs.solution(factors.solve(found[None])[0])
             found /= np.abs(found).max()
         return found.reshape(output.shape)
-
-    def constrained_step(
-        self, output: torch.Tensor, response: LinearResponse, fraction: float = 1.0
-    ) -> NewtonIterate:
-        """The Newton step by the springs' forces that close their gaps.
-
-        At the end of the step s the derivative of a quadratic energy is f_k b_k less the damping's D s, and
-        the energy half of its product with the output layer.
-        """
-        residual, free, unit, damping, negative = response
-        springs = ConstrainedElimination(self.functionals, unit, self.compliance)
-        values = fraction * self.targets - springs.values(output.numpy())
-        markers = self._marker_forces(springs, values - springs.values(free))
-        factor = self.factor or (self.weighting.factor(markers) if self.weighting and markers else 1.0)
-        scaled = np.append(self.compliance[: self.load_count], self.compliance[self.load_count :] / factor)
-        springs = replace(springs, compliance=scaled)
-        change, forces = springs.solution(free, values)
-        decrement = abs(float((forces @ self.functionals - residual) @ change))
-        work = abs(float(fraction * self.targets @ forces))
-        reached = output + torch.from_numpy(change).view_as(output)
-        derivative = forces @ self.functionals - damping * change
-        return NewtonIterate(
-            reached,
-            forces,
-            decrement / work if work else decrement,
-            markers,
-            factor,
-            springs.unstable(negative),
-            0.5 * float(derivative @ reached.numpy().ravel()) if self.energy.quadratic else None,
-        )
 
     def least(self, state: NewtonIterate) -> tuple[float, torch.Tensor]:
         """Energy with that of the springs at an equilibrium, N mm/mm, and its derivatives by the neurons.
@@ -267,14 +233,6 @@ class ConstrainedNetwork:
         rest = np.column_stack([flexibility[soft, soft], gap[soft]]) - flexibility[soft, load] @ held
         reduced = 0.5 * (rest[:, :-1] + rest[:, :-1].T)
         return MarkerForces(reduced, 1 / self.compliance[soft].reshape(-1, 2), rest[:, -1].reshape(-1, 2))
-
-    def project(self, field: FiniteBasisField) -> torch.Tensor:
-        """The output layer whose displacement is nearest to another network's in the linear energy."""
-        material = self.energy.material.model_copy(update={"law": "linear"})
-        found = replace(self, energy=replace(self.energy, material=material, origin=field)).step(
-            self.zero_output
-        )
-        return self.zero_output if found is None else found.output
 
 
 def _functionals(springs: Sequence[PointSprings], basis: FiniteBasis) -> FloatArray:

@@ -4,8 +4,7 @@ Source of stress and tangent: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanic
 2nd ed., sections 6.4.3 (neo-Hookean, with d(F^-T) = -F^-T dF^T F^-T) and 6.4.1 (St Venant-Kirchhoff).
 """
 
-from dataclasses import dataclass, replace
-from dataclasses import field as dataclass_field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import NamedTuple
@@ -24,13 +23,6 @@ from pinnray.solvers.problem import Material
 
 REGULARISATION = 1e-12
 """Added to the unit diagonal of the scaled Hessian, against nearly dependent basis functions."""
-
-KEPT = 2**30
-"""Most bytes of basis gradients that an energy of finite strain, or in training, keeps for its next use.
-
-The two levels of `pinn-std` on the default finger have 0.12 and 0.4 GB of them. Above the limit they are
-computed anew for every evaluation.
-"""
 
 LAWS: tuple[LawName, ...] = ("linear", "neo-hookean", "st-venant-kirchhoff")
 """Those of `pinnray.solvers.elasticity` that have a tangent here."""
@@ -64,10 +56,6 @@ class NetworkEnergy:
     weights: torch.Tensor  # Of the points, shape (q,), mm^2
     rows: IntArray  # First window of every pair that a patch has, shape (b,)
     columns: IntArray  # Second window, not before the first, shape (b,)
-    small: bool  # Whether the patches' basis gradients take at most `KEPT`
-    origin: FiniteBasisField | None = None  # Displacement of zero energy; None for zero
-    # Basis gradients of the patches met so far, by their numbers; None if they are not kept
-    kept: dict[int, torch.Tensor] | None = dataclass_field(default=None, repr=False)
 
     @classmethod
     def of(
@@ -80,16 +68,14 @@ class NetworkEnergy:
             keys.append(near[row] * count + near[column])
         diagonal = torch.arange(count) * (count + 1)
         known, number = torch.unique(torch.cat([*keys, diagonal]), return_inverse=True)
-        patches, used, start = [], 0, 0
+        patches, start = [], 0
         for (_, places, near), upper in zip(
             cuts, number[:-count].split([len(key) for key in keys]), strict=True
         ):
             rows = slice(start, start + len(places))
             patches.append(QuadraturePatch(places, near, upper, rows))
             start = rows.stop
-            used += 16 * len(places) * len(near) * basis.per_window
         order = np.concatenate([numbers for numbers, *_ in cuts])
-        small = used <= KEPT
         return cls(
             basis=basis,
             material=material,
@@ -97,13 +83,7 @@ class NetworkEnergy:
             weights=torch.from_numpy(weights[order]),
             rows=known.numpy() // count,
             columns=known.numpy() % count,
-            small=small,
-            kept={} if small and material.law != "linear" else None,
         )
-
-    def with_basis(self, basis: FiniteBasis) -> "NetworkEnergy":
-        """The energy of a network of the same windows, with which much is done."""
-        return replace(self, basis=basis, kept={} if self.small else None)
 
     @property
     def places(self) -> FloatArray:
@@ -139,8 +119,8 @@ class NetworkEnergy:
 
     @property
     def quadratic(self) -> bool:
-        """Whether the energy is a quadratic form of the output layer, with its least value at zero."""
-        return self.material.law == "linear" and self.origin is None
+        """Whether the energy is a quadratic form of the output layer."""
+        return self.material.law == "linear"
 
     @cached_property
     def factors_at_rest(self) -> Factors:
@@ -150,45 +130,40 @@ class NetworkEnergy:
         return self.hessian(tangent).factorised(REGULARISATION)
 
     def gradients(self, outputs: torch.Tensor) -> torch.Tensor:
-        """Gradients less the origin's at the points, (s, q, 2, 2), of output layers (s, c, 2, m + 1)."""
-        found = outputs.new_zeros(len(outputs), self.points, 2, 2)
-        if outputs.any():
-            layers = outputs.permute(1, 3, 0, 2).contiguous()
+        """Displacement gradients at the points, (s, q, 2, 2), of output layers (s, c, 2, m + 1)."""
+        columns = outputs.permute(1, 3, 0, 2).reshape(-1, 2 * len(outputs)).numpy()
+        found = torch.from_numpy(self.gradient_operator @ columns)
+        return found.view(-1, 2, len(outputs), 2).permute(2, 0, 3, 1)
 
-            def task(number: int) -> tuple[slice, torch.Tensor]:
-                patch, along = self.patches[number], self._along(number)
-                here = along.flatten(2) @ layers[patch.near].flatten(0, 1).flatten(1)
-                return patch.rows, here.view(2, len(patch.points), -1, 2).permute(2, 1, 3, 0)
+    def nearest(self, field: FiniteBasisField) -> tuple[torch.Tensor, Factors] | None:
+        """The output layer nearest to another network by the tangent at its displacement, and that's factors.
 
-            for rows, here in imap_in_threads(task, range(len(self.patches))):
-                found[:, rows] = here
-        return found if self.origin is None else found - self.gradients_of(self.origin)
+        None if a point is turned inside out.
+        """
+        gradient = self._gradients_of(field)
+        _, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
+        if not torch.isfinite(tangent).all():
+            return None
+        forces = self.forces(torch.einsum("nijkl,nkl->nij", tangent, gradient)[None])[0]
+        factors = self.hessian(tangent).factorised(REGULARISATION, definite=False)
+        return torch.from_numpy(factors.solve(forces.numpy().reshape(1, -1))).view_as(forces), factors
 
-    def gradients_of(self, field: FiniteBasisField) -> torch.Tensor:
+    def _gradients_of(self, field: FiniteBasisField) -> torch.Tensor:
         """Displacement gradients of another network at the points, shape (q, 2, 2)."""
+        basis, output = field.basis, field.output
 
         def task(patch: QuadraturePatch) -> torch.Tensor:
-            (near,) = field.basis.windows.near(boxes_around([patch.points]))
-            return field.gradient_of_patch(patch.points, near)
+            (near,) = basis.windows.near(boxes_around([patch.points]))
+            return torch.einsum("xnwu,wiu->nix", basis.gradients(patch.points, near), output[near])
 
         return torch.cat(list(imap_in_threads(task, self.patches)))
 
     def forces(self, stresses: torch.Tensor) -> torch.Tensor:
         """Forces (s, c, 2, m + 1), N/mm, of Piola-Kirchhoff stresses P at the points, (s, q, 2, 2), MPa."""
-        count = len(stresses)
-        found = stresses.new_zeros(self.basis.windows.count, 2 * count, self.basis.per_window)
-        if stresses.any():
-            weighted = (self.weights[:, None, None] * stresses).permute(3, 1, 0, 2).contiguous()
-
-            def task(number: int) -> tuple[torch.Tensor, torch.Tensor]:
-                patch, along = self.patches[number], self._along(number)
-                # In this order the product takes half of the time.
-                here = weighted[:, patch.rows].flatten(0, 1).flatten(1).T @ along.flatten(2).flatten(0, 1)
-                return patch.near, here.view(2 * count, len(patch.near), -1).transpose(0, 1)
-
-            for near, here in imap_in_threads(task, range(len(self.patches))):
-                found.index_add_(0, near, here)
-        return found.view(len(found), count, 2, -1).transpose(0, 1).contiguous()
+        weighted = (self.weights[:, None, None] * stresses).permute(1, 3, 0, 2)
+        columns = weighted.reshape(2 * self.points, -1).numpy()
+        found = torch.from_numpy(self.gradient_operator.T @ columns)
+        return found.view(-1, self.basis.per_window, len(stresses), 2).permute(2, 0, 3, 1).contiguous()
 
     def with_neuron_slopes(self, output: torch.Tensor) -> tuple[float, torch.Tensor]:
         """The energy of an output layer (c, 2, m + 1), and its derivatives by the neurons, (3, m, c)."""
@@ -206,11 +181,12 @@ class NetworkEnergy:
             found.index_add_(2, near, here)
         return float(self.weights @ energy_density(gradient, *law)), found
 
+    @cached_property
     def gradient_operator(self) -> csr_matrix:
         """The matrix from coefficients of the functions to gradients at the points, (2 q, c (m + 1)), 1/mm.
 
-        Rows 2 n and 2 n + 1 are the derivatives by x and y at point n. For a few states at a time this was
-        measured to be two to five times as fast as `gradients` and `forces`.
+        Rows 2 n and 2 n + 1 are the derivatives by x and y at point n. Products with it were measured to be
+        two to five times as fast as sums over the patches.
         """
         functions = np.arange(self.basis.per_window)
 
@@ -259,11 +235,7 @@ class NetworkEnergy:
     def _along(self, number: int) -> torch.Tensor:
         """Derivatives of the basis functions that reach a patch, at its points: (2, p, w, m + 1), 1/mm."""
         patch = self.patches[number]
-        if self.kept is None:
-            return self.basis.gradients(patch.points, patch.near)
-        if number not in self.kept:
-            self.kept[number] = self.basis.gradients(patch.points, patch.near)
-        return self.kept[number]
+        return self.basis.gradients(patch.points, patch.near)
 
 
 def _products(along: torch.Tensor, weights: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

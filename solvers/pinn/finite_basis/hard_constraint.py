@@ -1,7 +1,6 @@
 """The clamped base: smooth distances from it, which vanish there and nowhere else, as a hard condition."""
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 import torch
@@ -9,8 +8,6 @@ from scipy.spatial import cKDTree
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray, IntArray
-
-Points = TypeVar("Points", torch.Tensor, FloatArray)
 
 ON_LINE = 1e-9
 """Largest distance of a point on a straight base from its line, in sizes of the body."""
@@ -27,7 +24,7 @@ class LineDistance:
     normal: tuple[float, float]  # n, into the body, of unit length
     offset: float  # Of the line, mm
 
-    def at(self, points: Points) -> tuple[Points, Points, Points]:
+    def at(self, points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """The distance of points (n, 2), mm, and its derivatives by x and y, each (n, 1)."""
         along_x, along_y = self.normal
         distance = along_x * points[:, :1] + along_y * points[:, 1:] - self.offset
@@ -52,14 +49,11 @@ class CurveDistance:
 
     segments: FloatArray  # Shape (k, 2, 2), mm, with the body on their left
 
-    def at(self, points: Points) -> tuple[Points, Points, Points]:
+    def at(self, points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """The distance of points (n, 2), mm, and its derivatives by x and y, each (n, 1).
 
         On the curve the derivative is that of a point `TINY` off it.
         """
-        if not isinstance(points, torch.Tensor):
-            found = self.at(torch.from_numpy(np.array(points)))
-            return found[0].numpy(), found[1].numpy(), found[2].numpy()
         ends = torch.from_numpy(np.array(self.segments)).to(points)
         a, b = (ends[:, end].T[:, None] - points.T[:, :, None] for end in range(2))  # (2, n, k)
         along = (ends[:, 1] - ends[:, 0]).T[:, None]
@@ -132,7 +126,7 @@ class HardConstraint:
         """The factor for a mesh."""
         return cls(base_distance(mesh), length)
 
-    def at(self, points: Points) -> tuple[Points, Points, Points]:
+    def at(self, points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """The factor at points (n, 2), mm, and its derivatives by x and y, 1/mm, each (n, 1)."""
         distance, along_x, along_y = self.distance.at(points)
         slope = self.length / (distance + self.length) ** 2

@@ -163,18 +163,28 @@ class FiniteBasis:
         found[:2] += (pulled * rate_in_window).sum(dim=1)
         return found
 
-    def evaluated(
-        self, points: FloatArray, quantity: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+    def summed(
+        self,
+        functions: Callable[[torch.Tensor, torch.Tensor], torch.Tensor],
+        sums: str,
+        outputs: torch.Tensor,
+        points: FloatArray,
     ) -> FloatArray:
-        """A quantity at points (n, 2), mm, computed for a few points and the windows near them at a time.
+        """Sums of basis functions times output layers at points (n, 2), mm: shape (n, ...).
 
         Args:
+            functions: `values` or `gradients`, taken at a few points and the windows near them at a time.
+            sums: Of both, as for `einsum`; the windows are the third axis from the last of the outputs.
+            outputs: Output layers, shape (..., c, 2, m + 1), mm.
             points: Shape (n, 2), mm.
-            quantity: Its values, shape (m, ...), at some of the points, (m, 2), from the windows `near` (w,).
         """
+
+        def task(patch: tuple[IntArray, torch.Tensor, torch.Tensor]) -> FloatArray:
+            _, places, near = patch
+            return torch.einsum(sums, functions(places, near), outputs[..., near, :, :]).numpy()
+
         patches = self.patches(points)
-        parts = imap_in_threads(lambda patch: quantity(*patch[1:]).numpy(), patches)
-        found: FloatArray = np.concatenate(list(parts))
+        found: FloatArray = np.concatenate(list(imap_in_threads(task, patches)))
         result: FloatArray = np.empty_like(found)
         result[np.concatenate([patch for patch, *_ in patches])] = found
         return result
@@ -206,37 +216,8 @@ class FiniteBasisField:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        return self.displacement_and_gradient(location)[0]
+        return self.basis.summed(self.basis.values, "nuw,wiu->ni", self.output, location.points)
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        return self.displacement_and_gradient(location)[1]
-
-    def displacement_and_gradient(self, location: LocatedPoints) -> tuple[FloatArray, FloatArray]:
-        """Both, with the windows and neurons at a point computed once."""
-        both = self.basis.evaluated(location.points, self._both_of_patch)
-        return np.ascontiguousarray(both[:, :, 2]), np.ascontiguousarray(both[:, :, :2])
-
-    def gradient_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
-        """Its gradient at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2, 2)."""
-        return self._both_of_patch(points, near)[:, :, :2]
-
-    def _both_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
-        """The gradient and, as a third column, the displacement: (n, 2, 3).
-
-        With a window g and the function N = c + sum_m c_m tanh t_m of its neurons it is the sum over windows
-        of (N ∂g + g ∂N, g N).
-        """
-        window, along = self.basis.constrained_windows(points, near)
-        neurons, output = self.basis.neurons[:, :, near], self.output[near]
-        weights, bias = neurons.flatten(1).split([2, 1])
-        # tanh(t) = 2 σ(2 t) - 1, whose derivative is 4 σ (1 - σ)
-        logistic = torch.addmm(2 * bias, points, 2 * weights).sigmoid_().view(len(points), -1, len(near))
-        constant, linear = output[:, :, :1], output[:, :, 1:]
-        start = (constant - linear.sum(dim=2, keepdim=True)).transpose(1, 2)
-        function = torch.baddbmm(start, logistic.permute(2, 0, 1), linear.transpose(1, 2), alpha=2)
-        found = torch.einsum("xnw,wni->nix", torch.cat([along, window[None]]), function)
-        rate = (1 - logistic).mul_(logistic).mul_(window[:, None])
-        steep = torch.einsum("wim,xmw->mwix", 4 * linear, neurons[:2]).flatten(2).flatten(0, 1)
-        found[:, :, :2] += (rate.flatten(1) @ steep).view(-1, 2, 2)
-        return found
+        return self.basis.summed(self.basis.gradients, "xnwu,wiu->nix", self.output, location.points)

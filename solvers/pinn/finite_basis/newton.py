@@ -1,5 +1,6 @@
 """Newton's method for a finite-basis network, with the load applied in adaptive steps."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.cylinder_contact import ContactRegion
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
 from pinnray.solvers.solver import Progress
 from pinnray.solvers.stability import ShiftedStep, aside, descended
 
@@ -34,6 +36,22 @@ class LoadStep(NamedTuple):
     state: NewtonIterate  # Equilibrium there
     iterations: int  # Newton iterations so far
     region: ContactRegion | None = None  # Where a cylinder touches; None without one, and where it does not
+
+
+class Level(NamedTuple):
+    """A refinement level."""
+
+    network: ConstrainedNetwork
+    reached: LoadStep  # Its last equilibrium
+
+    @property
+    def field(self) -> FiniteBasisField:
+        """The displacement of the last equilibrium."""
+        return self.network.field(self.reached.state.output)
+
+
+Reach = Callable[[NewtonIterate, float], tuple[NewtonIterate | None, int]]
+"""Equilibrium under a fraction of the load from a guess, None if it is not found, and the iterations."""
 
 
 def find_equilibrium(
@@ -97,24 +115,32 @@ def least_energy(network: ConstrainedNetwork, start: FloatArray, fraction: float
     return None if settled is None or settled.unstable else settled
 
 
-def follow_load(network: ConstrainedNetwork, progress: Progress) -> LoadStep:
+def follow_load(
+    rest: NewtonIterate, reach: Reach, progress: Progress, *, longest: float = MAX_STEP, quick: float = 5
+) -> LoadStep:
     """Apply the load in steps that start from the last two states, extrapolated linearly.
 
-    A step whose iteration fails is halved; one that takes few iterations is doubled.
+    A step whose iteration fails is halved.
+
+    Args:
+        rest: Without load.
+        reach: Finds the equilibrium of a step.
+        progress: Told of every step.
+        longest: Largest fraction of the load in a step.
+        quick: Most iterations of a step that is doubled.
 
     Returns:
         The last equilibrium, below the full load where Newton's method fails beyond it.
     """
-    unloaded = NewtonIterate(network.zero_output, np.zeros(len(network.targets)), 0.0)
-    last = before = LoadStep(0.0, unloaded, 0)
-    step = FIRST_STEP
+    last = before = LoadStep(0.0, rest, 0)
+    step = min(FIRST_STEP, longest)
     while last.fraction < 1 and step >= MIN_STEP:
         fraction = min(last.fraction + step, 1.0)
-        guess = last.state.output
+        guess = last.state
         if last.fraction > 0:
             ahead = (fraction - last.fraction) / (last.fraction - before.fraction)
-            guess = guess + ahead * (guess - before.state.output)
-        state, iterations = find_equilibrium(network, guess, fraction)
+            guess = guess._replace(output=guess.output + ahead * (guess.output - before.state.output))
+        state, iterations = reach(guess, fraction)
         iterations_in_all = last.iterations + iterations
         if state is None:
             last = last._replace(iterations=iterations_in_all)
@@ -122,5 +148,5 @@ def follow_load(network: ConstrainedNetwork, progress: Progress) -> LoadStep:
             continue
         before, last = last, LoadStep(fraction, state, iterations_in_all)
         progress(fraction, f"{fraction:.0%} of the load, {iterations} Newton iterations")
-        step = min(MAX_STEP, step * (2 if iterations <= 5 else 1))
+        step = min(longest, step * (2 if iterations <= quick else 1))
     return last

@@ -11,16 +11,14 @@ from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import MarkerSettings
-from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
-from pinnray.solvers.pinn.finite_basis.newton import LoadStep
+from pinnray.solvers.pinn.finite_basis.newton import Level
 from pinnray.solvers.pinn.finite_basis.solver import FiniteBasisSolver
 from pinnray.solvers.pinn.finite_basis.training import with_trained_neurons
 from pinnray.solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.shared_work import SharedWork
 from pinnray.solvers.solution import Solution
-from pinnray.solvers.solver import Cost, Progress
+from pinnray.solvers.solver import Cost, Progress, Solver
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,50 +92,44 @@ class TrainedPinnSolver(PinnLocalSolver):
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=120)
 
-    def equilibrium(
-        self, network: ConstrainedNetwork, coarse: FiniteBasisField | None, progress: Progress
-    ) -> tuple[ConstrainedNetwork, LoadStep]:
-        """The network whose neurons are trained; see `FiniteBasisSolver`."""
-        network, start = super().equilibrium(network, coarse, progress)
+    def equilibrium(self, problem: Problem, scale: float, coarse: Level | None, progress: Progress) -> Level:
+        """A level whose neurons are trained; see `FiniteBasisSolver`."""
+        network, start = super().equilibrium(problem, scale, coarse, progress)
         windows = cast(ShepardWindows, network.energy.basis.windows)
-        return with_trained_neurons(network, start, windows, self.steps, progress)
-
-
-def _refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[Observations], Solution]:
-    """See `Refittable`; one factorisation of each level for all observations if the law is linear."""
-    work = SharedWork()
-
-    def refit(observations: Observations) -> Solution:
-        with work.used():
-            return solver.solve(replace(problem, observations=observations))
-
-    return refit
+        return Level(*with_trained_neurons(network, start, windows, self.steps, progress))
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnAsmSolver(MarkerSettings, PinnStdSolver):
+class _WithMarkers(MarkerSettings):
+    """A network with the markers' misfit."""
+
+    name: ClassVar[str] = "pinn-asm"
+    twin: ClassVar[str] = "fem-asm"
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """See `Refittable`; one factorisation of each level for all observations if the law is linear."""
+        work, solver = SharedWork(), cast(Solver, self)
+
+        def refit(observations: Observations) -> Solution:
+            with work.used():
+                return solver.solve(replace(problem, observations=observations))
+
+        return refit
+
+
+@dataclass(frozen=True, kw_only=True)
+class PinnAsmSolver(_WithMarkers, PinnStdSolver):
     """The network of `PinnStdSolver` with the markers' misfit."""
 
-    name: ClassVar[str] = "pinn-asm"
     cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=1.7)  # beside pinn-std, whose work it shares
-    twin: ClassVar[str] = "fem-asm"
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
-    refitter = _refitter
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnLocalAsmSolver(MarkerSettings, PinnLocalSolver):
+class PinnLocalAsmSolver(_WithMarkers, PinnLocalSolver):
     """The network of `PinnLocalSolver` with the markers' misfit."""
 
-    name: ClassVar[str] = "pinn-asm"
-    twin: ClassVar[str] = "fem-asm"
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
-    refitter = _refitter
-
 
 @dataclass(frozen=True, kw_only=True)
-class TrainedPinnAsmSolver(MarkerSettings, TrainedPinnSolver):
+class TrainedPinnAsmSolver(_WithMarkers, TrainedPinnSolver):
     """The network and the training of `TrainedPinnSolver` with the markers' misfit."""
-
-    name: ClassVar[str] = "pinn-asm"
-    twin: ClassVar[str] = "fem-asm"

@@ -17,9 +17,8 @@ from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.cylinder_contact import ContactRegion, ContactState, CylinderContact
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
-from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION, piola_stress_and_tangent
-from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
-from pinnray.solvers.pinn.finite_basis.newton import FIRST_STEP, MIN_STEP, LoadStep
+from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION
+from pinnray.solvers.pinn.finite_basis.newton import Level, LoadStep, follow_load
 from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Progress
@@ -47,8 +46,8 @@ SHORTEST = 2.0**-9
 class Tangent(NamedTuple):
     """The factorised second derivative of the elastic energy, kept while Newton's steps with it converge."""
 
-    factors: Factors  # Of the network's tangent, without the cylinder
     output: torch.Tensor  # The output layer at which it was formed
+    factors: Factors  # Of the network's tangent, without the cylinder
 
 
 class Step(NamedTuple):
@@ -101,16 +100,17 @@ class PressedNetwork:
         values = csr_matrix(values.reshape(len(points), -1))
         return cls(network, contact, values, len(space.nodes))
 
-    def refined(self, coarse: LoadStep, field: FiniteBasisField) -> LoadStep | None:
-        """Equilibrium under the full load from that of a coarser network; None if it is not found.
+    def equilibrium(self, coarse: Level | None, progress: Progress) -> LoadStep:
+        """Equilibrium from that of a coarser network or, if that fails, along the load."""
+        found = self.refined(coarse) if coarse is not None and coarse.reached.fraction == 1 else None
+        return self.followed(progress) if found is None else found
 
-        Args:
-            coarse: Of the coarser network, whose forces are taken.
-            field: Its displacement.
-        """
-        tangent, forces = self._tangent_near(field), coarse.state.forces
-        if tangent is None:
+    def refined(self, coarse: Level) -> LoadStep | None:
+        """Equilibrium under the full load from that of a coarser network; None if it is not found."""
+        near, forces = self.network.energy.nearest(coarse.field), coarse.reached.state.forces
+        if near is None:
             return None
+        tangent = Tangent(*near)
         gently = replace(self.contact, stiffness=SOFT / STIFF * self.contact.stiffness)
         soft = replace(self, contact=gently)
         found, first = soft._minimum(tangent.output, 1.0, forces, ROUGH, tangent)
@@ -119,33 +119,22 @@ class PressedNetwork:
         forces = gently.forces(soft.stage(found.output, 1.0, forces))
         held = self._held(found.output, 1.0, forces, found.tangent)
         start = min((found.output, held), key=lambda each: self._potential(each, 1.0, forces))
-        state, iterations = self._equilibrium(start, 1.0, forces, found.tangent)
+        state, iterations = self._in_balance(start, 1.0, forces, found.tangent)
         return None if state is None else self._load_step(1.0, state, first + iterations)
 
     def followed(self, progress: Progress) -> LoadStep:
         """Equilibrium along the load; the last one before the full load if one is not found."""
+
+        def reach(guess: NewtonIterate, fraction: float) -> tuple[NewtonIterate | None, int]:
+            output, forces = guess.output, guess.forces
+            if not output.any():
+                output, forces = self._pressed_at_one_node(fraction)
+            return self._in_balance(output, fraction, forces)
+
         rest = NewtonIterate(self.network.zero_output, np.zeros(len(self.contact.positions)), 0.0)
-        last = before = LoadStep(0.0, rest, 0)
-        step = min(FIRST_STEP, self.contact.longest_step)
-        while last.fraction < 1 and step >= MIN_STEP:
-            fraction = min(last.fraction + step, 1.0)
-            if last.fraction > 0:
-                ahead = (fraction - last.fraction) / (last.fraction - before.fraction)
-                guess = (
-                    last.state.output + ahead * (last.state.output - before.state.output),
-                    last.state.forces,
-                )
-            else:
-                guess = self._pressed_at_one_node(fraction)
-            state, iterations = self._equilibrium(guess[0], fraction, guess[1])
-            if state is None:
-                last = last._replace(iterations=last.iterations + iterations)
-                step /= 2
-                continue
-            before, last = last, self._load_step(fraction, state, last.iterations + iterations)
-            progress(fraction, f"{fraction:.0%} of the load, {iterations} Newton iterations")
-            step = min(self.contact.longest_step, 2 * step)
-        return last
+        longest = self.contact.longest_step
+        found = follow_load(rest, reach, progress, longest=longest, quick=np.inf)
+        return self._load_step(found.fraction, found.state, found.iterations)
 
     def stage(self, output: torch.Tensor, fraction: float, multipliers: FloatArray) -> ContactState:
         """The contact at an output layer."""
@@ -157,7 +146,7 @@ class PressedNetwork:
         stage = self.stage(state.output, fraction, state.forces)
         return LoadStep(fraction, state, iterations, ContactRegion.of(self.contact, stage))
 
-    def _equilibrium(
+    def _in_balance(
         self, output: torch.Tensor, fraction: float, multipliers: FloatArray, tangent: Tangent | None = None
     ) -> tuple[NewtonIterate | None, int]:
         """Equilibrium from a guess, None if the iteration fails, and the Newton iterations taken.
@@ -278,22 +267,7 @@ class PressedNetwork:
         gradient, hessian = self.network.energy.derivatives(output)
         if not torch.isfinite(gradient).all():
             return None
-        return Tangent(hessian.factorised(REGULARISATION, definite=False), output)
-
-    def _tangent_near(self, field: FiniteBasisField) -> Tangent | None:
-        """The tangent at another network's displacement, and the output layer nearest to it by that tangent.
-
-        None if a point is turned inside out.
-        """
-        energy = self.network.energy
-        gradient = energy.gradients_of(field)
-        _, tangent = piola_stress_and_tangent(gradient, energy.material.lame, energy.material.law)
-        if not torch.isfinite(tangent).all():
-            return None
-        forces = energy.forces(torch.einsum("nijkl,nkl->nij", tangent, gradient)[None])
-        factors = energy.hessian(tangent).factorised(REGULARISATION, definite=False)
-        output = factors.solve(forces.numpy().reshape(1, -1))
-        return Tangent(factors, torch.from_numpy(output).view_as(self.network.zero_output))
+        return Tangent(output, hessian.factorised(REGULARISATION, definite=False))
 
     def _step(
         self, stage: ContactState, output: torch.Tensor, touching: IntArray, tangent: Tangent

@@ -2,7 +2,7 @@
 
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import ClassVar
 
@@ -13,13 +13,13 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerFit
 from pinnray.solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
-from pinnray.solvers.assimilation.pictures import FreePictures
+from pinnray.solvers.assimilation.picture_frames import FreePictures
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END
-from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import LAWS, NetworkEnergy
 from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
-from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
-from pinnray.solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
+from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, Windows
+from pinnray.solvers.pinn.finite_basis.newton import Level, LoadStep, find_equilibrium, follow_load
 from pinnray.solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
     graded_quadrature,
@@ -33,9 +33,6 @@ from pinnray.solvers.problem import Problem
 from pinnray.solvers.shared_work import shared
 from pinnray.solvers.solution import Solution, Status, unstable_phrase
 from pinnray.solvers.solver import Cost, Progress, check_problem, silent
-
-Train = Callable[[float, FiniteBasisField | None, Progress], tuple[ConstrainedNetwork, LoadStep]]
-"""Trains one refinement level, of a scale of the spacings, starting from the coarser level's field."""
 
 ORDERS = np.linspace(2, 4, 21)
 """Orders of convergence that turn the change between two levels into an error estimate: the first one, a
@@ -112,59 +109,20 @@ class FiniteBasisSolver(NetworkSolver):
         check_problem(self, problem)
         if (framed := self._framed(problem, progress)) is not None:
             return framed
-        last: LoadStep | None = None
-
-        def train(
-            scale: float, coarse: FiniteBasisField | None, progress: Progress
-        ) -> tuple[ConstrainedNetwork, LoadStep]:
-            nonlocal last
-            network = self.level(problem, scale)
-            if problem.load.kind == "cylinder":
-                last = _press(PressedNetwork.of(network, problem), last, coarse, progress)
-            else:
-                network, last = self.equilibrium(network, coarse, progress)
-            return network, last
-
-        with pool():
-            return self.trained(problem, train, progress)
-
-    def equilibrium(
-        self, network: ConstrainedNetwork, coarse: FiniteBasisField | None, progress: Progress
-    ) -> tuple[ConstrainedNetwork, LoadStep]:
-        """A level's network and its equilibrium without a cylinder, from that of a coarser level if given."""
-        return network, _train(network, coarse, progress)
-
-    def _framed(self, problem: Problem, progress: Progress) -> Solution | None:
-        """The solution with the pictures' frames by the coarsest level; None where they are fixed.
-
-        At finite strain the pictures are taken as they are.
-        """
-        observations, linear = problem.observations, problem.material.law == "linear"
-        if self.weighting is None or observations is None or not linear:
-            return None
-        pictures = FreePictures.of(observations)
-        forces = self.level(problem, self.coarser).markers_at_rest if pictures.parameters else None
-        if forces is None:
-            return None
-        found = pictures.by_forces(forces, self.weighting)
-        straight = replace(problem, observations=pictures.straightened(observations, found.z))
-        return pictures.framed(self.solve(straight, progress), problem, found)
-
-    def trained(self, problem: Problem, train: Train, progress: Progress) -> Solution:
-        """The solution by refinement levels, trained one after the other until two agree."""
         started = time.perf_counter()
         rule = body_quadrature(problem.mesh, 1)
         before = np.zeros_like(rule.location.points)
         history, changes = [], list[float]()
-        coarse: FiniteBasisField | None = None
+        coarse: Level | None = None
         scales = [self.coarser, 1.0, FINEST]
         if problem.load.kind == "cylinder":  # along the load the coarsest level will do
             scales.insert(0, self.coarser**2)
         for number, scale in enumerate(scales):
-            network, reached = train(scale, coarse, _part(progress, number / len(scales), 1 / len(scales)))
-            state = reached.state
-            field = coarse = network.field(state.output)
-            displacement = field.displacement(rule.location)
+            part = _part(progress, number / len(scales), 1 / len(scales))
+            with pool():
+                network, reached = coarse = self.equilibrium(problem, scale, coarse, part)
+                state, field = reached.state, coarse.field
+                displacement = field.displacement(rule.location)
             change = _relative(displacement - before, displacement, rule.weights)
             changes.append(change)
             finer = scales[max(number - 1, 0)] / scale
@@ -207,6 +165,29 @@ class FiniteBasisSolver(NetworkSolver):
             ),
             left_out=None if fit is None else leave_one_out_displacements(problem, fit.residual_without),
         )
+
+    def equilibrium(self, problem: Problem, scale: float, coarse: Level | None, progress: Progress) -> Level:
+        """A level at a scale of the spacings, from a coarser one if given; see `level`."""
+        network = self.level(problem, scale)
+        if problem.load.kind == "cylinder":
+            return Level(network, PressedNetwork.of(network, problem).equilibrium(coarse, progress))
+        return Level(network, _train(network, coarse, progress))
+
+    def _framed(self, problem: Problem, progress: Progress) -> Solution | None:
+        """The solution with the pictures' frames by the coarsest level; None where they are fixed.
+
+        At finite strain the pictures are taken as they are.
+        """
+        observations, linear = problem.observations, problem.material.law == "linear"
+        if self.weighting is None or observations is None or not linear:
+            return None
+        pictures = FreePictures.of(observations)
+        forces = self.level(problem, self.coarser).at_rest().markers if pictures.parameters else None
+        if forces is None:
+            return None
+        found = pictures.by_forces(forces, self.weighting)
+        straight = replace(problem, observations=pictures.straightened(observations, found.z))
+        return pictures.framed(self.solve(straight, progress), problem, found)
 
     def level(self, problem: Problem, scale: float) -> ConstrainedNetwork:
         """The network of a refinement level, with spacings of `scale` times the settings'.
@@ -276,25 +257,21 @@ class FiniteBasisSolver(NetworkSolver):
         return Status(converged, message + advice + (f"; {fit.phrase}" if fit else ""))
 
 
-def _train(network: ConstrainedNetwork, coarse: FiniteBasisField | None, progress: Progress) -> LoadStep:
+def _train(network: ConstrainedNetwork, coarse: Level | None, progress: Progress) -> LoadStep:
     """Equilibrium of a level: at once for a linear law, else from a coarser level's or along the load."""
-    if network.energy.material.law == "linear":
-        state, iterations = network.step(network.zero_output), 1
-    elif coarse is not None:
-        state, iterations = find_equilibrium(network, network.project(coarse), 1.0)
-    else:
-        state = None
-    return follow_load(network, progress) if state is None else LoadStep(1.0, state, iterations)
+    if network.energy.quadratic:
+        return LoadStep(1.0, network.at_rest(), 1)
 
+    def reach(guess: NewtonIterate, fraction: float) -> tuple[NewtonIterate | None, int]:
+        return find_equilibrium(network, guess.output, fraction)
 
-def _press(
-    network: PressedNetwork, last: LoadStep | None, coarse: FiniteBasisField | None, progress: Progress
-) -> LoadStep:
-    """Equilibrium under a cylinder: from that of a coarser network or, if that fails, along the load."""
-    found = None
-    if last is not None and coarse is not None and last.fraction == 1:
-        found = network.refined(last, coarse)
-    return network.followed(progress) if found is None else found
+    rest = NewtonIterate(network.zero_output, np.zeros(len(network.targets)), 0.0)
+    near = None if coarse is None else network.energy.nearest(coarse.field)
+    if near is not None:
+        state, iterations = reach(rest._replace(output=near[0]), 1.0)
+        if state is not None:
+            return LoadStep(1.0, state, iterations)
+    return follow_load(rest, reach, progress)
 
 
 def estimated_error(changes: Sequence[float], scales: Sequence[float]) -> float:

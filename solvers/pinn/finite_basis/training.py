@@ -88,7 +88,5 @@ class _Training:
         value, slopes = network.least(state)
         if value <= self.lowest:
             self.network, self.lowest, self.state = network, value, state
-        if network.energy.kept:
-            network.energy.kept.clear()
         slopes[:2] = (slopes[:2] - slopes[2] * self.windows.centres.T[:, None]) / self.windows.radii
         return value / scale, slopes.numpy().ravel() / scale

@@ -10,7 +10,6 @@ for every derivative by X:
     P_ij = det(I + ∇W) P(G)_im M_jm        A_ijkl = det(I + ∇W) A(G)_imkn M_jm M_ln
 """
 
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -60,7 +59,6 @@ class NetworkBody:
 
     def __init__(self, energy: NetworkEnergy, walls: FloatArray) -> None:
         self._energy, self._walls = energy, torch.from_numpy(walls)
-        self._operator = energy.gradient_operator()
         self._law = energy.material.law
         self._factors: Factors | None = None
         self.factorisations = 0
@@ -102,7 +100,7 @@ class NetworkBody:
             if (gradient := self._strained(state, metric)) is None:
                 return None
             stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
-            force = self._forces(_pulled_back(stress, metric)[None])[0]
+            force = self._energy.forces(_pulled_back(stress, metric)[None])[0]
         tangent = _tangent_pulled_back(tangent, metric)
         return Linearised(force.numpy(), partial(self._solved, tangent), partial(self._negative, tangent))
 
@@ -155,7 +153,7 @@ class NetworkBody:
             for moduli in (Lame(1.0, 0.0, 1.0), Lame(0.0, 1.0, 0.0)):  # every law is a sum of both
                 part, _ = piola_stress_and_tangent(gradient, moduli, self._law)
                 slopes.append(_pulled_back(part, metric))
-            found = self._forces(torch.stack(slopes)).numpy()
+            found = self._energy.forces(torch.stack(slopes)).numpy()
         return found[:-2], found[-2:], self.feet
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
@@ -180,26 +178,13 @@ class NetworkBody:
 
     def displacements(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacements (s, n, 2) of states (s, *shape) at points of the drawn body."""
-        return self._summed(self._energy.basis.values, "nuw,swiu->nsi", states, location)
+        basis, outputs = self._energy.basis, torch.from_numpy(states)
+        return basis.summed(basis.values, "nuw,swiu->nsi", outputs, location.points).swapaxes(0, 1)
 
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
-        return self._summed(self._energy.basis.gradients, "xnwu,swiu->nsix", states, location)
-
-    def _summed(
-        self,
-        functions: Callable[[torch.Tensor, torch.Tensor], torch.Tensor],
-        sums: str,
-        states: FloatArray,
-        location: LocatedPoints,
-    ) -> FloatArray:
-        """Sums (s, n, ...) of functions of the windows near points, times the states, as for `einsum`."""
-        outputs = torch.from_numpy(states)
-        found = self._energy.basis.evaluated(
-            location.points,
-            lambda points, near: torch.einsum(sums, functions(points, near), outputs[:, near]),
-        )
-        return found.swapaxes(0, 1)
+        basis, outputs = self._energy.basis, torch.from_numpy(states)
+        return basis.summed(basis.gradients, "xnwu,swiu->nsix", outputs, location.points).swapaxes(0, 1)
 
     @property
     def points(self) -> FloatArray:
@@ -218,7 +203,7 @@ class NetworkBody:
             first[deformation_jacobian(first) <= 0] = 0.0  # turned inside out between points of the elements
             _, tangent = piola_stress_and_tangent(first, lame, self._law)
             tangent = _tangent_pulled_back(tangent, metric)
-            forces = self._forces(torch.einsum("nijkl,snkl->snij", tangent, given))
+            forces = self._energy.forces(torch.einsum("nijkl,snkl->snij", tangent, given))
             return _back_substituted(self._factorised(tangent), forces).numpy()
 
     def _both_components(self, rows: FloatArray) -> FloatArray:
@@ -228,20 +213,7 @@ class NetworkBody:
         return found
 
     def _gradient(self, state: FloatArray) -> torch.Tensor:
-        return self._gradients(torch.from_numpy(state)[None])[0]
-
-    def _gradients(self, states: torch.Tensor) -> torch.Tensor:
-        """∇u at the quadrature points, (s, q, 2, 2), of states (s, *shape)."""
-        columns = states.permute(1, 3, 0, 2).reshape(-1, 2 * len(states)).numpy()
-        found = torch.from_numpy(self._operator @ columns)
-        return found.view(-1, 2, len(states), 2).permute(2, 0, 3, 1)
-
-    def _forces(self, stresses: torch.Tensor) -> torch.Tensor:
-        """Forces (s, *shape), N/mm, of the stresses conjugate to ∇u, (s, q, 2, 2), MPa."""
-        weighted = (self._energy.weights[:, None, None] * stresses).permute(1, 3, 0, 2)
-        found = torch.from_numpy(self._operator.T @ weighted.reshape(self._operator.shape[0], -1).numpy())
-        windows, _, functions = self.shape
-        return found.view(windows, functions, len(stresses), 2).permute(2, 0, 3, 1).contiguous()
+        return self._energy.gradients(torch.from_numpy(state)[None])[0]
 
     def _metric(self, changes: FloatArray) -> WallMetric:
         by = torch.from_numpy(np.asarray(changes, dtype=np.float64))
@@ -260,9 +232,9 @@ class NetworkBody:
 
     def _product(self, factors: Factors, tangent: torch.Tensor, states: torch.Tensor) -> torch.Tensor:
         """The tangent's matrix, with the regularisation of factors, times states (r, *shape)."""
-        stresses = torch.einsum("nijkl,snkl->snij", tangent, self._gradients(states))
+        stresses = torch.einsum("nijkl,snkl->snij", tangent, self._energy.gradients(states))
         diagonal = torch.from_numpy(1 / factors.scale**2).view(self.shape)
-        return self._forces(stresses) + REGULARISATION * diagonal * states
+        return self._energy.forces(stresses) + REGULARISATION * diagonal * states
 
     def _iterated(self, factors: Factors, tangent: torch.Tensor, right: torch.Tensor) -> torch.Tensor | None:
         """Solutions by conjugate gradients, preconditioned by the factors of another tangent.

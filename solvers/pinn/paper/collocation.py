@@ -1,10 +1,9 @@
-"""Collocation points of the energy, and points of the base, for the paper's training."""
+"""Collocation points of the energy for the paper's training."""
 
 from typing import Literal
 
 import numpy as np
 
-from pinnray.geometry.mesh.boundary import evenly_spaced_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
@@ -22,8 +21,3 @@ def collocation_points(mesh: TriangleMesh, collocation: Collocation) -> tuple[Fl
         rule = body_quadrature(mesh)
         return rule.location.points, rule.weights / rule.weights.sum()
     return mesh.points, np.full(len(mesh.points), 1 / len(mesh.points))
-
-
-def base_points(mesh: TriangleMesh, count: int) -> FloatArray:
-    """Evenly spaced points of the base, along all its pieces, shape (count, 2), mm."""
-    return evenly_spaced_points(mesh, "base", count)

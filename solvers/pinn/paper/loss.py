@@ -14,7 +14,7 @@ import torch
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import Lame, stress_of
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
-from pinnray.solvers.pinn.threading import map_in_threads, slices
+from pinnray.solvers.pinn.threading import imap_in_threads, slices
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +65,6 @@ def stiffness_matrix(lame: Lame) -> FloatArray:
     return stress_of("linear", np.eye(4).reshape(4, 2, 2), lame)[0].reshape(4, 4)
 
 
-LANES = 16
-"""Fixed groups in which chunks are summed, so that rounding is independent of the number of threads."""
-
 CHUNK = 384
 """Points in a chunk."""
 
@@ -91,33 +88,32 @@ class Loss:
     factors: Mapping[str, float]  # Weight of the terms by their names
 
     def __call__(self, parameters: torch.Tensor) -> LossEvaluation:
-        """The loss and its gradient at parameters of shape (networks, parameters)."""
+        """The loss and its gradient at parameters of shape (networks, parameters).
 
-        def lane(chunks: list[Chunk]) -> tuple[dict[str, float], torch.Tensor]:
-            values = dict.fromkeys(self.factors, 0.0)
-            gradient = torch.zeros_like(parameters)
+        Chunks are added in their order, so that rounding is independent of the number of threads.
+        """
+
+        def part(chunk: Chunk) -> tuple[str, float, torch.Tensor]:
+            term, rows = chunk
             own = parameters.detach().requires_grad_()
-            for term, rows in chunks:
-                value = term.value(self.network, own, rows)
-                values[term.name] += float(value.detach())
-                gradient += torch.autograd.grad(self.factors[term.name] * value, own)[0]
-            return values, gradient
+            value = term.value(self.network, own, rows)
+            (slope,) = torch.autograd.grad(self.factors[term.name] * value, own)
+            return term.name, float(value.detach()), slope
 
         terms = dict.fromkeys(self.factors, 0.0)
         gradient = torch.zeros_like(parameters)
-        for values, gradient_of_lane in map_in_threads(lane, self._lanes):
-            for name, value in values.items():
-                terms[name] += value
-            gradient += gradient_of_lane
+        for name, value, slope in imap_in_threads(part, self._chunks):
+            terms[name] += value
+            gradient += slope
         total = sum(self.factors[name] * value for name, value in terms.items())
         return LossEvaluation(terms, total, gradient)
 
     @cached_property
-    def _lanes(self) -> list[list[Chunk]]:
-        """The chunks in groups; one chunk a term on a GPU."""
+    def _chunks(self) -> list[Chunk]:
+        """The terms in chunks; one chunk a term on a GPU."""
         chunks: list[Chunk] = []
         for term in self.terms:
             count = len(term.points)
             size = CHUNK if term.divisible and not term.points.is_cuda else count
             chunks += [(term, rows) for rows in slices(count, size)]
-        return [chunks[start::LANES] for start in range(min(LANES, len(chunks)))]
+        return chunks

@@ -8,8 +8,8 @@ flow pathologies in physics-informed neural networks, SIAM J. Sci. Comput. 43 (2
     H_k+1 = (1 - Z_k) * A + Z_k * B
     output = H_L+1 w + b
 
-The paper prints a layer more: Z_1 is made of H_1 = tanh(X W_0 + b_0), as the other gates are. `literal_gate`
-takes that reading. X is in mm, as it is: the paper mentions no scaling.
+The paper prints a layer more, H_1 = tanh(X W_0 + b_0), of which Z_1 is made as the other gates are. X is in
+mm, as it is: the paper mentions no scaling.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,7 @@ import torch
 class Weights(NamedTuple):
     """Parameters of the networks, as views of one tensor."""
 
-    # The input layers, those of A, B and Z_1 (or H_1): weights of x and y and the bias, shape (networks, 3,
-    # 3, width)
+    # The input layers, those of A, B and Z_1: weights of x and y and the bias, shape (networks, 3, 3, width)
     first: torch.Tensor
     gates: list[torch.Tensor]  # Matrices of the gates on hidden layers, each (networks, width, width)
     biases: list[torch.Tensor]  # Their biases, each (networks, 1, width)
@@ -37,12 +36,11 @@ class ModifiedMlp:
     networks: int = 2  # Number of networks
     width: int = 64  # Neurons in a layer
     layers: int = 4  # Number of gates L
-    literal_gate: bool = False  # Whether the first gate has a layer of its own, as printed in the paper
 
     @property
     def gates(self) -> int:
         """Number of gates on hidden layers."""
-        return self.layers if self.literal_gate else self.layers - 1
+        return self.layers - 1
 
     @property
     def parameters(self) -> int:
@@ -82,7 +80,7 @@ class ModifiedMlp:
         points = points.expand(self.networks, -1, -1)
         with_one = torch.cat([points, torch.ones_like(points[..., :1])], dim=-1)
         a, b, first = torch.tanh(with_one[:, None] @ weights.first).unbind(1)
-        hidden = first if self.literal_gate else torch.lerp(a, b, first)
+        hidden = torch.lerp(a, b, first)
         for matrix, bias in zip(weights.gates, weights.biases, strict=True):
             hidden = torch.lerp(a, b, torch.tanh(torch.baddbmm(bias, hidden, matrix)))
         return (hidden @ weights.output)[..., 0] + weights.output_bias

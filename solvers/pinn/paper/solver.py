@@ -1,30 +1,32 @@
 """Preset `paper` of `pinn-std`: the paper's two networks, loss and optimiser, trained for 60,000 epochs."""
 
 import time
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
 import numpy as np
 import torch
 
+from pinnray.geometry.mesh.boundary import evenly_spaced_points
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import Weighting
 from pinnray.solvers.pinn.network_solver import NetworkSolver
-from pinnray.solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
+from pinnray.solvers.pinn.paper.checkpoint import CheckpointStore
+from pinnray.solvers.pinn.paper.collocation import Collocation, collocation_points
 from pinnray.solvers.pinn.paper.loss import DisplacementTerm, EnergyTerm, Loss, LossTerm, stiffness_matrix
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
 from pinnray.solvers.pinn.paper.trained_field import MlpField, assess_training
-from pinnray.solvers.pinn.paper.training import CheckpointStore, Training, TrainingSettings
-from pinnray.solvers.pinn.threading import pool, torch_threads
+from pinnray.solvers.pinn.paper.training import Training
+from pinnray.solvers.pinn.threading import pool
 from pinnray.solvers.problem import Problem, contact_functional
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Cost, Progress, TrainingContext, check_problem, silent
 
 PRECISIONS = {"single": torch.float32, "double": torch.float64}
 
-FREE = ("epochs", "checkpoint_every", "threads", "device")
+FREE = ("epochs", "checkpoint_every", "device")
 """Settings that may change when a training is resumed."""
 
 
@@ -43,9 +45,7 @@ class PaperPinnSolver(NetworkSolver):
             paper, or "elements", by quadrature in its triangles.
         device: "cpu" or "cuda".
         precision: "single" or "double".
-        literal_gate: Whether the first gate has a hidden layer of its own, as printed in the paper.
         checkpoint_every: Epochs between checkpoints.
-        threads: Threads of the processor; 0 takes as many as torch is set to.
         seed: Of the random numbers.
     """
 
@@ -58,9 +58,7 @@ class PaperPinnSolver(NetworkSolver):
     collocation: Collocation = "nodes"
     device: Literal["cpu", "cuda"] = "cpu"
     precision: Literal["single", "double"] = "single"
-    literal_gate: bool = False
     checkpoint_every: int = 1000
-    threads: int = 0
     seed: int = 0
     _context: TrainingContext = field(default=TrainingContext(), init=False, repr=False, compare=False)
     name: ClassVar[str] = "pinn-std"
@@ -71,7 +69,7 @@ class PaperPinnSolver(NetworkSolver):
         self.check_positive("epochs", "learning_rate", "bc_weight", "width", "layers")
         if self.base_points < 2:
             raise UserError(f"{self.name}: base_points must be at least 2, got {self.base_points}")
-        self.check_not_negative("checkpoint_every", "threads", "seed")
+        self.check_not_negative("checkpoint_every", "seed")
         if self.device == "cuda" and not torch.cuda.is_available():
             raise UserError(f"{self.name}: device cuda needs a GPU and torch's CUDA build; take device=cpu")
         _ = self.weighting
@@ -85,7 +83,7 @@ class PaperPinnSolver(NetworkSolver):
     @property
     def network(self) -> ModifiedMlp:
         """The two networks' shape."""
-        return ModifiedMlp(width=self.width, layers=self.layers, literal_gate=self.literal_gate)
+        return ModifiedMlp(width=self.width, layers=self.layers)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train on the problem; see `Solver`.
@@ -95,13 +93,13 @@ class PaperPinnSolver(NetworkSolver):
         """
         check_problem(self, problem)
         started = time.perf_counter()
-        area = float(problem.mesh.areas.sum())
-        with torch_threads(self.threads) as threads, pool():
+        threads = torch.get_num_threads()
+        with pool():
             loss = self.loss(problem)
             initial = self.network.initial(self.seed, PRECISIONS[self.precision]).to(self.device)
-            settings = TrainingSettings(**{e.name: getattr(self, e.name) for e in fields(TrainingSettings)})
-            training = Training(loss, initial, settings, area, self._store(problem))
-            training.run(progress, self._context.reference_energy)
+            area = float(problem.mesh.areas.sum())
+            training = Training(loss, initial, area, self._store(problem), self.learning_rate)
+            training.run(self.epochs, self.checkpoint_every, progress)
             field = MlpField(self.network, training.parameters.double().cpu())
             energy, reaction, status = assess_training(problem, field, training)
         seconds = time.perf_counter() - started
@@ -143,7 +141,7 @@ class PaperPinnSolver(NetworkSolver):
             return torch.tensor(np.asarray(array), dtype=PRECISIONS[self.precision], device=self.device)
 
         body, shares = collocation_points(problem.mesh, self.collocation)
-        base = base_points(problem.mesh, self.base_points)
+        base = evenly_spaced_points(problem.mesh, "base", self.base_points)
         contact, functional = contact_functional(problem)
         targets = np.array([[value or 0.0] for value in problem.load.displacement])
         wanted = np.array([[float(value is not None)] for value in problem.load.displacement])

@@ -2,37 +2,20 @@
 
 import math
 import time
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
 
 import numpy as np
 import torch
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.pinn.paper.checkpoint import load_checkpoint, save_checkpoint, write_history
-from pinnray.solvers.pinn.paper.loss import Loss, LossEvaluation
+from pinnray.solvers.pinn.paper.checkpoint import CheckpointStore
+from pinnray.solvers.pinn.paper.loss import Loss
 from pinnray.solvers.solver import Progress, TrainingDiverged
 
 DIVERGED = 1e3
 """Ratio of the loss to its first value above which the training has diverged."""
-
-
-@dataclass(frozen=True)
-class TrainingSettings:
-    """Settings of the training; see `PaperPinnSolver` for their meaning."""
-
-    learning_rate: float
-    epochs: int
-    checkpoint_every: int
-
-
-@dataclass(frozen=True)
-class CheckpointStore:
-    """Destination of a training's checkpoint and history."""
-
-    folder: Path  # The folder of the checkpoint and the history
-    digest: str  # Of the problem and the settings that determine the result
-    resume: bool  # Whether to continue from a checkpoint in the folder
 
 
 class Training:
@@ -41,27 +24,28 @@ class Training:
     Args:
         loss: The loss.
         initial: Initial parameters, shape (networks, parameters); they are changed in place.
-        settings: Of the training.
         area: Of the body, mm², which times the mean energy density is the energy.
         store: Destination of checkpoint and history; None for none.
+        learning_rate: Of Adam.
     """
 
     def __init__(
         self,
         loss: Loss,
         initial: torch.Tensor,
-        settings: TrainingSettings,
         area: float,
         store: CheckpointStore | None,
+        learning_rate: float,
     ) -> None:
         self.parameters = initial
         self.columns = ("epoch", *loss.factors, "total", "energy", "seconds")
-        self._loss, self._settings, self._area, self._store = loss, settings, area, store
-        self._stepper = torch.optim.Adam([initial], lr=settings.learning_rate)
+        self._loss, self._area, self._store = loss, area, store
+        self._stepper = torch.optim.Adam([initial], lr=learning_rate)
         self._rows: list[tuple[float, ...]] = []
-        saved = load_checkpoint(store.folder, store.digest) if store and store.resume else None
-        if saved:
-            self._restore(saved)
+        if store and (saved := store.load()):
+            self.parameters.copy_(saved["parameters"])
+            self._stepper.load_state_dict(saved["optimiser"])
+            self._rows = [tuple(row) for row in saved["history"].tolist()]
         self._started = time.perf_counter() - (self._rows[-1][-1] if self._rows else 0.0)
 
     @property
@@ -74,48 +58,46 @@ class Training:
         """The columns of every epoch, shape (epochs, columns); losses are those before the epoch's step."""
         return np.array(self._rows).reshape(-1, len(self.columns))
 
-    def run(self, progress: Progress, reference: float | None) -> None:
-        """Train up to the settings' number of epochs, and report each.
+    def run(self, epochs: int, checkpoint_every: int, progress: Progress) -> None:
+        """Train, and report the terms of the loss, the energy and the time left after each epoch.
 
         Args:
-            progress: Receives the terms of the loss, the energy and the time left.
-            reference: Energy of a reference solution, N mm/mm.
+            epochs: In all, those of a checkpoint included.
+            checkpoint_every: Epochs between checkpoints; 0 for one at the end alone.
+            progress: Receives them.
 
         Raises:
             TrainingDiverged: If the loss is not a number or has grown beyond all bounds.
         """
         last, done, started = self._state(), self.epoch, time.perf_counter()
         try:
-            while self.epoch < self._settings.epochs:
-                evaluation = self._step()
+            while self.epoch < epochs:
+                terms = self._step()
                 last = self._state()
-                if self._settings.checkpoint_every and self.epoch % self._settings.checkpoint_every == 0:
+                if checkpoint_every and self.epoch % checkpoint_every == 0:
                     self._save(last)
                 pace = (time.perf_counter() - started) / (self.epoch - done)
-                progress(self.epoch / self._settings.epochs, self._text(evaluation, pace, reference))
+                left = _duration(pace * (epochs - self.epoch))
+                progress(
+                    self.epoch / epochs, f"epoch {self.epoch} of {epochs}: {self._said(terms)}, {left} left"
+                )
         except KeyboardInterrupt:
             self._save(last)
             raise
         self._save(last)
 
-    def _step(self) -> LossEvaluation:
-        """One step of the optimiser."""
-        evaluation = self._loss(self.parameters)
-        terms, total, self.parameters.grad = evaluation
+    def _step(self) -> Mapping[str, float]:
+        """One step of the optimiser; the terms of the loss before it."""
+        terms, total, self.parameters.grad = self._loss(self.parameters)
         self._check(total)
         self._stepper.step()
         seconds = time.perf_counter() - self._started
         self._rows.append((self.epoch + 1, *terms.values(), total, self._area * terms["PDE"], seconds))
-        return evaluation
+        return terms
 
-    def _text(self, evaluation: LossEvaluation, pace: float, reference: float | None) -> str:
-        energy, epochs = self._area * evaluation.terms["PDE"], self._settings.epochs
-        terms = ", ".join(f"{name} {value:.3g}" for name, value in evaluation.terms.items())
-        ratio = f" ({energy / reference:.3g} x reference)" if reference else ""
-        return (
-            f"epoch {self.epoch} of {epochs}: {terms}, energy {energy:.4g} N mm/mm{ratio}, "
-            f"{_duration(pace * (epochs - self.epoch))} left"
-        )
+    def _said(self, terms: Mapping[str, float]) -> str:
+        values = ", ".join(f"{name} {value:.3g}" for name, value in terms.items())
+        return f"{values}, energy {self._area * terms['PDE']:.4g} N mm/mm"
 
     def _check(self, total: float) -> None:
         first = self._rows[0][self.columns.index("total")] if self._rows else total
@@ -128,32 +110,22 @@ class Training:
         )
         raise TrainingDiverged(
             f"the loss {what} in epoch {self.epoch + 1}; take a learning_rate below "
-            f"{self._settings.learning_rate:g} or smaller weights of the loss"
+            f"{self._stepper.defaults['lr']:g} or smaller weights of the loss"
         )
 
-    def _state(self) -> tuple[int, dict[str, torch.Tensor]]:
-        """The epoch and a copy of parameters and optimiser state, safe from an interrupt within a step."""
-        state = {"parameters": self.parameters.clone()}
-        for name, value in self._stepper.state[self.parameters].items():
-            state[f"optimiser.{name}"] = value.clone()
-        return self.epoch, state
+    def _state(self) -> dict[str, Any]:
+        """A copy of parameters and optimiser state, safe from an interrupt within a step."""
+        return {
+            "epoch": self.epoch,
+            "parameters": self.parameters.clone(),
+            "optimiser": deepcopy(self._stepper.state_dict()),
+        }
 
-    def _restore(self, state: dict[str, torch.Tensor]) -> None:
-        self.parameters.copy_(state.pop("parameters"))
-        self._rows = [tuple(row) for row in state.pop("history").tolist()]
-        values = {name.removeprefix("optimiser."): value for name, value in state.items()}
-        groups = self._stepper.state_dict()["param_groups"]
-        self._stepper.load_state_dict({"state": {0: values} if values else {}, "param_groups": groups})
-
-    def _save(self, state: tuple[int, dict[str, torch.Tensor]]) -> None:
-        if self._store is None:
-            return
-        epoch, tensors = state
-        history = self.history[:epoch]
-        save_checkpoint(
-            self._store.folder, {**tensors, "history": torch.from_numpy(history)}, self._store.digest
-        )
-        write_history(self._store.folder, self.columns, history)
+    def _save(self, state: dict[str, Any]) -> None:
+        if self._store is not None:
+            history = self.history[: state["epoch"]]
+            self._store.save({**state, "history": torch.from_numpy(history)})
+            self._store.write_history(self.columns, history)
 
 
 def _duration(seconds: float) -> str:

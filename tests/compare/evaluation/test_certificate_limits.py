@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.comparison.evaluation.certificate import Certificate, Region
-from pinnray.comparison.evaluation.certification import with_certificate
-from pinnray.comparison.report.text import certificate_sentence
+from pinnray.comparison.evaluation.certificate import Certificate
+from pinnray.comparison.evaluation.certifier import with_certificate
+from pinnray.comparison.report.text import missed_energy
 
 GOOD = Certificate(
     energy=4.04,
@@ -21,7 +21,6 @@ GOOD = Certificate(
     load=np.array([np.nan, 0.1]),
     work=8.2,
     stroke=10.0,
-    regions={"tip": Region(area=0.25, excess=0.5, rel_l2_displacement=0.1, rel_l2_von_mises=0.2)},
 )
 """A converged solution: its energy is 4 N mm/mm under `fem`, its stroke 10 mm."""
 
@@ -107,5 +106,5 @@ def test_the_solution_of_fem_has_no_excess_but_rounding():
 
 def test_a_result_that_misses_energy_says_so(pinn):
     missing = with_certificate(pinn, replace(GOOD, missed=0.1))
-    assert "reports 2.50\xa0% less energy" in certificate_sentence(missing)
-    assert certificate_sentence(with_certificate(pinn, replace(GOOD, missed=0.01))) == ""
+    assert "reports 2.50\xa0% less energy" in missed_energy(missing)
+    assert missed_energy(with_certificate(pinn, replace(GOOD, missed=0.01))) == ""

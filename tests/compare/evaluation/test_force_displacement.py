@@ -85,7 +85,7 @@ def test_the_force_on_the_simulated_finger_is_a_cross(followed, fem):
 
 
 def test_the_whole_curve_of_the_simulated_finger_and_an_identified_force_are_drawn(followed, fem):
-    force = IdentifiedForce(Estimated(0.6, 0.5, 0.8), None)
+    force = IdentifiedForce(Estimated(0.7, 0.6, 0.9), None, Estimated(0.6, 0.5, 0.8))
     found = replace(fem, solver="fem-id", in_sample=True, identified=force)
     truth = replace(followed, solver="truth")
     curves = force_curves([fem, followed], Load())

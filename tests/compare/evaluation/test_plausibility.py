@@ -115,3 +115,11 @@ def test_another_order_of_the_markers_is_warned_of(measured, problem):
         assert any("see how they are numbered" in remark for remark in remarks), order
     smaller = replace(measured, displacements=0.5 * measured.displacements)
     assert displacement_remarks(smaller, problem) == []
+
+
+def test_two_markers_whose_clicks_were_exchanged_are_named(measured, problem):
+    places = measured.points + measured.displacements
+    places[[3, 5]] = places[[5, 3]]
+    mixed = replace(measured, displacements=places - measured.points)
+    remarks = displacement_remarks(mixed, problem)
+    assert any("with 4 and 6 exchanged their displacements would be smooth" in remark for remark in remarks)

@@ -12,11 +12,12 @@ from pinnray.runtime.figure import Figure
 
 
 class Page(NamedTuple):
-    """A matplotlib figure, what it wrote where when it was drawn, pixels, and its smallest type, points."""
+    """A matplotlib figure, what it wrote where when it was drawn, pixels, and sizes of its type, points."""
 
     figure: Figure
     words: list[tuple[str, Bbox]]
     smallest: float
+    largest: float
 
     @property
     def text(self) -> str:
@@ -53,4 +54,4 @@ def page_of(figure: Figure) -> Page:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Text, "draw", noted)
         figure.canvas.draw()
-    return Page(figure, words, min(sizes))
+    return Page(figure, words, min(sizes), max(sizes))

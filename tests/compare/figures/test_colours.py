@@ -1,10 +1,11 @@
 from dataclasses import replace
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.figures.body import ColourScale, diverging, sequential, symmetric
+from pinnray.comparison.figures.body import DIVERGING, ColourScale, sequential, symmetric
 from pinnray.comparison.figures.fields import QUANTITIES, difference_scale, field_scale, max_principal
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 
@@ -24,20 +25,9 @@ def test_a_symmetric_scale_takes_absolute_values_and_the_widest_field() -> None:
 
 
 def test_values_beyond_the_scale_take_the_end_colours() -> None:
-    scale = ColourScale(0.0, 1.0, diverging())
+    scale = ColourScale(0.0, 1.0, mpl.colormaps[DIVERGING])
     painted = scale.paint(np.array([-5.0, 0.0, 1.0, 5.0]))
     np.testing.assert_array_equal(painted[[0, 3]], painted[[1, 2]])
-
-
-def test_the_diverging_map_darkens_evenly_on_both_sides_of_a_light_grey() -> None:
-    colours = diverging()(np.linspace(0, 1, 256))[:, :3]
-    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-    lightness = np.cbrt(linear @ [0.2126, 0.7152, 0.0722])
-    assert lightness[127] > 0.93
-    assert (np.diff(lightness[:128]) > 0).all()
-    assert (np.diff(lightness[128:]) < 0).all()
-    steps = np.diff(lightness[:128])
-    assert steps.max() < 2 * steps.min()
 
 
 def test_every_solver_is_drawn_on_the_scale_of_the_reference(fem: Evaluation, mesh: TriangleMesh) -> None:

@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.certifier import with_certificates
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.figures import FORMATS, draw_all
+from pinnray.comparison.figures import FORMATS, draw_all, page_width
 from pinnray.comparison.figures.fields import QUANTITIES, draw_field
 from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
 from pinnray.comparison.figures.overlay import overlay_extent
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.runtime.errors import UserError
 from pinnray.runtime.figure import DPI, WIDTH
 from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import Estimated, IdentifiedForce
 from tests.compare.figures.drawn_pages import Page, page_of
 
 pytestmark = pytest.mark.slow
@@ -47,7 +49,9 @@ LIKE_OTHERS = ("strain_xx", "strain_yy", "strain_principal")
 @pytest.fixture(scope="module")
 def drawings(comparison: Results) -> dict[str, Illustration]:
     """The pictures of the comparison, of the fields two; no network of it has losses to draw."""
-    drawings = {name: draw(comparison) for name, (_, draw) in GALLERY.items() if name not in LIKE_OTHERS}
+    drawings = {
+        name: draw(comparison, WIDTH) for name, (_, draw) in GALLERY.items() if name not in LIKE_OTHERS
+    }
     return {name: drawing for name, drawing in drawings.items() if drawing is not None}
 
 
@@ -59,7 +63,7 @@ def pages(drawings: dict[str, Illustration]) -> dict[str, Page]:
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
     """In letters, not in pixels; and the same file every time."""
-    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", {"convergence": GALLERY["convergence"]})
+    monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", {"design": GALLERY["design"]})
     first, second = (
         [path.read_bytes() for path in sorted(folder.glob(f"*.{kind}"))]
         for folder in (tmp_path / "first", tmp_path / "second")
@@ -80,12 +84,12 @@ def test_every_picture_is_told_in_numbers_to_those_who_cannot_see_it(drawings, c
 
 
 FIELDS = tuple(quantity.name for quantity in QUANTITIES if quantity.name not in LIKE_OTHERS)
-ALL = (*("overlay", "marker_errors", *FIELDS, "force_displacement", "design", "mesh", "convergence"),)
+ALL = (*("overlay", "marker_errors", *FIELDS, "force_displacement", "design", "mesh"),)
 
 
 def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawings, tmp_path, monkeypatch):
     """Each is as wide as a page, and not blank; progress goes from none to all."""
-    drawn = {name: (title, lambda _, name=name: drawings.get(name)) for name, (title, _) in GALLERY.items()}
+    drawn = {name: (title, lambda *_, name=name: drawings.get(name)) for name, (title, _) in GALLERY.items()}
     monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", drawn)
     said: list[float] = []
     pictures = draw_all(tmp_path, comparison, lambda done, _: said.append(done))
@@ -115,9 +119,35 @@ def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     more += [replace(told, solver="gp"), replace(told, solver="statfem", converged=False)]
     eight = compared(fem, pinn, failed, *more)
-    for name in ("overlay", "marker_errors", "von_mises", "convergence"):
+    for name in ("overlay", "marker_errors", "von_mises"):
         page = page_of(draw(eight, name).figure)
         assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
+
+
+@pytest.mark.parametrize("width", [85.0, 180.0])
+def test_pictures_for_a_journal_have_its_width_and_type_that_fits(comparison, failed, pinn, width, compared):
+    """Nine solvers of long names, most of them not converged, on a column of a journal and on its page."""
+    record = {"epoch": np.arange(1.0, 4.0), "PDE": np.ones(3), "BC": np.ones(3), "ASM": np.ones(3)}
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(36.0, 35.0, 37.5))
+    told = replace(failed, in_sample=True, left_out=failed.marker_displacement, identified=force)
+    more = [replace(told, solver=f"pinn-id-long-{n}", history=record) for n in range(3)]
+    more += [replace(pinn, solver=f"pinn-long-{n}") for n in range(3)]
+    nine = compared(*comparison.evaluations, *more, observations=comparison.observations)
+    nine = replace(nine, design=nine.design.replaced(name="default-rib_count-6-height-110-t_rib-1.25"))
+    for name in GALLERY:
+        page = page_of(draw(nine, name, page=page_width(width)).figure)
+        assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
+        assert page.figure.get_figwidth() * 25.4 == pytest.approx(width)
+        assert page.figure.get_figheight() < 11
+        assert 7 <= page.smallest <= page.largest <= 9
+    with pytest.raises(UserError, match="80 to 200 mm"):
+        page_width(40.0)
+
+
+def test_a_picture_as_pdf_is_as_wide_as_it_was_asked_for(comparison, tmp_path):
+    path = draw(comparison, "design", page=page_width(85.0)).figure.save(tmp_path / "design.pdf")
+    box = re.search(rb"/MediaBox \[ *0 0 ([\d.]+) ", path.read_bytes())
+    assert float(box[1]) * 25.4 / 72 == pytest.approx(85.0, abs=0.01)
 
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors", *FIELDS])
@@ -184,12 +214,6 @@ def test_the_overlay_shows_the_whole_of_every_solution_that_converged(mesh, pinn
     assert extent.top > 0
 
 
-def test_the_reference_energy_is_a_line(pages: dict[str, Page]) -> None:
-    energies, distances, *_ = pages["convergence"].figure.axes
-    assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
-    np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [4400.0, 100.0, 21.0])
-
-
 def test_no_remark_on_a_field_lies_on_a_slender_finger(fem, pinn, mesh, compared):
     x, y = mesh.points.T
     length, width = float(np.ptp(x)), float(np.ptp(y))
@@ -213,11 +237,8 @@ def test_the_number_beside_a_field_is_its_largest_mean_of_a_triangle(fem, compar
     assert "largest 1 MPa" in page_of(draw(compared(peak), "von_mises").figure).text
 
 
-def test_ticks_of_six_characters_leave_room_for_the_labels(fem, pinn, compared):
-    history = {"units": np.array([3200.0, 8000.0]), "energy": np.array([1.1015, 1.0881])}
+def test_ticks_of_six_characters_leave_room_for_the_labels(pinn, compared):
     followed = {"load_fraction": np.array([0.0, 1.0]), "reaction_x": np.zeros(2), "reaction_y": [0, -0.0021]}
-    near = replace(fem, energy=1.0924)
-    assert page_of(draw(compared(near, replace(pinn, history=history)), "convergence").figure).cut_off() == []
     follower = replace(pinn, history=followed, reaction=np.array([0.0, -0.0021]))
     assert page_of(draw(compared(follower), "force_displacement").figure).cut_off() == []
 

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures.overlay import draw_overlay
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import Homography, Pictures
+from pinnray.geometry.picture_frame import Homography, Pictures
 from pinnray.solvers.problem import Load
 from tests.compare.conftest import BendingField, closed_form
 from tests.compare.figures.drawn_pages import page_of

@@ -3,30 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.comparison.figures.solver_charts import (
-    approaches_reference,
-    draw_convergence,
-    draw_losses,
-    readable,
-    records_by_kind,
-    wants_log,
-)
+from pinnray.comparison.figures.solver_charts import draw_losses, wants_log
 from tests.compare.figures.drawn_pages import page_of
-
-
-def test_records_are_grouped_by_their_first_column(fem, pinn, evaluate):
-    steps = np.array([0.0, 1.0])
-    other = evaluate("other", history={"load_fraction": steps, "reaction": steps, "energy": steps})
-    loss = evaluate("loss", history={"seconds": steps, "loss": steps})
-    assert records_by_kind([fem, pinn, other, loss]) == {
-        ("units", "energy"): [pinn],
-        ("load_fraction", "energy"): [other],
-        ("seconds", "loss"): [loss],
-    }
-
-
-def test_without_a_record_there_is_no_chart_of_energy(fem, compared):
-    assert draw_convergence(compared(fem)) is None
 
 
 @pytest.mark.parametrize(
@@ -41,20 +19,6 @@ def test_without_a_record_there_is_no_chart_of_energy(fem, compared):
 )
 def test_axes_are_logarithmic_where_that_helps(values: list[float], expected: bool) -> None:
     assert wants_log(np.array(values)) is expected
-
-
-def test_a_growing_load_does_not_approach_the_reference() -> None:
-    assert approaches_reference(("units", "energy"))
-    assert not approaches_reference(("load_fraction", "energy"))
-    assert not approaches_reference(("units", "loss"))
-    assert readable("newton_iterations") == "newton iterations"
-
-
-def test_two_results_are_joined_by_dots_and_no_curve(fem, pinn, compared):
-    short = {name: column[:2] for name, column in pinn.history.items()}
-    drawn = draw_convergence(compared(fem, replace(pinn, history=short)))
-    assert drawn is not None
-    assert drawn.axes[0].lines[0].get_linestyle() == ":"
 
 
 EPOCHS = np.array([1.0, 2.0, 3.0])

@@ -20,7 +20,7 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, HAND_HELD
+from pinnray.geometry.picture_frame import FIXED, HAND_HELD
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
 from pinnray.solvers.fem.linear import FemSolver

@@ -74,32 +74,3 @@ def test_a_finished_training_goes_on_where_more_is_asked_of_it(job, tmp_path):
     compare(job(longer, resume=True))
     assert longer.epochs == [5, 6]
     assert (tmp_path / "out" / "run" / "training" / "counting" / "checkpoint").read_text() == "6"
-
-
-class Other(FemSolver):
-    """`fem` by another name."""
-
-    name = "other"
-
-
-class FiniteStrain(Counting):
-    """Says that it has another law than `fem`."""
-
-    laws = ("neo-hookean",)
-
-
-@pytest.mark.parametrize(
-    ("before", "kind", "known"),
-    [
-        (FemSolver(degree=1), Counting, True),
-        (Other(degree=1), Counting, False),
-        (FemSolver(degree=1), FiniteStrain, False),
-    ],
-    ids=["fem", "another solver", "another law"],
-)
-def test_the_energy_of_fem_is_told_if_it_was_solved_before_with_the_same_law(job, before, kind, known):
-    counting = kind([])
-    reference, _ = compare(job(before, counting)).evaluations
-    _, context = counting.diary[0]
-    assert context.reference_energy == (reference.energy if known else None)
-    assert not context.resume

@@ -20,7 +20,7 @@ from pinnray.comparison.report.tables import (
 )
 from pinnray.geometry import Design, load_design
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.geometry.registration import FIXED, HAND_HELD
+from pinnray.geometry.picture_frame import FIXED, HAND_HELD
 from tests.compare.tables import rows_of
 
 Rows = list[dict[str, str]]

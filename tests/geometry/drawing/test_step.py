@@ -142,7 +142,7 @@ def test_end_faces_in_several_coplanar_parts_are_one(tmp_path, solid):
 def test_a_plane_in_the_face_of_a_step_gives_one_section(tmp_path):
     low, high = cq.Solid.makeBox(60, 20, 4), cq.Solid.makeBox(30, 20, 8, pnt=cq.Vector(0, 0, 4))
     path = saved(tmp_path, low.fuse(high).Solids()[0])
-    assert area(path, plane="z = 4") == pytest.approx(1200)
+    assert area(path, plane="z = 4", depth_known=True) == pytest.approx(1200)
 
 
 @pytest.mark.parametrize(("plane", "expected"), [("z = 12", 1200), ("z = 0", 1200), ("y = 20", 720)])
@@ -173,10 +173,65 @@ def degenerate(kind: str) -> cq.Shape:
 @pytest.mark.parametrize("kind", ["cone", "sphere"])
 def test_a_face_without_a_normal_somewhere_is_no_hindrance(tmp_path, kind):
     path = saved(tmp_path, degenerate(kind))
-    assert area(path, plane="z = 3") == pytest.approx(1200)
-    assert read_drawing(path, plane="z = 3").depth == pytest.approx(12)
-    with pytest.raises(UserError, match="the solid is not extruded; give the plane"):
+    for plane in ("z = 3", None):
+        assert area(path, plane=plane) == pytest.approx(1200)
+        assert read_drawing(path, plane=plane).depth == pytest.approx(12)
+
+
+def stepped(kind: str) -> cq.Shape:
+    """A bar of 60 mm by 12 mm that is 20 mm deep, and not everywhere."""
+    bar = cq.Workplane("XY").box(60, 12, 20)
+    return {
+        "foot": lambda: bar.union(cq.Workplane("XY").box(8, 16, 40).translate((-34, 0, 0))),
+        "foot flush": lambda: bar.union(cq.Workplane("XY").box(8, 16, 40).translate((-34, 0, 10))),
+        "boss": lambda: bar.faces(">Z").workplane().rect(10, 8).extrude(5),
+        "step": lambda: bar.cut(cq.Workplane("XY").box(20, 10, 10).translate((25, 0, 10))),
+        "chamfer": lambda: bar.edges().chamfer(2),
+        "holes across": lambda: bar.faces(">Y").workplane().hole(6).faces(">Z").workplane().hole(4),
+        "taper": lambda: cq.Workplane("XY").rect(60, 12).extrude(20, taper=3),
+        "sheared": lambda: (
+            cq.Workplane("XZ").polyline([(0, 0), (60, 0), (70, 20), (10, 20)]).close().extrude(12)
+        ),
+        "twisted": lambda: cq.Workplane("XY").rect(60, 12).twistExtrude(20, 20),
+    }[kind]().val()
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (
+            "foot",
+            "z = 0 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm, and .* 19520 mm3; .* depth = 20",
+        ),
+        ("foot flush", "z = -10 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm"),
+        ("boss", "720 mm2 over 20 mm, 80 mm2 over 25 mm"),
+        ("step", "720 mm2 over 15 mm, 570 mm2 over 20 mm"),
+        ("chamfer", "712 mm2 over 20 mm, and its volume 13707"),
+        *((kind, "mm2 over .* mm, and its volume") for kind in ("holes across", "taper", "twisted")),
+    ],
+)
+def test_the_depth_of_a_solid_is_asked_for_unless_its_volume_is_area_times_depth(tmp_path, kind, said):
+    path = saved(tmp_path, stepped(kind))
+    with pytest.raises(UserError, match=f"a.step: the solid is not extruded: across .*{said}"):
         read_drawing(path)
+    with pytest.raises(UserError, match="give the depth of the finger"):
+        read_drawing(path, plane="z = 1")
+    drawing = read_drawing(path, plane="z = 1", depth_known=True)
+    assert "cut, " in drawing.note
+
+
+def test_a_sheared_solid_is_extruded_along_its_one_straight_direction(tmp_path):
+    drawing = read_drawing(saved(tmp_path, stepped("sheared")))
+    assert drawing.depth == pytest.approx(12)
+    assert body(drawing.loops).area == pytest.approx(1200)
+
+
+def test_coloured_faces_are_read_like_others(tmp_path):
+    """Their labels have no names."""
+    whole = cq.Assembly(name="whole").add(BODY, name="body", color=cq.Color("red"))
+    for number, face in enumerate(BODY.Faces()):
+        whole.children[0].addSubshape(face, color=cq.Color(0.1 * number, 0.5, 0.5))
+    assert area(exported(tmp_path, whole)) == pytest.approx(1200)
 
 
 @pytest.mark.parametrize(

@@ -26,8 +26,8 @@ def design_of(options: list[str]) -> Design:
 @pytest.mark.parametrize("options", FINGERS.values(), ids=FINGERS)
 def test_every_export_is_read_back_as_the_same_finger(options: list[str], tmp_path: Path) -> None:
     design = design_of(options)
-    assert main(["design", *options, "--formats", "step,dxf,svg", "--out", str(tmp_path)]) == 0
-    for name in ("finger.step", "section.dxf", "section.svg"):
+    assert main(["design", *options, "--formats", "step,dxf", "--out", str(tmp_path)]) == 0
+    for name in ("finger.step", "section.dxf"):
         drawn = finger_from_file(tmp_path / name)
         shift = drawn.placement.shift  # of csiro: x = 0 is at the foot, which the design has at negative x
         assert options or str(drawn.placement) == "turned by 0 degrees, shifted by (0, 0) mm"
@@ -37,7 +37,7 @@ def test_every_export_is_read_back_as_the_same_finger(options: list[str], tmp_pa
         if name == "finger.step":
             assert drawn.depth == pytest.approx(design.depth, rel=1e-9)
             assert drawn.marker_height == pytest.approx(design.marker_height, rel=1e-6)
-        else:  # their layers and groups name clamp and contact
+        else:  # its layers name clamp and contact
             assert (drawn.sources["clamp"], drawn.sources["contact"]) == ("drawn", "drawn")
         np.testing.assert_allclose(drawn.markers - shift, design.markers, atol=1e-9)
         assert drawn.contact_abscissa - shift[0] == pytest.approx(design.contact_abscissa, abs=1e-9)

@@ -37,12 +37,11 @@ def test_beam():
     assert thickness[~long] == pytest.approx(50)
 
 
-def test_wedge_is_as_thick_as_its_tangent():
+def test_wedge_is_as_thick_as_its_tangent_and_has_no_wall():
     length, height = 40.0, 10.0
     wedge = Section(Loop.polygon([[0, 0], [0, -height], [length, 0]]))
-    points, thickness = wall_thickness(wedge, 0.5, corners=True)
-    front = points[:, 1] == 0
-    assert thickness[front] == pytest.approx((length - points[front, 0]) * height / length)
+    crossing = through(wedge, [[10.0, 0.0], [30.0, 0.0]], [[0.0, -1.0], [0.0, -1.0]])
+    assert crossing.lengths == pytest.approx([7.5, 2.5])
     assert len(wall_thickness(wedge, 0.5)[0]) == 0  # every ray ends beyond a sharp corner
 
 

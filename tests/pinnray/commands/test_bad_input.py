@@ -34,10 +34,11 @@ def test_a_link_to_itself_is_no_output_folder(folder, capsys):
 
 
 def test_a_drawing_is_not_replaced_by_what_is_drawn_from_it(folder, capsys):
-    Path("section.svg").write_text(str(FILES["beam.svg"]))
-    assert main(["design", "--section", "section.svg", "--formats", "svg", "--out", "."]) == BAD_INPUT
-    assert "this would overwrite section.svg, which is read" in capsys.readouterr().err
-    assert Path("section.svg").read_text() == FILES["beam.svg"]
+    Path("beam.svg").write_text(str(FILES["beam.svg"]))
+    Path("section.dxf").symlink_to("beam.svg")
+    assert main(["design", "--section", "beam.svg", "--formats", "dxf", "--out", "."]) == BAD_INPUT
+    assert "this would overwrite beam.svg, which is read" in capsys.readouterr().err
+    assert Path("beam.svg").read_text() == FILES["beam.svg"]
 
 
 @pytest.mark.parametrize(

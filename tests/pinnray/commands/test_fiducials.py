@@ -50,24 +50,6 @@ def test_the_printed_board_is_found_in_true_scale_and_not_mirrored(options, boar
     assert np.abs(found - expected).max() < 0.1  # pixels, of 0.25 mm
 
 
-@pytest.mark.parametrize(
-    ("options", "fitting"),
-    [
-        ("--square 20", 8),
-        ("--square 9 --marker-plane 20", 8),
-        ("--square 8", None),
-        ("--board charuco:8x6 --square 12 --marker 9", 9),
-        ("--design slender --square 20", 8),
-    ],
-)
-def test_a_board_that_is_larger_than_the_films_picture_is_told(options, fitting, tmp_path, capsys):
-    """The focus is that of the film, so the board is photographed from where the fiducials fill the image."""
-    assert main(["fiducials", *options.split(), "--out", str(tmp_path)]) == 0
-    said = capsys.readouterr().err
-    assert (f"give --square {fitting} or less" in said) == (fitting is not None)
-    assert ("warning" in said) == (fitting is not None)
-
-
 def test_the_fiducials_are_those_of_the_design_at_the_height_of_its_markers(tmp_path, capsys):
     from pinnray.geometry.finger.presets import load_design
 

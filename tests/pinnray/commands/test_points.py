@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.validation.printed_finger import FINGERS
 from pinnray.cli import main
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.vision.measurements import read_measurements
 
 FINGER = FINGERS[1]

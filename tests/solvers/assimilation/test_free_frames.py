@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
-from pinnray.solvers.assimilation.pictures import FreePictures
+from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Pictures, Registration
+from pinnray.solvers.assimilation.picture_frames import FreePictures
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.registry import make_solver
 from tests.solvers.conftest import hiding, observed_at

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
@@ -75,17 +74,6 @@ def test_what_is_left_out_is_what_a_fit_to_the_others_misses(springs: Springs, f
         np.testing.assert_allclose(left_out[marker], missed[rows], rtol=1e-9)
 
 
-@pytest.mark.parametrize("factor", [0.2, 1.0, 30.0])
-def test_the_evidence_is_the_density_of_what_is_seen(springs: Springs, factor: float) -> None:
-    """By SciPy: the errors' variances scale / W on top of the prior's covariance of the markers."""
-    scale, forces = 0.3, springs.forces()
-    variances = scale / springs.weights
-    covariance = np.diag(variances) + factor * scale * forces.compliance
-    density = multivariate_normal.logpdf(forces.prior_residual.ravel(), cov=covariance)
-    constant = -0.5 * np.log(2 * np.pi * variances).sum()
-    assert forces.log_evidence(scale, factor) + constant == pytest.approx(density, rel=1e-10)
-
-
 def test_a_direction_in_which_nothing_gives_way_stays_as_it_is() -> None:
     """The compliance of rounding's sign there is none: the residual is all that was to be moved."""
     direction = np.array([1.0, 2.0, -1.0, 0.5])
@@ -150,16 +138,12 @@ def test_the_curve_has_every_factors_fit(forces):
     found = [curve[name][30] for name in ("curve_energy", "curve_in_sample_mm", "curve_left_out_mm")]
     means = [np.sqrt((values**2).mean()) for values in (fit.residual, fit.residual_without)]
     np.testing.assert_allclose(found, [fit.energy, *means], rtol=1e-14)
-    likely = PRECISE.curve(forces)["curve_log_evidence"]
-    assert likely[30] == forces.log_evidence(0.3, FACTORS[30])
 
 
 def test_the_factor_is_the_best_on_the_curve(forces):
     assert PAPER.factor(forces) == 1
     left_out = [np.linalg.norm(forces.fit(factor).residual_without) for factor in FACTORS]
-    likely = [forces.log_evidence(0.3, factor) for factor in FACTORS]
-    best, likeliest = FACTORS[np.argmin(left_out)], FACTORS[np.argmax(likely)]
-    assert len({1.0, best, likeliest}) == 3, "else one could stand for another"
+    best = FACTORS[np.argmin(left_out)]
+    assert best != 1
     assert replace(PAPER, choose="left-out").factor(forces) == best
     assert replace(PRECISE, choose="left-out").factor(forces) == best
-    assert replace(PRECISE, choose="evidence").factor(forces) == likeliest

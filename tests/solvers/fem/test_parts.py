@@ -8,7 +8,8 @@ import pytest
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.physics import Load, Material
+from pinnray.solvers.load import Load
+from pinnray.solvers.material import Material
 from pinnray.solvers.problem import Problem
 from tests.solvers.conftest import bar_mesh
 

@@ -21,7 +21,7 @@ from pinnray.solvers.finger_figures.measures import (
     wrap_angle,
 )
 from pinnray.solvers.problem import Load, Material, Problem, Substance
-from pinnray.solvers.solution import Solution, Status
+from pinnray.solvers.solution import Estimated, IdentifiedForce, Solution, Status
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 
@@ -103,6 +103,13 @@ def test_force_acts_along_the_travel() -> None:
     oblique = replace(PROBLEM, load=Load(displacement=(3.0, -4.0)))
     (travel, force) = force_curve(affine([[0, 0], [0, 0]], oblique), 20.0)[-1]
     assert (travel, force) == pytest.approx((5.0, 20 * (0.18 + 1.6)))
+
+
+def test_the_force_has_the_interval_of_its_own_component() -> None:
+    """Not that of the size of a force that is partly tangential."""
+    found = IdentifiedForce(Estimated(0.5, 0.4, 0.6), None, Estimated(0.3, 0.25, 0.35))
+    figures = figures_of(replace(affine([[0, 0], [0, 0]]), identified=found), rest={})
+    assert figures.intervals["force"] == pytest.approx((0.25 * FINGER.depth, 0.35 * FINGER.depth))
 
 
 def test_a_recorded_path_gives_the_force_on_the_way() -> None:

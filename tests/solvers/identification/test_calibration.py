@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2, norm
 
-from pinnray.geometry.registration import Registration
+from pinnray.geometry.picture_frame import Registration
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.model import MarkerModel
 from pinnray.solvers.identification.search import Identifier

@@ -1,12 +1,9 @@
 """The force from frame to frame: a simulated loading and unloading, hidden markers, rest, jumps."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from pinnray.runtime.errors import ShapeError, UserError
-from pinnray.solvers.fem.identification import FemBody, fem_force_tracker
+from pinnray.solvers.fem.identification import FemBody
 from pinnray.solvers.identification.model import EXACT, ResponseModel
 from pinnray.solvers.identification.tracker import ForceTracker
 from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
@@ -20,7 +17,8 @@ PRINTED = {"front_thickness": 2.06, "back_thickness": 1.95, "rib_thickness": 2.0
 
 @pytest.fixture(scope="module")
 def tracker_of(problem):
-    return lambda: fem_force_tracker(problem, problem.mesh.markers, RADIUS, degree=1)
+    unknowns = Unknowns(problem, DEFAULT)
+    return lambda: ForceTracker(ResponseModel(FemBody(unknowns, 1), unknowns), problem.mesh.markers, RADIUS)
 
 
 def marker_path(problem, shares, finger):
@@ -142,15 +140,3 @@ def test_markers_that_no_force_explains_are_told(drawn_path, tracker_of):
     assert found.inflation > 5
     assert "times as far off as noise explains" in found.status
     assert found.high - found.low > 3 * (plain.high - plain.low)
-
-
-def test_arrays_of_another_finger_are_refused(tracker_of):
-    with pytest.raises(ShapeError, match=r"shape \(9, 2\) and a mask of shape \(9,\), got \(8, 2\)"):
-        tracker_of().update(np.zeros((8, 2)), np.zeros((8, 2)), np.ones(8, dtype=bool))
-
-
-def test_a_force_without_its_place_cannot_be_followed(problem):
-    unknowns = Unknowns(replace(problem), ("normal_force",))
-    model = ResponseModel(FemBody(unknowns, 1), unknowns)
-    with pytest.raises(UserError, match="followed with position among the unknowns"):
-        ForceTracker(model, problem.mesh.markers, RADIUS)

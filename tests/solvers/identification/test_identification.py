@@ -7,7 +7,7 @@ import pytest
 
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.quadrature import body_quadrature
-from pinnray.geometry.registration import HAND_HELD, Homography, Registration
+from pinnray.geometry.picture_frame import HAND_HELD, Homography, Registration
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver
@@ -163,7 +163,7 @@ def test_gradients_of_several_states_are_those_of_their_fields(identified, probl
     snapshots = [member.found, *member.steps]
     together = member.found.body.gradients(np.array([each.state for each in snapshots]), location)
     for each, found in zip(snapshots, together, strict=True):
-        np.testing.assert_allclose(found, each.drawn.gradient(location), atol=1e-12)
+        np.testing.assert_allclose(found, each.body.field(each.state).gradient(location), atol=1e-12)
 
 
 @pytest.mark.slow
@@ -212,7 +212,8 @@ def test_only_an_identified_finger_is_carried_and_only_to_where_it_has_an_equili
     far = replace(problem, load=Load(displacement=(None, -500.0)))
     with pytest.raises(UserError, match="no equilibrium of the identified finger"):
         solver.transferred(solution, given, far)
-    plain = replace(solution, field=solution.field.members[0].found.drawn)
+    found = solution.field.members[0].found
+    plain = replace(solution, field=found.body.field(found.state))
     carried = solver.transferred(plain, given, far)
     assert (carried.problem, carried.field) == (far, plain.field)
 

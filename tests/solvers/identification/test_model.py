@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.geometry.registration import Registration
+from pinnray.geometry.picture_frame import Registration
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel
 from pinnray.solvers.identification.unknowns import CONTACT, DEFAULT, PARTS  # type: ignore[attr-defined]

@@ -50,6 +50,30 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     assert force.position.low < min(places) < max(places) < force.position.high
 
 
+def test_the_variance_of_the_force_is_the_sum_of_what_it_comes_from(identified):
+    """Of a body with a depth the plane state is most of it, as ν² / 2 of the force."""
+    observed, _, solution = identified
+    shares, travel = {}, np.array([0.0, -1.0])
+    for finger in (None, Design()):
+        problem = replace(solution.problem, observations=None, finger=finger)
+        identifier = Identifier(
+            FemIdSolver(degree=1, law="given"), problem, lambda unknowns: FemBody(unknowns, 1)
+        )
+        found = identifier.identify(observed)
+        (value, deviation), parts = found.best.component(travel), found.best.variances(travel)
+        assert value == pytest.approx(-found.best.response.hypothesis.force[1])
+        assert sum(parts.values()) == pytest.approx(deviation**2)
+        assert all(part >= 0 for part in parts.values())
+        shares[finger is not None] = found.force().shares
+        assert sum(found.force().shares.values()) == pytest.approx(1)
+    assert shares[False]["third dimension"] == 0
+    assert next(iter(shares[True])) == "third dimension"
+    # The observations of a body without a depth are most of the rest, and no frame was to be found.
+    assert shares[False]["markers"] > 0.2
+    assert shares[False]["frames"] == 0
+    assert found.force().advice.startswith(f"{shares[True]['third dimension']:.0%} of the variance of the")
+
+
 @pytest.mark.slow
 def test_a_wrong_marker_is_found_and_not_used(identified, problem):
     observed, true, right = identified

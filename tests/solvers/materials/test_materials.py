@@ -66,6 +66,57 @@ def test_a_test_is_read_with_the_units_of_its_columns(tmp_path):
         test.up_to(0.3)
 
 
+CURVE = [(0.02 * n, 0.2 * n) for n in range(1, 26)]
+"""Strain, and stress in MPa, of a linear bar of 10 MPa up to a strain of 50 %."""
+
+
+@pytest.mark.parametrize(
+    ("titles", "strain", "stress"),
+    [
+        ("strain,stress_MPa", 1, 1),
+        ("Engineering Strain;Engineering Stress (MPa)", 1, 1),
+        ("True Stress (MPa);Engineering Strain;Engineering Stress [kPa]", 1, 1e3),
+        ("Tensile strain (%),Tensile stress (MPa)", 100, 1),
+        ("Strain\tStress\n(mm/mm)\t(N/mm²)", 1, 1),  # units below
+        ("Dehnung in %;Spannung in MPa", 100, 1),
+        ("strain_ratio,stress_Pa", 1, 1e6),
+    ],
+)
+def test_titles_of_many_programs_are_known(tmp_path, titles, strain, stress):
+    file = tmp_path / "strip.csv"
+    mark = next(each for each in ";\t," if each in titles)
+    before = ["99"] * (titles.count("True"))
+    rows = [mark.join([*before, f"{s * strain:.6g}", f"{p * stress:.6g}"]) for s, p in CURVE]
+    rows = [row.replace(".", ",") if mark == ";" else row for row in rows]
+    file.write_text(f"Specimen 1\nV2\n{titles}\n" + "\n".join(rows))
+    best, *_ = fitted(read_tensile_test(file))
+    assert best.material.law == "linear"
+    assert best.material.young == pytest.approx(10)
+
+
+BACK = [(s, p - 1.0) for s, p in CURVE[::-1]]
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        (CURVE, None),
+        (CURVE[::-1], None),
+        ([CURVE[n] for n in np.random.default_rng(0).permutation(25)], None),
+        (CURVE + BACK, "its strain goes back; of its 50 points the 25"),
+        (CURVE[:15] + BACK[10:] + CURVE + BACK, "its strain goes back"),  # two cycles
+        (CURVE + [(0.5 + 0.02 * n, 0.01) for n in range(1, 20)], "its stress falls after the peak"),  # broke
+    ],
+)
+def test_the_first_loading_up_to_the_peak_counts(tmp_path, recwarn, points, said):
+    file = tmp_path / "strip.csv"
+    file.write_text("strain,stress_MPa\n" + "".join(f"{s},{p}\n" for s, p in points))
+    test = read_tensile_test(file)
+    assert fitted(test)[0].material.young == pytest.approx(10)
+    assert test.secant(0.25) == pytest.approx(10)
+    assert [said in str(each.message) for each in recwarn] == [True] * (said is not None)
+
+
 def test_a_known_material_carries_its_substance_through_options_and_laws():
     from pinnray.options.shared import PhysicsOptions
     from pinnray.solvers.solver import with_law

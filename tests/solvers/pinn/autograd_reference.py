@@ -11,23 +11,20 @@ from pinnray.solvers.problem import Problem, contact_functional
 
 
 class PlainMlp(torch.nn.Module):
-    """One network of the paper: gated layers that take X directly, or the literal extra layer."""
+    """One network of the paper, whose first gate takes X directly."""
 
-    def __init__(self, width: int, layers: int, literal: bool) -> None:
+    def __init__(self, width: int, layers: int) -> None:
         super().__init__()
-        self.literal = literal
         self.encoder_a = torch.nn.Linear(2, width)
         self.encoder_b = torch.nn.Linear(2, width)
         self.first = torch.nn.Linear(2, width)
-        count = layers if literal else layers - 1
-        self.gates = torch.nn.ModuleList(torch.nn.Linear(width, width) for _ in range(count))
+        self.gates = torch.nn.ModuleList(torch.nn.Linear(width, width) for _ in range(layers - 1))
         self.last = torch.nn.Linear(width, 1)
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:
         a, b = torch.tanh(self.encoder_a(points)), torch.tanh(self.encoder_b(points))
         hidden = torch.tanh(self.first(points))
-        if not self.literal:
-            hidden = (1 - hidden) * a + hidden * b
+        hidden = (1 - hidden) * a + hidden * b
         for gate in self.gates:
             z = torch.tanh(gate(hidden))
             hidden = (1 - z) * a + z * b
@@ -51,7 +48,7 @@ class PlainPinn:
         first, gates, biases, output, output_bias = solver.network.weights(parameters)
         self.networks = []
         for k in range(2):
-            network = PlainMlp(solver.width, solver.layers, solver.literal_gate).to(dtype)
+            network = PlainMlp(solver.width, solver.layers).to(dtype)
             layers = [network.encoder_a, network.encoder_b, network.first, *network.gates, network.last]
             initial = [(layer[:2], layer[2]) for layer in first[k]]
             initial += [(gate[k], bias[k, 0]) for gate, bias in zip(gates, biases, strict=True)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from pinnray.solvers.pinn.paper.collocation import base_points, collocation_points
+from pinnray.solvers.pinn.paper.collocation import collocation_points
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
 from pinnray.solvers.pinn.paper.solver import PaperPinnSolver
 from pinnray.solvers.pinn.paper.trained_field import assess_training
@@ -22,7 +22,7 @@ TINY = {"width": 8, "layers": 2, "base_points": 20, "precision": "double"}
         ({}, Material(), Load()),  # the default load
         ({}, Material(), Load(kind="point")),  # the paper's
         ({}, Material(plane="stress"), Load(displacement=(None, -10.0))),  # the printed law; u free
-        ({"literal_gate": True, "bc_weight": 10.0}, Material(poisson=0.3), Load()),  # the printed network
+        ({"bc_weight": 10.0}, Material(poisson=0.3), Load()),
     ],
 )
 def test_first_epochs_of_every_variant(coarse_mesh, settings, material, load):
@@ -35,14 +35,11 @@ def test_first_epochs_of_every_variant(coarse_mesh, settings, material, load):
         np.testing.assert_allclose(ours, plain.step(), rtol=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("literal", "count"),
-    [(False, 13_121), (True, 17_281)],  # the paper's 4 layers of 64; with the extra layer that it prints
-)
-def test_number_of_parameters(literal, count):
-    network = ModifiedMlp(literal_gate=literal)
-    assert network.parameters == count
-    assert network.initial(0, torch.float32).shape == (2, count)
+def test_number_of_parameters():
+    """The paper's 4 layers of 64."""
+    network = ModifiedMlp()
+    assert network.parameters == 13_121
+    assert network.initial(0, torch.float32).shape == (2, 13_121)
 
 
 def test_initial_weights_are_glorot_normal():
@@ -64,12 +61,6 @@ def test_shares_make_a_mean(coarse_mesh, kind, tolerance):
     points, shares = collocation_points(coarse_mesh, kind)
     assert shares.sum() == pytest.approx(1.0, rel=1e-12)
     assert (shares * points[:, 0] ** 2).sum() == pytest.approx(mean, rel=tolerance)
-
-
-def test_base_points_are_evenly_spaced_over_the_whole_base(coarse_mesh):
-    points = base_points(coarse_mesh, 31)
-    np.testing.assert_allclose(points[:, 0], 0.0, atol=1e-12)
-    np.testing.assert_allclose(np.sort(points[:, 1]), np.linspace(-30, 0, 31), atol=1e-9)
 
 
 class Scaled:

@@ -77,7 +77,7 @@ def test_the_cylinder_only_presses_and_is_not_entered(local, problem):
 def test_a_newton_step_is_that_of_the_residual_by_differences(problem, local):
     """Out of equilibrium, so that the nodes that touch also slide: forces turn with the normal."""
     pressed = PressedNetwork.of(LOCAL.level(problem, 2.0), problem)
-    output = pressed.network.project(local.field)
+    output, _ = pressed.network.energy.nearest(local.field)
     middle = len(pressed.contact.positions) // 3
     multipliers = np.zeros(len(pressed.contact.positions))
     multipliers[middle : middle + 3] = 20.0
@@ -119,7 +119,7 @@ def test_gaps_that_no_forces_close_are_let_be(coarse, monkeypatch):
         (1.0, (None, UPDATES)),
     ):
         pressed = replace(coarse, contact=replace(coarse.contact, travel=np.array([0.0, -depth])))
-        found = pressed._equilibrium(output, 1.0, none, tangent)
+        found = pressed._in_balance(output, 1.0, none, tangent)
         assert found == expected
 
 
@@ -136,11 +136,11 @@ def test_a_finger_that_has_left_the_cylinder_is_held_at_the_nodes_with_forces(co
 
 
 def test_a_step_where_the_curvature_is_negative_goes_downhill(coarse, local):
-    output, none = coarse.network.project(local.field), np.zeros(0, dtype=int)
+    (output, _), none = coarse.network.energy.nearest(local.field), np.zeros(0, dtype=int)
     stage = coarse.stage(output, 0.0, np.zeros(len(coarse.contact.positions)))
     factors = coarse._tangent(coarse.network.zero_output).factors
     turned = SimpleNamespace(solve=lambda right: -factors.solve(right), negative=0)
-    downhill, other = (coarse._step(stage, output, none, Tangent(each, output)) for each in (factors, turned))
+    downhill, other = (coarse._step(stage, output, none, Tangent(output, each)) for each in (factors, turned))
     np.testing.assert_array_equal(downhill.change, other.change)
 
 

@@ -9,7 +9,7 @@ import pytest
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
-from pinnray.geometry.registration import Homography, Pictures
+from pinnray.geometry.picture_frame import Homography, Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import misfit_of

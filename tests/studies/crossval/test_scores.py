@@ -1,4 +1,4 @@
-"""Held-out markers and loads, and scores, verdicts, tables and pictures by hand."""
+"""Held-out markers and loads, and scores, verdicts and tables by hand."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,14 +24,12 @@ from pinnray.studies.crossval.folds import (
     hide_markers,
     load_cases_of,
 )
-from pinnray.studies.crossval.report import draw_held_out
 from pinnray.studies.crossval.result import CrossvalResult
 from pinnray.studies.crossval.scores import Sample, bootstrap, difference_table, sample_table, score_table
 from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant
 from pinnray.studies.crossval.tables import all_tables, truth_tables
 from pinnray.studies.crossval.true_fields import SampledField, TrueField
 from pinnray.studies.sweep.measurement import Measurement
-from tests.compare.figures.drawn_pages import page_of
 
 
 def test_folds_hold_out_what_they_say(coarse_mesh):
@@ -189,10 +187,3 @@ def test_tables_fit_a_terminal():
         shown = terminal_table("", table.headings, table.rows, narrow=True)
         assert Console(width=200).measure(shown).maximum <= 80
     assert truth_tables(replace(many, truths={})) == []
-
-
-def test_the_picture_shows_every_solver():
-    many = result([f"solver {number}" for number in range(9)], [("sliding", "front"), ("sliding", "joints")])
-    page = page_of(draw_held_out(many))
-    assert page.cut_off() == []
-    assert all(f"solver {number}" in page.text for number in range(9))

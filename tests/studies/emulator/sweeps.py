@@ -8,9 +8,9 @@ from pinnray.runtime.atomic import write_json
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.store import opened
-from pinnray.studies.sweep.study import Study, Value, load_study
-from pinnray.studies.sweep.sweep import JOURNAL, STUDY_FILE
+from pinnray.studies.sweep.store import JOURNAL, opened
+from pinnray.studies.sweep.study import Study, Value
+from pinnray.studies.sweep.sweep import STUDY_FILE
 
 DATA = Path(__file__).parents[2] / "data" / "sweep"
 """`ref.csv`: force, tip displacement, wrap angle and stress of the first fingers of the study `ref.toml`."""
@@ -18,7 +18,7 @@ DATA = Path(__file__).parents[2] / "data" / "sweep"
 
 def solved_sweep(folder: Path, *, count: int = 300, left_out: tuple[str, ...] = ()) -> Path:
     """A folder with the first samples of the kept table."""
-    study = load_study(DATA / "ref.toml")
+    study = Study.load(DATA / "ref.toml")
     with (DATA / "ref.csv").open(encoding="utf-8") as table:
         rows = [
             {name: float(cell) for name, cell in row.items() if name not in left_out}

@@ -9,7 +9,7 @@ from pinnray.geometry.finger.parameters import Parameters
 from pinnray.solvers.problem import Material
 from pinnray.studies.emulator.frame import SHEAR_SHARE, BeamFrame, _stiffness
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.study import load_study
+from pinnray.studies.sweep.study import Study
 from tests.studies.emulator.sweeps import DATA
 
 TRAVEL = (0.0, -10.0)
@@ -58,7 +58,7 @@ def test_a_contact_that_slides_has_no_force_along_the_finger() -> None:
 
 
 def test_it_follows_finite_elements() -> None:
-    study = load_study(DATA / "ref.toml")
+    study = Study.load(DATA / "ref.toml")
     every = samples(study)
     with (DATA / "ref.csv").open(encoding="utf-8") as table:
         rows = [row for row in csv.DictReader(table) if every[int(row["sample"])]["rib_count"] == 4]

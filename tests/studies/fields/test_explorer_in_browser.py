@@ -1,17 +1,26 @@
 """The explorer as a reader has it: its numbers against the emulator's, its sliders, files and faults."""
 
+import json
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page
 
+import pinnray as pr
+from pinnray.cli import main
+from pinnray.solvers.finger_figures import figures_of
+from pinnray.studies.fields import explorer
 from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields
 from pinnray.studies.fields.explorer import write_explorer
 from tests.compare.report.browser import chromium, opened
 from tests.studies.fields.synthetic import known, snapshots, study
 
 pytestmark = pytest.mark.slow
+
+DOCS = Path(__file__).parents[3] / "docs"
+SCRIPTS = Path(explorer.__file__).parents[1] / "templates"
 
 VARIED = {
     "contact_position": {"from": 30, "to": 60},
@@ -118,12 +127,48 @@ def test_markers_that_lie_where_the_finger_is_have_no_error(page, emulator, tmp_
     assert "lacks the column x_mm" in page.inner_text("#explorer-said")
 
 
-def test_the_finger_is_copied_as_command_options_and_python(page):
+@pytest.fixture
+def copied(page: Page) -> dict[str, str]:
+    """What the page offers to copy of a finger."""
     give(page, radius=7, stroke=4)
-    for kind, part in (
-        ("command", "--radius 7"),
-        ("toml", "radius = 7"),
-        ("python", "radius=7, direction=0"),
-    ):
+    found = {}
+    for kind in ("command", "toml", "python"):
         page.click(f"[data-copy={kind}]")
-        assert part in page.inner_text("#explorer-copied")
+        found[kind] = page.inner_text("#explorer-copied")
+    return found
+
+
+def test_what_is_copied_runs_and_is_the_same_finger(copied, tmp_path, capsys):
+    solution = eval(copied["python"], {"pr": pr})
+    load = solution.problem.load
+    assert (load.kind, load.radius, load.displacement) == ("cylinder", 7.0, (0.0, -4.0))
+    assert solution.problem.finger.contact_abscissa == 45.0
+    force = f"{figures_of(solution, {}).force:.4g} N"
+    assert main([*shlex.split(copied["command"])[1:], "--out", str(tmp_path / "finger.vtu")]) == 0
+    assert force in capsys.readouterr().out
+    (tmp_path / "finger.toml").write_text(copied["toml"], encoding="utf-8")
+    options = ["--from", str(tmp_path / "finger.toml"), "--out", str(tmp_path / "out")]
+    assert main(["compare", *options]) == 0
+    metrics = json.loads((tmp_path / "out/metrics.json").read_text(encoding="utf-8"))["solvers"]
+    assert metrics["fem-nonlinear"]["reaction"] == pytest.approx(solution.reaction.tolist(), rel=1e-9)
+
+
+def test_the_colour_bar_ends_at_no_less_than_the_largest_stress(page):
+    page.evaluate(
+        """() => { window.words = []; const old = CanvasRenderingContext2D.prototype.fillText;
+        CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
+            window.words.push(text); old.call(this, text, ...rest); }; }"""
+    )
+    for stroke in (2, 10):
+        give(page, stroke=stroke)
+        end = page.evaluate("window.words.filter((text) => text.endsWith('MPa')).pop()")
+        figures = page.evaluate("pinnrayExplorer.state().figures")
+        largest = next(each["value"] for each in figures if each["name"] == "von_mises")
+        assert end.startswith("≥ ")
+        assert float(end.split()[1]) >= float(f"{largest:.3g}")
+
+
+def test_the_shipped_page_has_the_scripts_of_today():
+    shipped = (DOCS / "static" / "explore-default.html").read_text(encoding="utf-8")
+    for name in ("explorer.js", "explorer_model.js"):
+        assert (SCRIPTS / name).read_text(encoding="utf-8").strip() in shipped

@@ -1,5 +1,6 @@
 """Emulated fields against fields in closed form, and kept fields against a solution on its own mesh."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from pinnray.solvers.lagrange import LagrangeField
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields, places
 from pinnray.studies.fields.reader import FieldReader
-from pinnray.studies.fields.store import fields_of, load, save
+from pinnray.studies.fields.store import fields_of
 from pinnray.studies.sweep.field_path import FieldPath, MovedMesh
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.sampling import samples
@@ -72,9 +73,8 @@ def test_a_field_outside_the_study_is_refused_with_the_reason(emulator):
     assert "it buckles" in str(missing.fault(inside, 5.0))
 
 
-def test_an_emulator_is_kept_whole(emulator, tmp_path):
-    save(emulator, tmp_path / "fields.npz")
-    again = load(tmp_path / "fields.npz", known(study()))
+def test_an_emulator_is_kept_whole(emulator):
+    again = pickle.loads(pickle.dumps(emulator))
     sample = {"contact_position": 40.0, "radius": 9.0}
     first, second = (each.predict(sample, 7.0) for each in (emulator, again))
     assert np.array_equal(first.nodal, second.nodal)
@@ -87,7 +87,7 @@ CHANGED = {
     "a sample was lost for another reason": lambda patch, now: replace(now, reasons=["refused"]),
     "samples of other values": lambda patch, now: replace(now, samples=now.samples[::-1]),
     "another version of a library": lambda patch, now: (
-        patch.setattr("pinnray.studies.fields.store.package_versions", lambda: {"scipy": "9"}),
+        patch.setattr("pinnray.studies.emulator.store.package_versions", lambda: {"scipy": "9"}),
         now,
     )[1],
 }

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pinnray.studies.optimum.question import Question, load_question
+from pinnray.studies.optimum.question import Question
 
 GOOD = """
 mesh_size = 2.0
@@ -24,7 +24,7 @@ rib_thickness = {from = 0.6, to = 2.5}
 def asked(folder: Path, text: str) -> Question:
     path = folder / "ask.toml"
     path.write_text(text, encoding="utf-8")
-    return load_question(path)
+    return Question.load(path)
 
 
 def test_costs_are_least_at_the_best(tmp_path: Path) -> None:

@@ -34,7 +34,6 @@ VARIED = {
 }
 QUESTION = Question(
     name="known",
-    samples=14,
     fixed={"marker_diameter": 0.4},
     varied=VARIED,
     objectives={"wrap": "largest", "force": "least"},

@@ -9,18 +9,40 @@ from matplotlib.patches import Rectangle
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.pictures import SHOWN, draw_maps, draw_pairs
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.study import Range, Study, load_study
+from pinnray.studies.sweep.study import Range, Study
 from pinnray.studies.sweep.sweep import Sweep
+from pinnray.studies.sweep.tables import correlation_grid
 from tests.compare.figures.drawn_pages import page_of
 from tests.studies.sweep.test_sweep import study_file
 
 
 def swept(folder: Path, count: int) -> Sweep:
     """A sweep of so many fingers with made-up numbers."""
-    study = load_study(study_file(folder, count))
+    study = Study.load(study_file(folder, count))
     drawn = samples(study)
     found = [Measurement(n, "done", "fine", 0.1, dict.fromkeys(SHOWN, 1.0 + n)) for n in range(len(drawn))]
     return Sweep(study, drawn, found)
+
+
+def test_rank_correlations_tell_which_parameter_matters_and_which_way() -> None:
+    varied = {"rib_thickness": {"from": 1, "to": 2}, "rib_reference": {"values": ["front", "base"]}}
+    study = Study(name="s", samples=64, varied=varied)
+    every = samples(study)
+    found = [
+        Measurement(
+            n,
+            "done",
+            "",
+            0.1,
+            {"force": each["rib_thickness"] ** 3, "mass": 1.0, "wrap": -len(each["rib_reference"])},
+        )
+        for n, each in enumerate(every)
+    ]
+    table = correlation_grid(Sweep(study, every, found), ["force", "wrap", "mass"])
+    texts = {name: row for name, *row in table.rows}
+    assert (texts["force"][0], texts["wrap"][1]) == ("+1.00", "+1.00")  # base has fewer letters, and is later
+    assert abs(float(texts["force"][1])) < 0.1
+    assert "mass" not in texts  # it is equal everywhere
 
 
 @pytest.mark.parametrize("count", [2, 32])

@@ -14,7 +14,7 @@ VARIED = {
 
 
 def test_a_grid_has_every_combination_once() -> None:
-    varied = VARIED | {"height": {"from": 80, "to": 100, "count": 3}}
+    varied = VARIED | {"height": {"from": 80, "to": 100, "step": 10}}
     grid = samples(Study(name="s", sampling="grid", varied=varied))
     assert len(grid) == 4 * 3 * 2
     assert len({tuple(sample.values()) for sample in grid}) == len(grid)

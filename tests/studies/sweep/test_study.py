@@ -6,7 +6,7 @@ import pytest
 
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.study import load_study, physics_of
+from pinnray.studies.sweep.study import Study, physics_of
 
 GOOD = 'sampling = "sobol"\nsamples = 4\n[varied]\nrib_thickness = {from = 1, to = 2}\n'
 
@@ -18,7 +18,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def test_a_task_has_the_fixed_and_the_sampled_values(tmp_path: Path) -> None:
-    study = load_study(
+    study = Study.load(
         written(tmp_path, GOOD + "[fixed]\nN = 3\nyoung = 5.0\nstroke = 4.0\ndirection = 30\n")
     )
     task = StudyJob(study, tmp_path, tmp_path / "out").task(1, samples(study)[1])
@@ -31,13 +31,13 @@ def test_a_task_has_the_fixed_and_the_sampled_values(tmp_path: Path) -> None:
 
 def test_a_design_beside_the_study_is_meant_from_there(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text("height = 77\n", encoding="utf-8")
-    study = load_study(written(tmp_path, 'design = "own.toml"\n' + GOOD))
+    study = Study.load(written(tmp_path, 'design = "own.toml"\n' + GOOD))
     assert StudyJob(study, tmp_path, tmp_path / "out").task(0, samples(study)[0]).definition["height"] == 77
 
 
 def test_settings_of_the_solver_are_varied_like_parameters(tmp_path: Path) -> None:
     text = 'sampling = "grid"\n[varied]\n"fem.degree" = {values = [1, 2]}\nrib_count = {values = [3, 4]}\n'
-    study = load_study(written(tmp_path, text))
+    study = Study.load(written(tmp_path, text))
     tasks = [
         StudyJob(study, tmp_path, tmp_path / "out").task(number, each)
         for number, each in enumerate(samples(study))

@@ -13,6 +13,7 @@ import pytest
 
 from pinnray.cli import main
 from pinnray.geometry.cache import cad_files
+from pinnray.geometry.drawing.load import finger_from_file
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.solution import Solution
@@ -20,9 +21,9 @@ from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.measurement import Measurement, measured
 from pinnray.studies.sweep.quantities import quantities
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.store import opened
-from pinnray.studies.sweep.study import load_study
-from pinnray.studies.sweep.sweep import JOURNAL, Sweep, load_sweep, run_sweep
+from pinnray.studies.sweep.store import JOURNAL, opened
+from pinnray.studies.sweep.study import Study
+from pinnray.studies.sweep.sweep import Sweep, load_sweep, run_sweep
 from pinnray.studies.sweep.tables import failure_grid, sample_table
 from tests.conftest import inline
 from tests.studies.sweep.workers import answered, die_at_one, hang_at_one
@@ -57,7 +58,7 @@ def test_a_sample_is_kept_once(tmp_path: Path) -> None:
 
 
 def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
-    study = load_study(study_file(tmp_path, 1))
+    study = Study.load(study_file(tmp_path, 1))
     job = StudyJob(study, tmp_path, tmp_path / "out")
     refused = measured(job.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
     assert (refused.state, refused.values) == ("refused", {})
@@ -87,7 +88,7 @@ def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("pinnray.studies.sweep.measurement.quantities", without_stress)
     sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
     found = measured(
-        StudyJob(load_study(study_file(tmp_path, 1)), tmp_path, tmp_path / "out").task(1, sample)
+        StudyJob(Study.load(study_file(tmp_path, 1)), tmp_path, tmp_path / "out").task(1, sample)
     )
     assert (found.state, found.message.partition(";")[0]) == ("not converged", "von_mises cannot be computed")
 
@@ -119,7 +120,8 @@ def test_the_tables_have_a_row_for_each_sample(swept: Path) -> None:
 
 def test_the_page_has_pictures_and_every_quantity(swept: Path) -> None:
     page = (swept / "out" / "sweep.html").read_text(encoding="utf-8")
-    assert page.count("<img alt=") == 1  # six samples are too few for sensitivities
+    assert page.count("<img alt=") == 1
+    assert "Which parameter matters" in page
     assert "6 of 6 samples of a Sobol sequence were run; 6 have a converged result" in page
     assert "compliance_across" in page
 
@@ -128,7 +130,7 @@ def test_a_second_start_goes_on_and_does_nothing_twice(swept, tmp_path, in_line)
     out = tmp_path / "out"
     shutil.copytree(swept / "out", out)
     before = load_sweep(out).measurements
-    study = load_study(study_file(tmp_path, 8))
+    study = Study.load(study_file(tmp_path, 8))
     study = study.model_copy(update={"name": "ribs"})
     after = run_sweep(StudyJob(study, tmp_path, out, 1)).measurements
     assert after[:6] == before
@@ -140,7 +142,7 @@ def test_another_name_or_marker_does_the_same_study(swept: Path, tmp_path: Path)
     """Nothing of a result depends on them."""
     out = tmp_path / "out"
     shutil.copytree(swept / "out", out)
-    study = load_study(study_file(tmp_path, 6))
+    study = Study.load(study_file(tmp_path, 6))
     fixed = {**study.fixed, "marker_diameter": 0.3, "marker_height": 0.2}
     study = study.model_copy(update={"name": "renamed", "fixed": fixed, "time_limit": 100.0})
     after = run_sweep(StudyJob(study, tmp_path, out, 1)).measurements
@@ -163,7 +165,7 @@ def test_a_worker_that_hangs_or_dies_costs_its_own_sample_alone(
     monkeypatch.setattr("pinnray.studies.sweep.sweep.sampled", ending)
     monkeypatch.setattr("pinnray.studies.sweep.sweep.GRACE_S", 1.0)
     monkeypatch.setattr("pinnray.studies.sweep.sweep.DEATHS", 2)
-    study = load_study(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
+    study = Study.load(study_file(tmp_path, 3)).model_copy(update={"time_limit": limit})
     sweep = run_sweep(StudyJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", state, "done"]
     assert [(row[0], row[2]) for row in failure_grid(sweep).rows] == [(state, said)]
@@ -205,20 +207,13 @@ def test_a_journal_of_others_removes_no_file(tmp_path: Path) -> None:
     assert mine.read_text() == "mine"
 
 
-def test_drawings_are_samples_too(tmp_path: Path) -> None:
-    for name, ribs in (("few", 2), ("many", 6)):
-        cad_files(Design(rib_count=ribs), tmp_path / name, formats=["dxf"])
-        (tmp_path / name / "section.dxf").rename(tmp_path / f"{name}.dxf")
-    path = tmp_path / "drawn.toml"
-    path.write_text(
-        'mesh_size = 2.0\nsampling = "grid"\n[varied]\nsection = {values = ["few.dxf", "many.dxf"]}\n'
-        "depth = {values = [10.0, 20.0]}\n",
-        encoding="utf-8",
-    )
-    study = load_study(path)
-    job = StudyJob(study, tmp_path, tmp_path / "out")
-    found = [measured(job.task(number, sample)) for number, sample in enumerate(samples(study))]
-    assert [each.state for each in found] == ["done"] * 4
-    areas = [Design(rib_count=ribs).section.area for ribs in (2, 2, 6, 6)]
-    assert [each.values["area"] for each in found] == pytest.approx(areas, rel=1e-6)
-    assert found[1].values["force"] == pytest.approx(2 * found[0].values["force"], rel=1e-9)
+def test_material_and_load_of_a_drawn_finger_are_varied(tmp_path: Path) -> None:
+    cad_files(Design(), tmp_path, formats=["dxf"])
+    drawn = finger_from_file(tmp_path / "section.dxf")
+    study = Study(name="s", mesh_size=4.0, sampling="grid", varied={"young": {"values": [5.0, 10.0]}})
+    job = StudyJob(study, tmp_path, tmp_path / "out", finger=drawn)
+    soft, hard = (measured(job.task(number, sample)) for number, sample in enumerate(samples(study)))
+    assert soft.values["area"] == pytest.approx(Design().section.area, rel=1e-6)
+    assert hard.values["force"] == pytest.approx(2 * soft.values["force"], rel=1e-9)
+    with pytest.raises(UserError, match="of a drawn finger a study changes material and load, not depth"):
+        job.task(0, {"depth": 10.0})

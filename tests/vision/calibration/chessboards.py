@@ -1,7 +1,5 @@
 """A camera by its formula, photographs of a board in many poses, and a board drawn analytically."""
 
-from collections.abc import Callable
-
 import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -26,6 +24,12 @@ def projected(camera: Camera, points: FloatArray, pose: Pose) -> FloatArray:
     u = x * radial + 2 * p1 * x * y + p2 * (r**2 + 2 * x**2)
     v = y * radial + p1 * (r**2 + 2 * y**2) + 2 * p2 * x * y
     return np.stack([camera.fx * u + camera.cx, camera.fy * v + camera.cy], axis=1)
+
+
+def distorted(camera: Camera, pixels: FloatArray) -> FloatArray:
+    """Pixels of a pinhole camera to pixels behind the lens; shapes (n, 2)."""
+    plane = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    return camera.project(np.column_stack([plane, np.ones(len(plane))]))
 
 
 def poses(count: int, *, seed: int = 0) -> list[Pose]:
@@ -57,19 +61,17 @@ def drawn(
     size: tuple[int, int],
     *,
     samples: int = 5,
-    straight: Callable[[FloatArray], FloatArray] = lambda pixels: pixels,
 ) -> GreyImage:
     """A photograph without a lens: every pixel is the mean of `samples`² points of the exact scene.
 
-    `homography` takes pixels to the board's plane, mm, after `straight` has undone a lens, both in
-    homogeneous coordinates, shape (3, height, width); outside the board all is white.
+    `homography` takes pixels to the board's plane, mm; outside the board all is white.
     """
     width, height = size
     offsets = (np.arange(samples) + 0.5) / samples - 0.5
     x = (np.arange(width)[:, None] + offsets).ravel()
     y = (np.arange(height)[:, None] + offsets).ravel()
     pixels = np.stack([*np.broadcast_arrays(x[None, :], y[:, None]), np.ones((len(y), len(x)))])
-    u, v, w = np.tensordot(homography, straight(pixels), axes=1)
+    u, v, w = np.tensordot(homography, pixels, axes=1)
     column, row = np.floor(u / w / board.square), np.floor(v / w / board.square)
     inside = (column >= -1) & (column < board.columns) & (row >= -1) & (row < board.rows)
     black = inside & ((column + row) % 2 == 0)
@@ -91,27 +93,6 @@ def photographed(
     image += np.random.default_rng(4).normal(0, noise, image.shape)
     exact = np.column_stack([board.corners[:, :2], np.ones(len(board.corners))]) @ to_pixels.T
     return np.clip(np.rint(image), 0, 255).astype(np.uint8), exact[:, :2] / exact[:, 2:]
-
-
-def through_fisheye(board: Board, pose: Pose, *, blur: float = 0.7) -> tuple[GreyImage, FloatArray]:
-    """A photograph of 480x300 pixels by an equidistant fisheye, and where the corners truly are.
-
-    The angle to the axis is the distance from the middle over the focal length of 150 pixels.
-    """
-    focal, middle = 150.0, np.array([239.5, 149.5])
-
-    def straight(pixels: FloatArray) -> FloatArray:
-        x, y = (pixels[:2] - middle[:, None, None]) / focal
-        longer = np.tan(np.minimum(np.hypot(x, y), 1.5)) / np.hypot(x, y)
-        return np.stack([x * longer, y * longer, np.ones_like(x)])
-
-    turn = Rotation.from_rotvec(pose.rotation)
-    to_rays = np.column_stack([turn.as_matrix()[:, :2], pose.translation])
-    sharp = drawn(board, np.linalg.inv(to_rays), (480, 300), samples=3, straight=straight)
-    rays = turn.apply(board.corners) + pose.translation
-    sideways = np.hypot(rays[:, 0], rays[:, 1])
-    angle = np.arctan2(sideways, rays[:, 2])
-    return cv2.GaussianBlur(sharp, (0, 0), blur), middle + focal * (angle / sideways)[:, None] * rays[:, :2]
 
 
 def _markers(board: CharucoBoard, x: FloatArray, y: FloatArray) -> BoolArray:

@@ -2,11 +2,9 @@
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from pinnray.vision.calibration.camera import Pose
 from pinnray.vision.calibration.chessboard import Board
-from tests.vision.calibration.chessboards import BOARD, drawn, through_fisheye
+from tests.vision.calibration.chessboards import drawn
 
 SMALL = Board(5, 4, 10.0)
 TO_PIXELS = np.array([[4.2, 0.7, 90.0], [-0.5, 3.9, 75.0], [1e-3, -6e-4, 1.0]])
@@ -29,24 +27,3 @@ def test_corners_of_a_large_image_are_sought_in_a_smaller_one():
     found, expected = SMALL.find(large), 5 * SMALL.find(image) + 2
     error = min(np.abs(order - expected).max() for order in (found, found[::-1]))
     assert error < 0.4  # of larger pixels, in whose steps the edges are
-
-
-def posed(angles: tuple[float, float, float], centre: tuple[float, float, float]) -> Pose:
-    turn = Rotation.from_euler("xyz", angles, degrees=True)
-    return Pose(turn.as_rotvec(), np.array(centre) - turn.apply(BOARD.corners.mean(axis=0)))
-
-
-def test_a_board_that_a_fisheye_bends_is_found():
-    """OpenCV's usual search misses it."""
-    image, exact = through_fisheye(BOARD, posed((-38.64, 51.99, 140.38), (-6.0, -42.82, 134.01)))
-    found = BOARD.find(image)
-    error = min(np.abs(order - exact).max() for order in (found, found[::-1]))
-    assert error < 0.2  # 0.12; squares are 8 pixels long where the board is farthest
-
-
-def test_false_corners_of_the_exhaustive_search_are_refused():
-    """In the outermost row one of them is 10 pixels off, and three have no place where they could be."""
-    image, _ = through_fisheye(BOARD, posed((3.45, -39.45, 94.49), (70.36, 25.71, 130.02)))
-    flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
-    assert cv2.findChessboardCornersSB(image, (9, 6), flags=flags)[0]
-    assert BOARD.find(image) is None

@@ -7,13 +7,12 @@ import cv2
 import numpy as np
 import pytest
 
-from pinnray.vision.calibration.camera import Camera
+from pinnray.vision.calibration.camera import INTRINSICS
 from pinnray.vision.calibration.camera_file import load_camera, save_camera
-from tests.vision.calibration.chessboards import BOARD, CAMERA, poses, projected
+from tests.vision.calibration.chessboards import BOARD, CAMERA, distorted, poses, projected
 
 GRID = np.stack(np.meshgrid(np.linspace(0, 1279, 17), np.linspace(0, 719, 11)), axis=-1).reshape(-1, 2)
 BARREL = replace(CAMERA, distortion=(-0.35, 0.15, 2e-3, -1e-3, -0.03))
-FISHEYE = Camera(1280, 720, 520.0, 518.0, 652.0, 349.0, (0.03, -0.01, 2e-3, -5e-4), "fisheye")
 KNOWN = replace(CAMERA, covariance=tuple(map(tuple, np.diag(np.pi / 10.0 ** np.arange(9)).tolist())))
 
 
@@ -24,11 +23,11 @@ def test_points_are_seen_where_the_formula_says(camera):
         np.testing.assert_allclose(camera.project(BOARD.corners, pose), expected, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("camera", "least"), [(CAMERA, 20), (BARREL, 20), (FISHEYE, 500)])
-def test_undistorting_is_undone_by_distorting(camera, least):
+@pytest.mark.parametrize("camera", [CAMERA, BARREL])
+def test_undistorting_is_undone_by_distorting(camera):
     straight = camera.undistort(GRID)
-    assert np.abs(straight - GRID).max() > least  # there is something to undo
-    np.testing.assert_allclose(camera.distort(straight), GRID, rtol=0, atol=1e-9)
+    assert np.abs(straight - GRID).max() > 20  # there is something to undo
+    np.testing.assert_allclose(distorted(camera, straight), GRID, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("camera", [CAMERA, KNOWN])
@@ -53,10 +52,10 @@ def test_four_coefficients_of_another_program_mean_that_k3_is_zero(tmp_path):
     assert load_camera(tmp_path / "camera.json").distortion == (0.1, 0.2, 0.3, 0.4, 0.0)
 
 
-@pytest.mark.parametrize("camera", [BARREL, FISHEYE])
+@pytest.mark.parametrize("camera", [CAMERA, BARREL])
 def test_derivatives_are_those_of_differences(camera):
     points = np.random.default_rng(2).uniform((-80, -50, 150), (80, 50, 250), (20, 3))
-    steps = np.diag([1e-3] * 4 + [1e-6] * (len(camera.intrinsic_names) - 4))
+    steps = np.diag([1e-3] * 4 + [1e-6] * (len(INTRINSICS) - 4))
 
     def changed(function, step):
         up, down = (camera.with_intrinsics(camera.intrinsics + sign * step) for sign in (1, -1))

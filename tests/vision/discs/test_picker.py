@@ -36,13 +36,9 @@ def test_a_click_into_one_marker_selects_all_and_nothing_else(name, radius):
     assert outside < 0.005
 
 
-def test_a_rectangle_gives_nearly_what_a_click_gives():
+def test_a_colour_is_read_back():
     scene = dots(12.0, colour=COLOURS["red"], size=(640, 360))
-    x, y, _ = scene.discs[4]
-    clicked = pick_colour(scene.image, (x, y))
-    for box in ((x - 5, y - 5, x + 5, y + 5), (x + 5, y + 5, x - 5, y - 5)):
-        drawn = pick_colour(scene.image, box)
-        assert np.abs(np.array([drawn.low, drawn.high]) - [clicked.low, clicked.high]).max() < 5
+    clicked = pick_colour(scene.image, scene.discs[4, :2])
     assert read_colour(str(clicked)) == clicked
 
 

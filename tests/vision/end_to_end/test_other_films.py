@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pinnray.geometry.finger.design import Design
-from pinnray.geometry.registration import HAND_HELD
+from pinnray.geometry.picture_frame import HAND_HELD
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, error_of, images, recording, tracked
 
 pytestmark = pytest.mark.usefixtures("discs_fitted_once")

@@ -26,9 +26,9 @@ def smooth(count: int, size: tuple[int, int] = SIZE) -> list[np.ndarray]:
     return [np.rint(128 + 90 * np.sin(np.stack(wave, axis=2) / 9)).astype(np.uint8) for wave in waves]
 
 
-def written(path: Path, frames: list[np.ndarray], rate: float = 25.0, codec: str | None = None) -> Path:
+def written(path: Path, frames: list[np.ndarray], rate: float = 25.0) -> Path:
     size = frames[0].shape[1::-1] if frames else SIZE
-    with video_writer(path, size, rate, codec) as write:
+    with video_writer(path, size, rate) as write:
         for frame in frames:
             write(frame)
     return path
@@ -40,17 +40,16 @@ def read(path: Path) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("name", "codec", "psnr"),
+    ("name", "psnr"),
     [
-        ("a.mkv", None, np.inf),  # lossless
-        ("a.avi", "ffv1", np.inf),
-        ("a.avi", None, 35),  # dB; 8 bits of these waves in MJPG
-        ("A.MP4", "MP4V", 30),
+        ("a.mkv", np.inf),  # lossless
+        ("a.avi", 35),  # dB; 8 bits of these waves in MJPG
+        ("A.MP4", 30),
     ],
 )
-def test_every_frame_comes_back(name, codec, psnr, tmp_path):
+def test_every_frame_comes_back(name, psnr, tmp_path):
     frames = smooth(7)
-    path = written(tmp_path / name, frames, codec=codec)
+    path = written(tmp_path / name, frames)
     back = read(path)
     assert len(back) == 7
     assert min(map(cv2.PSNR, frames, back)) >= min(psnr, 360)  # OpenCV's infinity is about 361

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pinnray.geometry.registration import Homography
+from pinnray.geometry.picture_frame import Homography
 from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.tracking.marker_plane import (

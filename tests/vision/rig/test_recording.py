@@ -13,10 +13,10 @@ from pinnray.vision.measurements import read_measurements
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
-from pinnray.vision.rig.occluders import cable, share_seen
 from pinnray.vision.rig.recording import Recording
 from pinnray.vision.rig.recording_files import FILES, record
-from pinnray.vision.rig.render import render
+from pinnray.vision.rig.render import render, share_seen
+from pinnray.vision.rig.shapes import Shape, rectangle
 from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
 from pinnray.vision.tracking.workspace import default_workspace, load_workspace
 
@@ -96,14 +96,15 @@ def test_motion_blur_is_the_mean_of_what_is_seen_while_the_shutter_is_open(bench
     np.testing.assert_allclose(truth.pixels, pixels, atol=1e-3)
 
 
-def test_a_cable_hides_the_share_of_a_marker_that_it_is_told_to(bench):
+def test_the_share_of_a_marker_that_an_occluder_leaves_is_told(bench):
     still = np.zeros_like(bench.mesh.points)
     disc = bench.discs(still)[4]
     camera, pose = default_camera(), viewing_pose(default_camera(), WORKSPACE)
 
     def seen(share):
-        cover = cable(bench.mesh.markers[4], Design().marker_radius, share, z=0)
-        return share_seen(disc, [cover], camera, pose)
+        radius, (x, y) = Design().marker_radius, bench.mesh.markers[4]
+        edge = y + radius * (1 - 2 * share)
+        return share_seen(disc, [Shape(rectangle((x - 9, edge), (x + 9, y + 9)), (0, 0, 0))], camera, pose)
 
     assert seen(0) == pytest.approx(1, abs=0.005)
     assert seen(0.5) == pytest.approx(0.5, abs=0.01)

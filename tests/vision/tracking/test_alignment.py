@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pinnray.geometry.registration import FIXED, Homography
+from pinnray.geometry.picture_frame import FIXED, Homography
 from pinnray.vision.tracking.alignment import LAID, align
 
 DRAWN = np.array([[10.0, -1.0], [20.0, -20.0], [30.0, -1.0], [45.0, -14.0], [60.0, -1.0], [80.0, -2.0]])

@@ -21,6 +21,18 @@ def test_a_tensile_test_ends_with_the_options_for_compare(tmp_path, capsys):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_where_the_linear_law_fits_best_both_laws_have_their_options(tmp_path, capsys):
+    file = tmp_path / "strip.csv"
+    file.write_text("strain,stress_MPa\n" + "".join(f"{n / 50},{n / 5}\n" for n in range(1, 16)))
+    assert main(["material", str(file)]) == 0
+    small, finite = capsys.readouterr().out.splitlines()[-2:]
+    assert small == "small strain: --young 10 --poisson 0.45 --law linear"
+    young = float(
+        finite.removeprefix("finite strain: --young ").removesuffix(" --poisson 0.45 --law neo-hookean")
+    )
+    assert young == pytest.approx(12.0, abs=0.1)
+
+
 def test_without_a_test_the_materials_are_listed_with_their_sources(capsys):
     assert main(["material"]) == 0
     lines = capsys.readouterr().out.splitlines()

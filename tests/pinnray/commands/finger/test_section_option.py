@@ -45,7 +45,7 @@ def test_a_description_beside_the_drawing_counts_and_the_command_line_wins(tmp_p
 
 def test_design_says_that_a_size_is_a_guess(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = drawing(tmp_path, size="100")
-    assert main(["design", "--section", str(file), "--formats", "svg", "--out", str(tmp_path / "out")]) == 0
+    assert main(["design", "--section", str(file), "--formats", "dxf", "--out", str(tmp_path / "out")]) == 0
     assert "note: beam.svg was read as SVG, 0.264583 mm in a user unit (assumed" in capsys.readouterr().err
     assert "(assumed" in (tmp_path / "out" / "beam.toml").read_text()
 

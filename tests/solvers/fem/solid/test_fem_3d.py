@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pinnray.comparison.evaluation.certification import with_certificates
+from pinnray.comparison.evaluation.certifier import with_certificates
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pinnray.geometry.registration import FIXED, FREE, Homography, Pictures, Registration, nearest_similarity
+from pinnray.geometry.picture_frame import FIXED, FREE, Homography, Pictures, Registration, nearest_similarity
 
 RNG = np.random.default_rng(5)
 POINTS = RNG.normal(size=(7, 2)) * 30

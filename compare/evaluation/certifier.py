@@ -5,29 +5,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from pinnray.comparison.evaluation.certificate import ROUNDING, Certificate, Region
-from pinnray.comparison.evaluation.differences import FieldDifference
+from pinnray.comparison.evaluation.certificate import ROUNDING, Certificate
 from pinnray.comparison.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation
-from pinnray.geometry.mesh.boundary import boundary_loops, mean_thickness, singular_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
-from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.solvers.elasticity import energy_density_of
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.boundary_conditions import reaction_by_residual_work
-from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
-from pinnray.solvers.problem import Problem, contact_nodes
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import MissingLibraryError, make_solver
-from pinnray.solvers.solution import State
 
 NOT_FINITE = "its displacement or stress is not finite everywhere"
 """Fault of a result with NaN or infinity in a field."""
-
-REGION_RADIUS = 0.5
-"""Radius of the regions around corners and contact, in mean wall thicknesses."""
-
-REGIONS = ("corners", "contact", "tip", "walls", "rest")
-"""Every region by which errors are told apart: corners are re-entrant ones and the ends of the base."""
 
 
 def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
@@ -87,10 +76,6 @@ class Certifier:
         self._rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = self._space.shape_gradients(self._rule.location)
         self._solution = self._equilibrium.linear_guess(1.0).nodal
-        field = LagrangeField(self._space, self._solution)
-        self._displacement = field.displacement(self._rule.location)
-        self._von_mises = State.from_gradient(self._gradient(self._solution), problem).von_mises
-        self._regions = body_regions(problem)
 
     def certificate(self, evaluation: Evaluation) -> Certificate:
         """The certificate of an evaluation of the linear law on the problem's mesh.
@@ -112,7 +97,6 @@ class Certifier:
             )
         balance, weak_residual = self._imbalance(evaluation.stress)
         reaction = reaction_by_residual_work(self._space, self._equilibrium.internal_force(self._solution))
-        density = energy_density_of("linear", self._gradient(rest), self._problem.material.lame)
         load = self._problem.load
         return Certificate(
             energy=energy,
@@ -126,16 +110,11 @@ class Certifier:
             load=self._load_missed(nodal, values),
             work=float(evaluation.reaction[load.prescribed] @ load.values),
             stroke=float(np.abs(load.values).max()),
-            regions=self._by_region(evaluation, density),
         )
 
     def _energy(self, nodal: FloatArray) -> float:
         """Elastic energy of nodal displacements, N mm / mm."""
         return 0.5 * float((nodal * self._equilibrium.internal_force(nodal)).sum())
-
-    def _gradient(self, nodal: FloatArray) -> FloatArray:
-        """Displacement gradient at the quadrature points, shape (q, 2, 2)."""
-        return np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)
 
     def _imbalance(self, stress: FloatArray) -> tuple[FloatArray, float]:
         """Residual of the internal forces of a stress (q, 2, 2), MPa, balanced best by the reactions.
@@ -162,52 +141,3 @@ class Certifier:
         missed = np.full(2, np.nan)
         missed[load.prescribed] = np.abs(values - load.values)
         return missed
-
-    def _by_region(self, evaluation: Evaluation, density: FloatArray) -> dict[str, Region]:
-        weights = self._rule.weights
-        energy = weights * density
-        total = energy.sum()
-        regions = {}
-        for name, triangles in self._regions.items():
-            here = np.repeat(triangles, len(weights) // len(triangles))
-            share = energy[here].sum() / total if total > ROUNDING**2 * evaluation.energy else np.nan
-            displacement, von_mises = (
-                FieldDifference.of(np.where(here, own.T, fem.T).T, fem, weights).rel_l2
-                for own, fem in (
-                    (evaluation.displacement, self._displacement),
-                    (evaluation.von_mises, self._von_mises),
-                )
-            )
-            area = weights[here].sum() / weights.sum()
-            regions[name] = Region(
-                area=area, excess=share, rel_l2_displacement=displacement, rel_l2_von_mises=von_mises
-            )
-        return regions
-
-
-def body_regions(problem: Problem) -> dict[str, BoolArray]:
-    """Split the triangles into the `REGIONS` that the mesh has: masks of shape (t,) by name.
-
-    A triangle with its centroid within `REGION_RADIUS` of a re-entrant corner or an end of the base belongs
-    to the corners; of the others, one within that radius of the contact's nodes to the contact; of the
-    others, one beyond the last cavity to the tip, if the body is as thick there as two walls. All others are
-    walls, ribs included, or the rest of a body without cavities.
-    """
-    mesh = problem.mesh
-    centroids, thickness = mesh.at_centroids().points, mean_thickness(mesh)
-    cavities = boundary_loops(mesh)[1:]
-    beyond = centroids[:, 0] > max((mesh.points[cavity, 0].max() for cavity in cavities), default=np.inf)
-    boundary = mesh.points[np.unique(mesh.boundary_edges)]
-    depth = cKDTree(boundary).query(centroids[beyond])[0].max(initial=0.0)
-    near = REGION_RADIUS * thickness
-    belongs = {
-        "corners": cKDTree(singular_points(mesh)).query(centroids)[0] <= near,
-        "contact": cKDTree(mesh.points[contact_nodes(problem)]).query(centroids)[0] <= near,
-        "tip": beyond & (depth > thickness),
-        "walls" if cavities else "rest": np.ones(len(centroids), dtype=bool),
-    }
-    regions, left = {}, np.ones(len(centroids), dtype=bool)
-    for name, here in belongs.items():
-        regions[name] = here & left
-        left &= ~here
-    return {name: here for name, here in regions.items() if here.any()}

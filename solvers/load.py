@@ -1,18 +1,19 @@
-"""Material and load: elastic constants, and the motion of the indenter."""
+"""Load: the indenter's kind, how far and which way it moves, and how it touches."""
 
 from math import cos, radians, sin
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.names import LawName
-from pinnray.solvers.names import LoadKind as LoadKind
+from pinnray.solvers.material import Material
 
-if TYPE_CHECKING:  # options are of these classes, and `--help` has to be quick
+if TYPE_CHECKING:  # options are of this class, and `--help` has to be quick
     from pinnray.runtime.arrays import FloatArray
-    from pinnray.solvers.elasticity import Lame
+
+LoadKind = Literal["mean", "point", "patch", "cylinder"]
+"""See `Load`."""
 
 USUAL_RADIUS = 5.0
 """Default radius of the cylinder, mm."""
@@ -22,67 +23,6 @@ ROUGHEST = 5.0
 
 LEAST_TRAVEL = 1e-9
 """Smallest displacement of an indenter that moves, mm: a hundredth of an atom's size."""
-
-
-class Substance(NamedTuple):
-    """What is known of a material besides its elasticity."""
-
-    name: str
-    density: float  #: g/cm^3
-    strain_at_break: float  #: Nominal strain
-
-
-class Material(CheckedModel):
-    """An isotropic elastic material; by default the paper's, Agilus30 and VeroUltra mixed to Shore 85A.
-
-    Young's modulus and Poisson's ratio go by their names or symbols: `Material(young=3, poisson=0.4)` equals
-    `Material(E=3, nu=0.4)`. A `UserError` says that a constant is out of its range, or that the law is not
-    given for plane stress.
-    """
-
-    #: From a thousandth of the softest gels' to eight times diamond's
-    young: float = bounded(11.4, 1e-6, 1e7, "MPa", "E", "Young's modulus")
-    poisson: float = bounded(0.45, -0.99, 0.4999, "", "nu", "Poisson's ratio", gt=-1, lt=0.5)
-    plane: Literal["strain", "stress"] = Field(
-        default="strain",
-        description="Plane strain (a thick finger), or plane stress, whose equations the paper prints",
-    )
-    law: LawName = Field(
-        default="linear", description="Material law of the solvers that have it; the others keep their own"
-    )
-    _substance: Substance | None = PrivateAttr(None)  # beside the constants, which alone decide a solution
-
-    @model_validator(mode="after")
-    def _supported(self) -> Self:
-        if self.law != "linear" and self.plane == "stress":
-            raise ValueError(f"the {self.law} law is given for plane strain only; take plane = strain")
-        return self
-
-    @property
-    def substance(self) -> Substance | None:
-        """What the finger is made of, where that is known."""
-        return self._substance
-
-    def made_of(self, substance: Substance | None) -> Self:
-        """The same elastic constants, of a substance."""
-        made = self.model_copy()
-        made._substance = substance
-        return made
-
-    @property
-    def lame(self) -> "Lame":
-        """Lamé constants of the plane law, MPa."""
-        return self._lame(self.plane)
-
-    @property
-    def solid_lame(self) -> "Lame":
-        """Lamé constants in three dimensions, MPa."""
-        return self._lame("strain")
-
-    def _lame(self, plane: Literal["strain", "stress"]) -> "Lame":
-        from pinnray.solvers.elasticity import lame_constants
-
-        return lame_constants(self.young, self.poisson, plane)
 
 
 class Travel(CheckedModel):
@@ -215,4 +155,4 @@ class Physics(Travel, Material):
     def parts(self) -> tuple[Material, Load]:
         """Material and load."""
         load = Load(self.load, displacement=self.displacement, radius=self.radius, friction=self.friction)
-        return Material(**self.model_dump(include=set(Material.model_fields))), load
+        return Material(**self.model_dump(include=set(Material.model_fields), exclude_unset=True)), load

@@ -9,7 +9,7 @@ so that the unknown frames are like further errors of the observations, common t
 that minimises energy plus misfit they are a compliance S Sᵀ / scale in series with the markers' springs.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.registration import FIXED, PARTS, Homography, Pictures, Registration
+from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Pictures, Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Parameter, values_of
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
@@ -41,6 +41,16 @@ def _of(picture: str, known: Registration) -> list[Parameter]:
         for (part, unit), deviation in zip(PARTS.items(), known.deviations.tolist(), strict=True)
         if deviation
     ]
+
+
+def pictures_of(centre: FloatArray, values: Mapping[str, float]) -> Pictures:
+    """The pictures with values of `picture_parameters` by name, else zero, about a centre, (2,), mm."""
+    return Pictures(
+        *(
+            Homography(centre, np.array([values.get(f"{picture}_{part}", 0.0) for part in PARTS]))
+            for picture in ("pressed", "drawn")
+        )
+    )
 
 
 class FramedFit(NamedTuple):
@@ -82,13 +92,8 @@ class FreePictures:
     def at(self, z: FloatArray) -> Pictures:
         """The frames of standardised values, shape (p,)."""
         values, _ = values_of(self.parameters, z)
-        named = dict(zip((each.name for each in self.parameters), values.tolist(), strict=True))
-        return Pictures(
-            *(
-                Homography(self.centre, np.array([named.get(f"{picture}_{part}", 0.0) for part in PARTS]))
-                for picture in ("pressed", "drawn")
-            )
-        )
+        names = [each.name for each in self.parameters]
+        return pictures_of(self.centre, dict(zip(names, values.tolist(), strict=True)))
 
     def about(self, z: FloatArray) -> FramedData:
         """The observations, linear in the frames about standardised values, shape (p,)."""
