@@ -222,7 +222,7 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
     return FingerFigures(
         force=force,
         **ways,
-        lift=2 * (problem.load.friction or FRICTION) * max(force, 0.0) / GRAVITY,
+        lift=_lift(problem.load, force),
         contact_angle=angle,
         contact_length=touching,
         tip_u=float(tip_u),
@@ -299,11 +299,17 @@ def _strain_over_break(material: Material, strain: float) -> float:
     return float(nominal / material.substance.strain_at_break)
 
 
+def _lift(load: Load, force: float) -> float:
+    """Mass that two fingers hold by friction, kg, each with a force, N."""
+    return 2 * (load.friction or FRICTION) * max(force, 0.0) / GRAVITY
+
+
 def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, Interval]:
     """The 95 % intervals of force and stress that a solver knows."""
     found: dict[str, Interval] = {}
     if solution.identified is not None and (along := solution.identified.along) is not None:
-        found["force"] = depth * along.low, depth * along.high
+        low, high, load = depth * along.low, depth * along.high, solution.problem.load
+        found |= {"force": (low, high), "lift": (_lift(load, low), _lift(load, high))}
     known = solution.uncertainty
     if known is not None and known.von_mises is not None and np.isfinite(stress.value):
         half = NORMAL * float(known.von_mises(solution.problem.mesh.locate(stress.place[None]))[0])

@@ -80,7 +80,8 @@ class LoadPath:
         self._newton, self._exact_from = self._begin(), exact_from
         rough = self._begin(tolerance=ROUGH_TOLERANCE) if exact_from > 0 else None
         self._rough = rough  # For equilibria that need be near only
-        self._stops = {*steps.stops, *(() if self.equilibrium.linear else QUARTERS)}
+        rubs = problem.load.friction > 0  # Friction depends on the way
+        self._stops = {*steps.stops, *(() if self.equilibrium.linear or rubs else QUARTERS)}
         contact = self.equilibrium.contact
         self._max_step = steps.max_step if contact is None else min(steps.max_step, contact.longest_step)
         self._softer: list[float] | None = [] if contact is None else None  # Until it is needed
