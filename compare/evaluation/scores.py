@@ -225,8 +225,14 @@ class Scores(Numbers):
         return solver if self.solvers[solver].converged else f"{solver} (not converged)"
 
     def rows(self) -> list[dict[str, Cell]]:
-        """The main numbers, a row a solver, with units in the names of the columns; NaN for none."""
-        return [self._row(name, own) for name, own in self.solvers.items()]
+        """The main numbers, a row a solver, with units in the names of the columns; NaN for none.
+
+        One that failed has a row with the reason as its status.
+        """
+        found = [self._row(name, own) for name, own in self.solvers.items()]
+        none: dict[str, Cell] = dict.fromkeys(found[0], nan)
+        failed = self.failed.items()
+        return found + [none | {"solver": name, "converged": False, "status": said} for name, said in failed]
 
     def _row(self, name: str, own: SolverScores) -> dict[str, Cell]:
         row: dict[str, Cell] = {
