@@ -20,25 +20,19 @@ USABLE = 0.8
 """Share of the free memory that needs no consent."""
 
 
-def mesh_seconds(triangles: int, solvers: Sequence[Solver] = (), *, simulated: bool = False) -> float:
-    """Time of a mesh and of what is done on it, s, as far as a coarser mesh takes less.
+def mesh_price(
+    triangles: int, solvers: Sequence[Solver] = (), *, simulated: bool = False
+) -> tuple[float, float]:
+    """Time of a mesh and of what is done on it, s, as far as a coarser mesh takes less, and memory, GB.
 
     Args:
         triangles: Number of triangles.
         solvers: What it is made for.
         simulated: Whether it is for a virtual experiment as well.
     """
-    return sum(cost.of_mesh(triangles) for cost in [MESH, *_work(solvers, simulated=simulated)])
-
-
-def mesh_memory_gb(triangles: int, solvers: Sequence[Solver] = (), *, simulated: bool = False) -> float:
-    """Memory of the work on a mesh that takes most, GB."""
-    needs = [cost.kilobytes for cost in _work(solvers, simulated=simulated)]
-    return 1e-6 * triangles * max(needs, default=0.0)
-
-
-def _work(solvers: Sequence[Solver], *, simulated: bool) -> list[Cost]:
-    return [*[EXPERIMENT] * simulated, *(Traits.of(each).cost for each in solvers)]
+    costs = [*[EXPERIMENT] * simulated, *(Traits.of(each).cost for each in solvers)]
+    seconds = sum(cost.of_mesh(triangles) for cost in [MESH, *costs])
+    return seconds, 1e-6 * triangles * max((cost.kilobytes for cost in costs), default=0.0)
 
 
 def check_mesh_cost(
@@ -62,8 +56,7 @@ def check_mesh_cost(
     if (settings := mesh_sizes(finger, settings)) is None:
         return
     triangles, free = estimated_triangles(finger, settings), free_memory_gb()
-    seconds = mesh_seconds(triangles, solvers, simulated=simulated)
-    memory = mesh_memory_gb(triangles, solvers, simulated=simulated)
+    seconds, memory = mesh_price(triangles, solvers, simulated=simulated)
     if seconds > MAX_SECONDS or memory > USABLE * free:
         raise UserError(
             f"--mesh-size {settings.size:g} gives about {triangles:,} triangles, which take about "

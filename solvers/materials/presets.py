@@ -58,11 +58,12 @@ MATERIALS: Mapping[str, MaterialPreset] = {
 
 
 def preset(name: str) -> MaterialPreset:
-    """The preset of a name.
+    """The preset of a name, also as makers write it: `TPU 85A` is `tpu-85a`.
 
     Raises:
         UserError: If there is none; it names those there are.
     """
-    if name not in MATERIALS:
+    known = MATERIALS.get("-".join(name.lower().replace("_", " ").split()))
+    if known is None:
         raise UserError(f"there is no material {name!r}; there are {', '.join(MATERIALS)}")
-    return MATERIALS[name]
+    return known

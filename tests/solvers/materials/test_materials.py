@@ -53,6 +53,11 @@ def test_a_silicone_has_the_stress_of_its_sheet_at_twice_its_length():
         preset("tpu")
 
 
+@pytest.mark.parametrize("name", ["TPU-85A", "TPU 85A", "tpu_85a"])
+def test_a_material_is_known_as_its_maker_writes_it(name):
+    assert preset(name) is preset("tpu-85a")
+
+
 def test_a_test_is_read_with_the_units_of_its_columns(tmp_path):
     file = tmp_path / "strip.csv"
     file.write_text("# of a strip\nstrain_percent;stress_kPa\n0;0\n10;50\n20;100\n50;220\n")
@@ -80,6 +85,7 @@ CURVE = [(0.02 * n, 0.2 * n) for n in range(1, 26)]
         ("Strain\tStress\n(mm/mm)\t(N/mm²)", 1, 1),  # units below
         ("Dehnung in %;Spannung in MPa", 100, 1),
         ("strain_ratio,stress_Pa", 1, 1e6),
+        ("ε / -;σ / kPa", 1, 1e3),
     ],
 )
 def test_titles_of_many_programs_are_known(tmp_path, titles, strain, stress):

@@ -10,7 +10,7 @@ from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.mesh.element_size import estimated_triangles
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.options.cost import MAX_SECONDS, USABLE, check_mesh_cost, mesh_memory_gb, mesh_seconds
+from pinnray.options.cost import MAX_SECONDS, USABLE, check_mesh_cost, mesh_price
 from pinnray.options.preset_jobs import job_defaults
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import BAD_INPUT
@@ -65,16 +65,17 @@ def test_every_default_needs_no_consent():
     """On a machine with 4 GB, the mesh of the paper's preset included."""
     paper, default = (job_defaults(preset).solvers.split(",") for preset in ("paper", None))
     of_paper = [make_solver(name, **({"preset": "paper"} if name in PRESETS else {})) for name in paper]
-    assert mesh_seconds(182_000, of_paper, simulated=True) < MAX_SECONDS
-    assert mesh_seconds(18_193, [make_solver(name) for name in default], simulated=True) < MAX_SECONDS
-    assert mesh_memory_gb(18_193, [make_solver(name) for name in default], simulated=True) < USABLE * 4.0
+    assert mesh_price(182_000, of_paper, simulated=True)[0] < MAX_SECONDS
+    seconds, memory = mesh_price(18_193, [make_solver(name) for name in default], simulated=True)
+    assert seconds < MAX_SECONDS
+    assert memory < USABLE * 4.0
 
 
 def test_a_solver_says_what_it_costs_and_one_that_says_nothing_counts_as_fem():
     class Slow(Ending):
         cost = Cost(per_triangle=1000.0, fixed=60.0)
 
-    assert mesh_seconds(18_000, [Slow("slow")]) - mesh_seconds(18_000) == pytest.approx(18)
+    assert mesh_price(18_000, [Slow("slow")])[0] - mesh_price(18_000)[0] == pytest.approx(18)
     assert Traits.of(Slow("slow")).cost.seconds(18_000) == pytest.approx(78)
     assert Traits.of(Ending("silent")).cost == Traits.of(make_solver("fem")).cost
-    assert mesh_memory_gb(18_000, [make_solver("fem"), make_solver("fem-3d")]) > USABLE * 8.0
+    assert mesh_price(18_000, [make_solver("fem"), make_solver("fem-3d")])[1] > USABLE * 8.0
