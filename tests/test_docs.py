@@ -16,6 +16,7 @@ import pytest
 from pydantic import BaseModel
 
 from pinnray.cli import compare_main, main
+from pinnray.cli import QUIET
 from pinnray.commands.app import pinnray
 from pinnray.geometry.cache import CAD_FORMATS, finger_mesh
 from pinnray.geometry.finger.markers import marker_positions
@@ -203,7 +204,7 @@ def command_lines() -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(("page", "line"), command_lines())
 def test_command_lines_parse(page, line):
-    tokens = shlex.split(line, comments=True)
+    tokens = [word for word in shlex.split(line, comments=True) if word != QUIET]
     tokens = tokens[1:] if tokens[0] == "pinnray" else tokens
     if "--from" in tokens:  # a file of an earlier run
         at = tokens.index("--from")
