@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from pinnray.cli import compare_main, main
-from pinnray.cli import QUIET
+from pinnray.cli import QUIET, compare_main, main
 from pinnray.commands.app import pinnray
 from pinnray.geometry.cache import CAD_FORMATS, finger_mesh
 from pinnray.geometry.finger.markers import marker_positions
