@@ -173,6 +173,9 @@ def compare(
 ) -> Comparison:
     """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
 
+    Warns of what the command line says, such as a solver that raises: it has a row with the reason in
+    `table()`, and the result has its traceback in `tracebacks`.
+
     Args:
         design: A finger, the name of a preset, or the path of a TOML file or of a drawing.
         solvers: Solvers or their names; those of the complete table that support the problem if None.
@@ -220,9 +223,13 @@ def compare(
     )
     with shown_stages(progress) as stages:
         if out is not None:
-            return run(replace(job, out=as_path(out, "out")), stages)
-        with TemporaryDirectory() as folder:
-            return compute(checked(job), stages, Path(folder))
+            compared = run(replace(job, out=as_path(out, "out")), stages)
+        else:
+            with TemporaryDirectory() as folder:
+                compared = compute(checked(job), stages, Path(folder))
+    for remark in [*compared.remarks, *compared.failed.values()]:
+        warnings.warn(remark, stacklevel=2)
+    return compared
 
 
 def crossval(
@@ -237,7 +244,7 @@ def crossval(
     progress: bool | None = None,
     **study: Any,
 ) -> "CrossvalResult":
-    """Judge solvers by markers, loads and fields that they were not given.
+    """Judge solvers by markers, loads and fields that they were not given; warns of folds that fail.
 
     Args:
         design: The finger, in one of the ways of `mesh`.
@@ -277,7 +284,10 @@ def crossval(
         **study,
     )
     with shown_stages(progress) as stages:
-        return cross_validate(job, stages)
+        found = cross_validate(job, stages)
+    for name, message in found.failed.items():
+        warnings.warn(f"{name} failed, and is tried again by the same call: {message}", stacklevel=2)
+    return found
 
 
 SEVERAL = {"truths", "layouts", "schemes"}

@@ -12,7 +12,7 @@ from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.export_settings import ExportSettings, Kind
-from pinnray.robots.mjcf import Damping, chain_mjcf, flex_mjcf, with_header
+from pinnray.robots.mjcf import CLEARANCE, Damping, chain_mjcf, flex_mjcf, gripper_mjcf, with_header
 from pinnray.robots.presses import PressedFinger, press
 from pinnray.robots.score import ModelScore, scored
 from pinnray.robots.simulation import Model, chain_front, check_mujoco, flex_front
@@ -124,11 +124,28 @@ def _mujoco(
         said = f"Score: {scores[number].sentence}." if scores else "Not scored: export with the option score."
         files.append(out / f"{model.name}.xml")
         write_text(files[-1], with_header(model.text, [*_header(pressed, fit, settings), said]))
+    files.append(out / "gripper.xml")
+    write_text(files[-1], _gripper(pressed, models[0].name))
     if scores:
         files += [out / "score.json", out / "score.csv"]
         write_json(files[-2], _document(pressed, factor, density, settings, scores))
         write_csv(files[-1], [{"model": s.model, **each.row()} for s in scores for each in s.presses])
     return Exported(tuple(files), tuple(scores), pressed.lost)
+
+
+def _gripper(pressed: PressedFinger, model: str) -> str:
+    """A scene of two chains around the load's cylinder; their bases do not meet."""
+    mesh, stroke = pressed.problem.mesh, -float(pressed.problem.load.values[1])
+    place = np.array([mesh.points[mesh.contact_node, 0], pressed.front[:, 1].max()])
+    closed = min(stroke, 0.9 * pressed.radius)
+    said = [
+        f"Two fingers of {model}.xml around a free cylinder as dense as water, with MuJoCo's friction of 1.",
+        f"Controls left and right close them: from 0 to {MM * (closed + CLEARANCE):g}, {closed:g} mm beyond "
+        "the first touch.",
+        "A time step above 1 ms makes the fingers unstable.",
+    ]
+    scene = gripper_mjcf("gripper", f"{model}.xml", place, pressed.radius, mesh.depth, closed)
+    return with_header(scene, said)
 
 
 def _header(pressed: PressedFinger, fit: str, settings: ExportSettings) -> Sequence[str]:
@@ -143,6 +160,8 @@ def _header(pressed: PressedFinger, fit: str, settings: ExportSettings) -> Seque
         f"stroke of {stroke:g} mm, beyond which it is not known.",
         f"Plane strain: a force is N/mm times the depth of {problem.mesh.depth:g} mm. Gravity is off.",
         f"Damping is not fitted: a loss factor of {settings.loss_factor:g} is stated.",
+        "Attached to another model, whose time step holds, give that one at most 1 ms: MuJoCo's 2 ms make it "
+        "unstable.",
     ]
 
 

@@ -37,7 +37,7 @@ def test_the_example_study_can_be_read(name: str) -> None:
     Study.load(DOCS / "examples" / f"{name}.toml")
 
 
-@pytest.mark.parametrize("name", ["wrap.toml", "wrap-cylinder.toml"])
+@pytest.mark.parametrize("name", ["wrap.toml", "wrap-cylinder.toml", "grip.toml"])
 def test_the_example_questions_can_be_read(name: str) -> None:
     from pinnray.studies.optimum.question import Question
 

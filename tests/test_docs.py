@@ -203,7 +203,7 @@ def command_lines() -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(("page", "line"), command_lines())
 def test_command_lines_parse(page, line):
-    tokens = [word for word in shlex.split(line, comments=True) if word != QUIET]
+    tokens = [token for token in shlex.split(line, comments=True) if token != QUIET]
     tokens = tokens[1:] if tokens[0] == "pinnray" else tokens
     if "--from" in tokens:  # a file of an earlier run
         at = tokens.index("--from")

@@ -1,6 +1,9 @@
 """Files for people who install, cite or package: they agree with the project's metadata and figures."""
 
+import os
 import re
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -53,6 +56,31 @@ def test_the_readme_says_what_its_table_says():
     assert kept["pinn-asm"].von_mises > 4 * kept["pinn-std"].von_mises  # "much worse"
     assert all(abs(value) < 0.05 for value in kept["fem-id"][8:11])  # "finding the load helps"
     assert Figures._fields[8:11] == ("displacement", "von_mises", "force")
+
+
+def test_pip_meets_the_wheel_of_dolfinx_first():
+    """So that it ends before it loads gigabytes, where the extra is asked for and has no wheel."""
+    first, *others = PROJECT["dependencies"]
+    assert first.startswith("dolfinx-solver-real")
+    assert first.endswith("; extra == 'fem'")
+    assert "fem" in PROJECT["optional-dependencies"]
+    assert not any("extra" in each for each in others)
+
+
+def test_make_leaves_an_environment_that_it_has_not_made(tmp_path):
+    """Before it installs anything: the message says how to go on with it, or without it."""
+    for name in ("tools", "requirements"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    (tmp_path / ".venv").mkdir()
+    (tmp_path / "os-release").write_text("ID=debian\nVERSION_ID=12\n")
+    environment = {**os.environ, "OS_RELEASE": str(tmp_path / "os-release")}
+    done = subprocess.run(
+        [tmp_path / "tools/setup.sh"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "setup: cannot go on: the folder .venv was not made by make" in done.stderr
+    assert ". .venv/bin/activate && pinnray compare" in done.stderr
+    assert list((tmp_path / ".venv").iterdir()) == []
 
 
 def test_the_version_is_the_same_everywhere():

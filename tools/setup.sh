@@ -26,6 +26,12 @@ if [[ ! -f $apt || ! -f $lock ]]; then
 $elsewhere"
 fi
 
+if [[ -e .venv && ! -e .venv/setup-state ]]; then # made by hand, say by pip's way in: it is not ours to change
+    stop "the folder .venv was not made by make. Go on with it:
+  . .venv/bin/activate && pinnray compare --design default
+or let make have its own: mv .venv .venv-other && make"
+fi
+
 # Everything that decides what is installed, and where.
 state=$(sha256sum tools/setup.sh pyproject.toml "$apt" "$lock" requirements/dev.txt; pwd; echo "${TORCH_INDEX:-}")
 up_to_date() { [[ $state == "$(cat .venv/setup-state 2>/dev/null)" ]]; }
@@ -72,6 +78,7 @@ install_locked() {
 }
 
 say "creating .venv on $(/usr/bin/python3 --version), with the distribution's packages in sight"
+mkdir -p .venv && touch .venv/setup-state # a setup that is interrupted begins anew
 /usr/bin/python3 -m venv --system-site-packages .venv
 say "installing the packages of $lock and requirements/dev.txt (about half a minute)"
 if ! install_locked; then

@@ -31,6 +31,9 @@ MOST_CHOICES, CLEAR = 5000, 5.0
 """Number of ways to leave out points of the longer list up to which they are tried, and lead in logarithmic
 likelihood from which on one is the right one."""
 
+NUMBERED = "number them in a column point, or write nan for one that is missing"
+"""Advice for lists of which it is not clear which points they lack."""
+
 LengthScale = Literal["same", "lengths"]
 
 
@@ -97,8 +100,7 @@ def clicked_points(
 
     The picture at rest is put on the drawing by turn, shift and, where it is not known, scale; the pressed
     one is moved with it. Its own frame is `HAND_HELD`. A point that is missing in one picture is left out; a
-    pressed list in another order than that at rest is put into this order, unless its points are numbered,
-    and one whose y runs the other way is turned over.
+    pressed list in another order than that at rest is put into this order, unless its points are numbered.
 
     Args:
         rest: At rest.
@@ -111,14 +113,20 @@ def clicked_points(
         source: A sentence for the observations.
 
     Raises:
-        UserError: If the points of both are not the same or in two units, or those at rest do not lie as on
-            the drawing.
+        UserError: If it is not clear which points are missing, those of both are the same, in two units or
+            with y the other way, or those at rest do not lie as on the drawing.
     """
     zoom = _size(rest.places) / _size(pressed.places) if scale == "lengths" else 1.0
     if isinstance(scale, tuple):
         zoom = scale[1] / scale[0]
     one, other, names, remarks = _paired(rest, pressed, zoom)
     here, there = rest.places[one], pressed.places[other]
+    most = max(len(each.places) for each in (rest, pressed))
+    if len(here) > len(markers) or (most < len(markers) and not rest.numbers):
+        raise UserError(
+            f"{len(rest.places)} points at rest, {len(pressed.places)} pressed, {len(markers)} markers on "
+            f"the drawing; {NUMBERED}"
+        )
     _check_pair(here, zoom * there)
     found = likeliest_order(here, zoom * there, may_flip=True)
     if found.flipped:
@@ -149,6 +157,8 @@ def clicked_points(
             f"{least:.3g} mm, not {far:.3g}; "
             + ("see their numbers" if rest.numbers else "they were taken in that order")
         )
+    if _misfit(there, own) < _misfit(here, own) / UNKNOWN_BY - ROUNDING * float(np.ptp(own)):
+        remarks.append("the pressed points are nearer to the drawing than those at rest: exchanged?")
     if len(absent := np.setdiff1d(np.arange(len(markers)), owner)):
         remarks.append(f"not visible, for want of a point: marker {_listed(absent + 1)}")
     misfit = float(np.sqrt(((here - own) ** 2).sum() / max(2 * len(own) - 4, 1)))
@@ -202,10 +212,7 @@ def _paired(rest: Clicks, pressed: Clicks, zoom: float) -> tuple[IntArray, IntAr
 def _likeliest_choice(here: FloatArray, there: FloatArray) -> tuple[IntArray, IntArray]:
     """Numbers of the points in two lists of different lengths that give the likeliest displacements."""
     fewer, more = sorted((here, there), key=len)
-    said = (
-        f"{len(here)} points at rest and {len(there)} pressed; number them in a column point, or write "
-        "nan for one that is missing"
-    )
+    said = f"{len(here)} points at rest and {len(there)} pressed; {NUMBERED}"
     if comb(len(more), len(fewer)) > MOST_CHOICES:
         raise UserError(said)
     choices = np.array(list(combinations(range(len(more)), len(fewer))))

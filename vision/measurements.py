@@ -22,8 +22,8 @@ REQUIRED = (*POSITION, *DISPLACEMENT)
 OPTIONAL = {"std_u_mm": 0.0, "std_v_mm": 0.0, "visible": 1.0}
 TITLES = {name: name for name in REQUIRED}, {name: name for name in OPTIONAL}
 """Titles of the columns that must and that may be there, by their names."""
-WORDS = {"true": "1", "false": "0", "yes": "1", "no": "0"}
-"""Other ways to write `visible`, in lower case."""
+WORDS = {"true": "1", "false": "0", "yes": "1", "no": "0", "wahr": "1", "falsch": "0"}
+"""Other ways to write `visible`, in lower case; German spreadsheets write WAHR."""
 CLICKED = 0.05
 """Median standard deviation, mm, from which points were set by hand: fixed cameras do better."""
 SMALLEST_DISTANCE = 1e-3

@@ -33,27 +33,30 @@ class PointOrder(NamedTuple):
     gain: float  # Logarithmic likelihood beyond that of the points as given
 
 
-def likeliest_order(first: FloatArray, second: FloatArray, *, may_flip: bool = False) -> PointOrder:
-    """The likeliest order of the points of the second picture, shape (m, 2); as given, unless it is `SURE`.
+def likeliest_order(
+    points: FloatArray, shown: FloatArray, *, expected: FloatArray | None = None, may_flip: bool = False
+) -> PointOrder:
+    """The likeliest order of what the second picture shows of points; as given, unless it is `SURE`.
 
     Args:
-        first: Points in the first picture, shape (m, 2), at about the same scale.
-        second: The same in the second one, perhaps in another order.
+        points: In the first picture, shape (m, 2).
+        shown: Their places in the second picture, shape (m, 2), at about the same scale.
+        expected: What `shown` is like but for a smooth field, shape (m, 2); `points` if None.
         may_flip: Whether y may run the other way in the second picture.
     """
-    listed = np.arange(len(first))
+    listed = np.arange(len(points))
     best = given = PointOrder(listed, False, 0.0)
-    extent = float(np.ptp(first, axis=0).max())
-    if not 3 < len(first) <= MOST or extent == 0:
+    extent = float(np.ptp(points, axis=0).max())
+    if not 3 < len(points) <= MOST or extent == 0:
         return given
-    field = _Field((first - first.mean(axis=0)) / extent)
-    as_given = float(field.likelihoods((second - first)[None] / extent)[0])
+    field, base = _Field((points - points.mean(axis=0)) / extent), (points if expected is None else expected)
+    as_given = float(field.likelihoods((shown - base)[None] / extent)[0])
     for flipped in (False, True) if may_flip else (False,):
-        there = (second * (1.0, -1.0 if flipped else 1.0) - first.mean(axis=0)) / extent
-        centred = there - there.mean(axis=0)
-        nearest = linear_sum_assignment(((field.points[:, None] - centred) ** 2).sum(axis=2))[1]
+        there = shown * (1.0, -1.0 if flipped else 1.0)
+        apart = (base - base.mean(axis=0))[:, None] - (there - there.mean(axis=0))
+        nearest = linear_sum_assignment((apart**2).sum(axis=2))[1]
         for start in (listed, listed[::-1], nearest):
-            order, likelihood = field.improved(there, start)
+            order, likelihood = field.improved(there / extent, base / extent, start)
             if likelihood - as_given > best.gain:
                 best = PointOrder(order, flipped, likelihood - as_given)
     return best if best.gain > SURE else given
@@ -98,7 +101,7 @@ class _Field:
         squares = ((values @ self._precisions) * values).sum(axis=2)
         return np.asarray(-0.5 * (squares + self._determinants[:, None]).min(axis=0))
 
-    def improved(self, there: FloatArray, order: IntArray) -> tuple[IntArray, float]:
+    def improved(self, there: FloatArray, base: FloatArray, order: IntArray) -> tuple[IntArray, float]:
         """The order after exchanges of two points as long as they make it likelier, and its likelihood."""
         one, other = np.triu_indices(len(order), 1)
         trial = np.tile(order, (len(one) + 1, 1))
@@ -106,7 +109,7 @@ class _Field:
             rows = np.arange(len(one))
             trial[:] = order
             trial[rows, one], trial[rows, other] = order[other], order[one]
-            found = self.likelihoods(there[trial] - self.points)  # the last is without an exchange
+            found = self.likelihoods(there[trial] - base)  # the last is without an exchange
             if found.argmax() == len(one) or not found.max() > found[-1] + 1e-9:
                 return order, float(found[-1])
             order = trial[found.argmax()].copy()

@@ -1,15 +1,16 @@
 """Random drawings as programs write them: each read to 1e-6 of its area, or refused in one line.
 
-`python -m benchmarks.reliability.drawings COUNT [SEED]` makes DXF, SVG and STEP files of random
-sections: blocks, units, hidden layers, copies, placements, short lines and gaps. What a refusal proposes
-(`units`, `tolerance`) must work. Areas and distances of markers are computed here, without the readers' code.
+`python -m benchmarks.reliability.drawings COUNT [SEED] [FORMAT]` makes DXF, SVG and STEP files of random
+sections: blocks, units, hidden layers, copies, placements, short lines and gaps; solids with bosses, steps,
+feet, pockets, holes, chamfers and coloured faces. What a refusal proposes (`units`, `tolerance`, `depth`)
+must work. Areas, volumes and distances of markers are computed here, without the readers' code.
 """
 
 import re
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +25,10 @@ from pinnray.runtime.errors import UserError
 
 SAME = 1e-6
 """Largest relative difference of areas and of the markers' distances."""
+LEFT_OUT = 0.005
+"""Share of a solid's volume that its section times its depth may leave out or add."""
+FEATURES = ("markers", "markers", "plain", "boss", "foot", "step", "pocket", "hole", "hole across", "chamfer")
+"""Of solids; there are no others with markers."""
 LENGTHS = {0: 1.0, 1: 25.4, 2: 304.8, 4: 1.0, 5: 10.0, 6: 1000.0, 9: 0.0254, 10: 914.4}
 """Units of DXF headers, mm."""
 UNITS = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "": 25.4 / 96}
@@ -46,6 +51,14 @@ class Curve(NamedTuple):
         bent = np.abs(self.bulges) > 0
         radius = np.divide(chord, 2 * np.sin(angle / 2), out=np.zeros_like(chord), where=bent)
         return float(0.5 * (x * w - z * y).sum() + (0.5 * radius**2 * (angle - np.sin(angle))).sum())
+
+
+class Truth(NamedTuple):
+    """What the reader of a file must find beside the section."""
+
+    gap: float = 0.0  # between ends of lines, mm
+    volume: float = 0.0  # of the solid, mm^3; zero for a drawing
+    kind: str = ""  # of the solid
 
 
 class Sketch(NamedTuple):
@@ -102,7 +115,7 @@ def plain(sketch: Sketch, length: float = 1.0, units: int = 0) -> Drawing:
     return document
 
 
-def dxf(random: np.random.Generator, sketch: Sketch, path: Path) -> float:
+def dxf(random: np.random.Generator, sketch: Sketch, path: Path) -> Truth:
     """A DXF file: some unit, nested, turned and mirrored blocks, lines with gaps, and hidden frames."""
     number = int(random.choice(list(LENGTHS)))
     length = 1.0 if random.random() < 0.2 else LENGTHS[number]  # the header's unit may be a lie
@@ -133,10 +146,10 @@ def dxf(random: np.random.Generator, sketch: Sketch, path: Path) -> float:
         layer.freeze() if name == "frozen" else layer.off()
         space.add_lwpolyline([(-9, -9), (500, -9), (500, 300)], close=True, dxfattribs={"layer": name})
     document.saveas(path)
-    return gap * 2
+    return Truth(gap=gap * 2)
 
 
-def svg(random: np.random.Generator, sketch: Sketch, path: Path) -> float:
+def svg(random: np.random.Generator, sketch: Sketch, path: Path) -> Truth:
     """An SVG file: some unit, transformed, also through copies, beside what is not drawn."""
     unit = str(random.choice(list(UNITS)))
     scale = float(random.choice([0.5, 1, 3]))
@@ -150,7 +163,7 @@ def svg(random: np.random.Generator, sketch: Sketch, path: Path) -> float:
     size = f'width="400{unit}" height="300{unit}" ' if unit else ""
     head = f'xmlns="http://www.w3.org/2000/svg" {size}viewBox="-200 -100 400 300"'
     path.write_text(f"<svg {head}><path/>{hidden}{content}</svg>")
-    return 0.0
+    return Truth()
 
 
 def elements(sketch: Sketch, length: float = 1.0) -> str:
@@ -171,42 +184,73 @@ def elements(sketch: Sketch, length: float = 1.0) -> str:
     return f'<g id="finger"><path d="{text}"/><g id="markers">{dots}</g></g>'
 
 
-def step(random: np.random.Generator, sketch: Sketch, path: Path) -> float:
-    """A STEP file: an assembly of assemblies, moved and turned."""
+def step(random: np.random.Generator, sketch: Sketch, path: Path) -> Truth:
+    """A STEP file: an assembly of assemblies, moved and turned, of a solid with a feature or with markers."""
     import cadquery as cq
 
     plain(sketch).saveas(path.with_suffix(".dxf"))
     section = cq.importers.importDXF(str(path.with_suffix(".dxf"))).wires().toPending()
     solid = section.extrude(DEPTH).val()
+    kind = str(random.choice(FEATURES))
+    shaped = featured(random, kind, solid, *np.ptp(sketch.outline.points, axis=0))
     place = cq.Location(*random.uniform(-50, 50, 2), 0, 0, 0, random.uniform(0, 360))
     whole, inner = cq.Assembly(name="whole"), cq.Assembly(name="inner")
-    inner.add(solid.moved(place.inverse), name="body:1", loc=place)
+    body = shaped.moved(place.inverse)
+    inner.add(body, name="body:1", loc=place, color=cq.Color(*random.random(3)))
+    for face in random.permutation(np.array(body.Faces(), dtype=object))[: random.integers(9)]:
+        named = {"name": "face"} if random.random() < 0.3 else {"color": cq.Color(*random.random(3))}
+        inner.children[0].addSubshape(face, **named)
     disc = cq.Solid.makeCylinder(RADIUS, 0.5)
-    for number, (x, y) in enumerate(sketch.markers, start=1):
+    for number, (x, y) in enumerate(sketch.markers if kind == "markers" else (), start=1):
         inner.add(disc, name=f"marker-1:{number}", loc=cq.Location(x, y, DEPTH - 0.5))
     turned = cq.Location(*random.uniform(-20, 20, 3), 0, *random.uniform(0, 360, 2))
     whole.add(inner, name="inner:1", loc=turned)
     whole.export(str(path))
-    return 0.0
+    return Truth(volume=shaped.Volume(), kind=kind)
 
 
-WRITERS: dict[str, Callable[[np.random.Generator, Sketch, Path], float]] = {
+def featured(random: np.random.Generator, kind: str, solid: Any, x: float, y: float) -> Any:
+    """A solid with one of `FEATURES` of any size."""
+    import cadquery as cq
+
+    at, size, vector = random.uniform(0.2, 0.7) * x, 0.02 * 200 ** random.random(), cq.Vector
+    box, cylinder = cq.Solid.makeBox, cq.Solid.makeCylinder
+    wedge = box(20, 3 * y, 20).rotate(vector(), vector(0, 1, 0), 45)
+    whole = {
+        "boss": lambda: solid.fuse(cylinder(2, size, vector(at, y - 2, DEPTH))),
+        "foot": lambda: solid.fuse(box(4, y, DEPTH + 2 * size, vector(-3, 0, -size))),
+        "step": lambda: solid.cut(box(0.2 * x, 3 * y, size, vector(at, -y, DEPTH - size))),
+        "pocket": lambda: solid.cut(cylinder(1, size, vector(at, y - 2, DEPTH - size))),
+        "hole": lambda: solid.cut(cylinder(0.7, DEPTH, vector(at, y - 1, 0))),
+        "hole across": lambda: solid.cut(
+            cylinder(size / 2, 3 * y, vector(at, -y, random.uniform(3, 9)), vector(0, 1, 0))
+        ),
+        "chamfer": lambda: solid.cut(wedge.moved(cq.Location(x, -y, DEPTH - size))),
+    }.get(kind, lambda: solid)()
+    return whole.Solids()[0] if len(whole.Solids()) == 1 else solid
+
+
+WRITERS: dict[str, Callable[[np.random.Generator, Sketch, Path], Truth]] = {
     "dxf": dxf,
     "svg": svg,
     "step": step,
 }
-"""By suffix; they return for how long a gap the ends of two lines are apart, mm."""
+"""By suffix."""
 
 
-def outcome(path: Path, expected: Sketch, gap: float) -> tuple[str, str]:
+def outcome(path: Path, expected: Sketch, truth: Truth) -> tuple[str, str]:
     """`read`, `read as proposed`, `refused` or `wrong`, and the refusal or what is wrong."""
     settings, said = dict[str, Any](), ""
+    if truth.kind not in ("", "markers"):
+        expected = expected._replace(markers=np.empty((0, 2)))
     for _ in range(4):
         try:
             drawing = read_drawing(path, **settings)
             found = body(drawing.loops)
         except UserError as error:
             said = str(error)
+            if "the solid is not extruded" in said:
+                return "depth asked for", said
             remedy = re.search(r'(units|tolerance) = "?([a-z]+|[0-9.e-]+)', said)
             if "\n" in said or (remedy and remedy[1] in settings):
                 return "wrong", f"after {settings}: {said}"
@@ -216,7 +260,13 @@ def outcome(path: Path, expected: Sketch, gap: float) -> tuple[str, str]:
             continue
         except Exception as error:
             return "wrong", f"{type(error).__name__}: {error}"
-        if fault := _difference(found.area, drawing.markers, expected, gap):
+        volume = found.area * (drawing.depth or 0.0)
+        if truth.volume and abs(volume / truth.volume - 1) > LEFT_OUT:
+            return "wrong", f"{volume:.6g} for {truth.volume:.6g} mm3; {drawing.note}"
+        exact = abs(volume / truth.volume - 1) < SAME if truth.volume else False
+        if not len(expected.markers) and (exact or abs((drawing.depth or DEPTH) - DEPTH) > 0.01):
+            return "read", said  # with a hole, or across another direction, as of a bar
+        if fault := _difference(found.area, drawing.markers, expected, truth.gap):
             return "wrong", f"{fault}; {drawing.note}"
         return ("read as proposed" if said else "read"), said
     return "wrong", said
@@ -235,18 +285,20 @@ def _difference(area: float, markers: np.ndarray, expected: Sketch, gap: float) 
     return "markers elsewhere" if np.abs(found - right).max(initial=0) > SAME * 100 else ""
 
 
-def tried(count: int, seed: int = 0) -> tuple[Counter[tuple[str, str]], list[str]]:
+def tried(
+    count: int, seed: int = 0, formats: Sequence[str] = tuple(WRITERS)
+) -> tuple[Counter[tuple[str, str]], list[str]]:
     """Numbers of drawings by format and outcome, and the wrong ones in words."""
     counts, wrong = Counter[tuple[str, str]](), list[str]()
     with tempfile.TemporaryDirectory() as folder:
         for number in range(count):
             random = np.random.default_rng([seed, number])
-            suffix = list(WRITERS)[number % len(WRITERS)]
+            suffix = formats[number % len(formats)]
             drawn = sketch(random, fine=suffix != "step")
             path = Path(folder) / f"{number}.{suffix}"
-            gap = WRITERS[suffix](random, drawn, path)
-            state, said = outcome(path, drawn, gap)
-            counts[suffix, state] += 1
+            truth = WRITERS[suffix](random, drawn, path)
+            state, said = outcome(path, drawn, truth)
+            counts[f"{suffix} {truth.kind}".rstrip(), state] += 1
             if state in ("wrong", "refused"):
                 wrong += [f"{path.name}: {said}"] * (state == "wrong")
                 print(path.name, state, said, flush=True)
@@ -254,4 +306,4 @@ def tried(count: int, seed: int = 0) -> tuple[Counter[tuple[str, str]], list[str
 
 
 if __name__ == "__main__":
-    print(tried(int(sys.argv[1]), *map(int, sys.argv[2:]))[0])
+    print(tried(int(sys.argv[1]), *map(int, sys.argv[2:3]), *([sys.argv[3:]] if sys.argv[3:] else []))[0])

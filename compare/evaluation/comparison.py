@@ -42,7 +42,8 @@ class Results:
     adaptation: Adaptation | None = None  #: Rounds of mesh refinement, if a tolerance was given.
     settings: Mapping[str, Mapping[str, object]] = field(default_factory=dict)  #: Of each solver, by name.
     unsupported: Mapping[str, str] = field(default_factory=dict)  #: Reasons, by the solvers' names.
-    failed: Mapping[str, str] = field(default_factory=dict)  #: Exceptions, by the names of solvers.
+    failed: Mapping[str, str] = field(default_factory=dict)  #: Reasons of those that failed, by their names.
+    tracebacks: Mapping[str, str] = field(default_factory=dict)  #: Of those that raised, by their names.
     warnings: Sequence[str] = ()  #: Remarks of the marker tracking and on unlikely measurements.
 
     @cached_property
@@ -62,7 +63,7 @@ class Results:
             failed=self.failed,
             reference=self.reference.solver,
             solvers={
-                each.solver: solver_scores(each, given, self.reference, self.truth)
+                each.solver: solver_scores(each, given, self.reference, self.truth, self.load.values)
                 for each in self.evaluations
             },
         )
@@ -74,6 +75,8 @@ class Results:
 
     def __getitem__(self, solver: str) -> Evaluation:
         named = {evaluation.solver: evaluation for evaluation in self.evaluations}
+        if solver in self.failed:
+            raise UserError(self.failed[solver])
         if solver not in named:
             raise UserError(f"no solver of this comparison is called {solver!r}; it has {', '.join(named)}")
         return named[solver]

@@ -23,9 +23,13 @@ from pinnray.solvers.finger_figures import FingerFigures
 
 
 def solver_scores(
-    evaluation: Evaluation, observations: Observations, reference: Evaluation, truth: Evaluation | None
+    evaluation: Evaluation,
+    observations: Observations,
+    reference: Evaluation,
+    truth: Evaluation | None,
+    travel: FloatArray,
 ) -> SolverScores:
-    """Compute every number of a solver."""
+    """Compute every number of a solver; the indenter has a travel, shape (2,), mm."""
     plain = ("family", "twin", "law", "message", "energy", "reaction", "stats", "certificate")
     markers = marker_errors(evaluation.shown_displacement, observations)
     numbers: dict[str, Any] = {name: getattr(evaluation, name) for name in plain} | {
@@ -41,6 +45,9 @@ def solver_scores(
         | {"reference_uncertainty": reference.uncertainty},
         "to_truth": None if truth is None else truth_differences(evaluation, truth),
         "force_to_truth_rel": None if truth is None else force_error(evaluation, truth),
+        "grip_to_truth_rel": None
+        if truth is None
+        else float(evaluation.reaction @ travel / (truth.reaction @ travel)) - 1,
     }
     return SolverScores.model_validate(numbers)
 

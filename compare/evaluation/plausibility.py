@@ -4,7 +4,6 @@ What is impossible is refused, what is unlikely warned of, with what was read an
 """
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -29,9 +28,6 @@ SIZES = 3.0
 """Ratio of measured to linear displacements that is unlikely; at finite strain it is 0.86 to 1."""
 IMPOSSIBLE = 200.0
 """Ratio that no other stroke explains: no camera sees one so much smaller, no finger bears a larger one."""
-MUCH_NEARER = 0.75
-"""Share of the distance from `fem` to which another order of the markers has to bring them to be suspected:
-0.53 to 0.58 where they were in reverse order, numbered one off or had their walls swapped."""
 SMALL = 0.1
 """Share of the stroke below which `fem`'s displacements at the markers say little of a direction."""
 
@@ -112,13 +108,6 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
         )
     if not moved.any():
         return [*remarks, "the measurements say that no marker moved"]
-    found = likeliest_order(points, points + moved)
-    if found.gain:
-        names = [str(number) for number in np.flatnonzero(seen) + 1]
-        remarks.append(
-            f"the markers' pressed places look mixed up: {order_text(found.order, names)} their "
-            "displacements would be smooth; see in which order they were clicked"
-        )
     try:
         expected = _expected(problem, points)
     except MissingLibraryError as error:
@@ -126,7 +115,9 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
     stroke = float(np.abs(problem.load.values).max())
     if float(np.sqrt((expected**2).sum(axis=1).mean())) < SMALL * stroke:
         return remarks
-    return [*remarks, *_compared(moved, expected, stroke, np.flatnonzero(seen) + 1, apart=apart)]
+    numbers = np.flatnonzero(seen) + 1
+    remarks += _compared(moved, expected, stroke, numbers, apart=apart)
+    return remarks + (_order_remarks(points, moved, expected, numbers) if apart else [])
 
 
 def _compared(
@@ -162,38 +153,23 @@ def _compared(
         )
     elif turned:
         remarks.append(f"u goes against that of fem; {CONVENTION}")
-    if apart and not turned and (order := likely_order(moved, expected)) is not None:
-        remarks.append(
-            "the markers' displacements are much nearer to those of fem in the order of the rows "
-            f"{' '.join(map(str, numbers[order]))}; see how they are numbered"
-        )
     return remarks
 
 
-def likely_order(moved: FloatArray, expected: FloatArray) -> IntArray | None:
-    """The order in which displacements are much nearer to expected ones, or None if there is none.
-
-    Args:
-        moved: Displacements, shape (m, 2), mm.
-        expected: What is expected of the same markers up to a factor, shape (m, 2), mm.
-
-    Returns:
-        Rows of `moved`, shape (m,): the one of the first marker first.
-    """
-
-    def distance(order: IntArray) -> float:
-        """From the nearest multiple of the expected ones, mm."""
-        return float(np.linalg.norm(moved[order] - _size(moved[order], expected) * expected))
-
-    apart = ((moved[:, None] - abs(_size(moved, expected)) * expected) ** 2).sum(axis=2)
-    given = np.arange(len(moved))
-    order = linear_sum_assignment(apart.T)[1]
-    return order if (order != given).any() and distance(order) < MUCH_NEARER * distance(given) else None
-
-
-def _size(moved: FloatArray, expected: FloatArray) -> float:
-    """Factor of expected displacements at which they are nearest to some, both of shape (m, 2), mm."""
-    return float((moved * expected).sum() / max(float((expected**2).sum()), np.finfo(float).tiny))
+def _order_remarks(
+    points: FloatArray, moved: FloatArray, expected: FloatArray, numbers: IntArray
+) -> list[str]:
+    """A remark on markers whose displacements or pressed places much likelier are in another order."""
+    like = expected * float(np.linalg.norm(moved) / np.linalg.norm(expected))
+    found = {
+        "displacements": likeliest_order(points, moved, expected=like),
+        "pressed places": likeliest_order(points, points + moved, expected=points + like),
+    }
+    mixed = max(found, key=lambda each: found[each].gain)
+    if not found[mixed].gain:
+        return []
+    text = order_text(found[mixed].order, [str(number) for number in numbers])
+    return [f"the markers' {mixed} look mixed up: much likelier they are {text}; see how they are numbered"]
 
 
 def _expected(problem: Problem, points: FloatArray) -> FloatArray:

@@ -150,6 +150,8 @@ class SolverScores(Numbers):
     to_truth: TruthDifferences | None  #: None where the markers were measured: nobody knows a real field.
     force_to_truth_rel: Number  #: Relative error of the size of the indenter's force; NaN likewise.
 
+    grip_to_truth_rel: Number = nan  #: The same of its component along the travel, which a gripper feels.
+
     @property
     def converged(self) -> bool:
         """By the solver's own criterion and, where there is a certificate, its limits."""
@@ -223,8 +225,14 @@ class Scores(Numbers):
         return solver if self.solvers[solver].converged else f"{solver} (not converged)"
 
     def rows(self) -> list[dict[str, Cell]]:
-        """The main numbers, a row a solver, with units in the names of the columns; NaN for none."""
-        return [self._row(name, own) for name, own in self.solvers.items()]
+        """The main numbers, a row a solver, with units in the names of the columns; NaN for none.
+
+        One that failed has a row with the reason as its status.
+        """
+        found = [self._row(name, own) for name, own in self.solvers.items()]
+        none: dict[str, Cell] = dict.fromkeys(found[0], nan)
+        failed = self.failed.items()
+        return found + [none | {"solver": name, "converged": False, "status": said} for name, said in failed]
 
     def _row(self, name: str, own: SolverScores) -> dict[str, Cell]:
         row: dict[str, Cell] = {

@@ -32,7 +32,8 @@ def page_width(width: float | None) -> float:
 
     if width is not None and not 80 <= width <= 200:
         raise UserError(
-            f"no picture can be {width:g} mm wide: give 80 to 200 mm; a journal's column has 85, its page 180"
+            f"a picture's width of {width:g} mm is not within 80 to 200 mm; a journal's column has 85 mm, "
+            "its page 180 mm"
         )
     return WIDTH if width is None else width / 25.4
 

@@ -52,11 +52,12 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Comparison:
     kept = job.names if job.resume else ()
     with replaced_folder(job.out, keep=kept) as folder:
         if not isinstance(job.measurements, MarkerSource):
-            comparison = compute(job, stages, folder, pool)
+            comparison = _with_files(compute(job, stages, folder, pool))
             _write(folder, job, comparison, stages)
             return comparison
         measured = job.measurements.measured(job.design, folder, stages)
-        comparison = compute(replace(job, measurements=measured.observations), stages, folder, pool)
+        given = replace(job, measurements=measured.observations)
+        comparison = _with_files(compute(given, stages, folder, pool))
         comparison = replace(comparison, warnings=[*measured.warnings, *comparison.warnings])
         photographs = [*measured.pictures, *measured.compared(comparison)]
         _write(folder, job, comparison, stages, photographs)
@@ -110,7 +111,12 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
         adaptation=adaptation,
         settings={each.name: each.settings() for each in solvers if each.name in outcome.evaluations},
         unsupported=unsupported | outcome.unsupported,
-        failed={name: _with_traceback(folder, name, reason) for name, reason in outcome.failed.items()},
+        failed=outcome.failed,
+        tracebacks={
+            name: file.read_text(encoding="utf-8")
+            for name in outcome.failed
+            if (file := folder / ERRORS / f"{name}.txt").exists()
+        },
         warnings=[
             *(f"{each.solver}: {text}" for each in evaluations for text in each.warnings),
             *(*problem_remarks(problem), *remarks, *_unframed(evaluations, observations)),
@@ -128,10 +134,11 @@ def _unframed(evaluations: Sequence[Evaluation], observations: Observations) -> 
     return [f"{', '.join(names)}: the pictures' frames are not known, and were taken as they are"]
 
 
-def _with_traceback(folder: Path, name: str, reason: str) -> str:
-    """Why a solver failed, and the file of its exception's traceback if there is one."""
-    trace = Path(ERRORS) / f"{name}.txt"
-    return f"{reason}; its traceback is in {trace}" if (folder / trace).exists() else reason
+def _with_files(comparison: Comparison) -> Comparison:
+    """A comparison whose reasons for a failure name the file of the traceback."""
+    files = {name: f"; its traceback is in {Path(ERRORS) / name}.txt" for name in comparison.tracebacks}
+    failed = {name: reason + files.get(name, "") for name, reason in comparison.failed.items()}
+    return replace(comparison, failed=failed)
 
 
 def _without_markers(

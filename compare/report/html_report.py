@@ -30,6 +30,7 @@ from pinnray.comparison.report.tables import printed_rows, seconds, table_one
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_text
 from pinnray.runtime.html import Packed, picture_urls, template_environment
+from pinnray.runtime.machine import program_version
 from pinnray.runtime.tables import distance, number, percent
 
 BUDGET = 6_000_000
@@ -165,6 +166,7 @@ def report_html(
         pictures=[picture for picture in pictures if picture.path.stem not in fields],
         stills=[picture for picture in pictures if picture.path.stem in fields],
         provenance=provenance,
+        version=program_version(),
     )
 
 

@@ -3,7 +3,7 @@
 A question that they cannot answer is not asked.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import hypot, isfinite, nan
 from typing import NamedTuple
 
@@ -59,14 +59,15 @@ def _figures(scores: Scores) -> RunAnswer | None:
     known = {name: own.figures for name, own in scores.solvers.items() if own.figures}
     if not known:
         return None
-    measured = scores.measurements.source == "measured"
-    found_force = [name for name in known if measured and scores[name].force]
-    name = next(iter([*found_force, *(each for each in known if each == scores.reference), *known]))
-    values = known[name].values
+    name = _best(known, scores)
+    values, error = known[name].values, scores[name].grip_to_truth_rel
     low, high = (values.get(f"force_{end}_N") for end in ("low", "high"))
-    interval = (
-        "" if low is None or high is None else f" (95 % interval {number(low, 3)} to {number(high, 3)} N)"
-    )
+    beside = []
+    if low is not None and high is not None:
+        beside.append(f"95 % interval {number(low, 3)} to {number(high, 3)} N")
+    if isfinite(error):
+        beside.append(f"{_signed(error, True)} off the simulated finger’s")
+    interval = f" ({'; '.join(beside)})" if beside else ""
     force, strain = values["force_N"], values["principal_strain"]
     moved = hypot(values["tip_u_mm"], values["tip_v_mm"])
     parts = {
@@ -89,6 +90,15 @@ def _figures(scores: Scores) -> RunAnswer | None:
         [broken] if broken else [],
         TextTable("", ["", *map(scores.label, known)], rows, caption, left=[""]),
     )
+
+
+def _best(known: Collection[str], scores: Scores) -> str:
+    """The solver at hand that is nearest to the truth, else has found the force, else is the reference."""
+    away = {name: own.to_truth.displacement.rel_l2 for name in known if (own := scores[name]).to_truth}
+    if away and all(map(isfinite, away.values())):
+        return min(away, key=lambda name: (not scores[name].converged, away[name]))
+    found = [name for name in known if scores[name].force]
+    return next(iter([*found, *(each for each in known if each == scores.reference), *known]))
 
 
 def _figure(known: FigureScores, key: str) -> str:

@@ -122,9 +122,11 @@
       }
       context.restore();
       const unit = `${panel.against ? "difference, " : ""}${now.quantity.unit}`;
-      const ends = [digits(low), digits(high), unit];
+      const least = `${field.some((value) => value < low) ? "≤ " : ""}${digits(low)}`;
+      const most = `${field.some((value) => value > high) ? "≥ " : ""}${digits(high)}`;
+      const ends = [least, most, unit];
       colourBar(context, [number * each + 8, height()], Math.min(0.5 * each, 260), colours, ends);
-      return { panel, at, places, field, marks };
+      return { panel, at, places, field, marks, ends };
     });
     return scaleBar(context, [width - 8, height()], look.scale, 0.15 * each);
   }

@@ -29,7 +29,7 @@ UNITS = {
 TITLES = {
     name: rf"(?:(?:nominal|engineering|eng\.?|tensile|axial)[\s_]+)*{word}[\s_/,]*(?:in\s+)?"
     rf"[(\[]?\s*(?P<unit>|{'|'.join(map(re.escape, UNITS[name]))})\s*[)\]]?"
-    for name, word in (("strain", "(?:strain|dehnung)"), ("stress_MPa", "(?:stress|spannung)"))
+    for name, word in (("strain", "(?:strain|dehnung|ε)"), ("stress_MPa", "(?:stress|spannung|σ)"))
 }
 """Titles of the columns, in English and German; those of true strain and stress are none."""
 MOST_RATIO = 10.0

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from pinnray.geometry.drawing.drawn_finger import finger_from
@@ -33,9 +34,7 @@ def write_designs(job: StudyJob[Question], task: Task, path: Path) -> Path:
     """
     changed = changed_parameters(job, task)
     problem = path.parent.with_name(PROBLEMS) / path.name
-    remark = (
-        f"# The shape alone; with load, material and solver: {COMMAND.format(f'{PROBLEMS}/{problem.name}')}"
-    )
+    remark = f"# The shape alone; with load, material and solver: {COMMAND.format(quote(str(problem)))}"
     lines = [f"{name} = {json.dumps(value)}" for name, value in changed.items()]
     write_text(path, "\n".join([remark, *lines]) + "\n")
     options = problem_options(job, task)

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from pinnray.runtime.tables import TextTable
 from pinnray.solvers.finger_figures import QUANTITIES, heading
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import solved, with_law
-from pinnray.studies.optimum.designs import COMMAND, write_designs
+from pinnray.studies.optimum.designs import COMMAND, PROBLEMS, write_designs
 from pinnray.studies.optimum.pictures import draw_front, draw_front_fingers
 from pinnray.studies.optimum.question import Question
 from pinnray.studies.optimum.search import Optimum
@@ -64,17 +65,17 @@ def write_front(
     shown = spread(optimum)
     solutions = {run: _solved(tasks[run]) for run in shown}
     drawn = {
-        "front": (draw_front(optimum, shown), "The objectives of every run, with the Pareto front."),
+        "front": (draw_front(optimum, shown), "Every run, with the fingers of the table."),
         "fingers": (
             draw_front_fingers(optimum, solutions),
-            "Fingers on the front at rest and under the load, numbered as in the table."
+            "Fingers of the table at rest and under the load, by their numbers."
             f"{CIRCLE if any(each.problem.load.radius for each in solutions.values()) else ''}",
         ),
     }
     pages = write_page(
         folder / PAGE,
-        f"Front of {optimum.study.name}",
-        front_sentences(optimum),
+        f"{optimum.study.heading}: {optimum.study.name}",
+        front_sentences(optimum, folder),
         [*page_tables(optimum), failure_grid(optimum)],
         drawn,
         f"{FILES}. Started {record['started']}.",
@@ -83,27 +84,31 @@ def write_front(
     return [*pages, folder / "front.csv"], designs
 
 
-def front_sentences(optimum: Optimum) -> list[str]:
-    """The search in sentences."""
+def front_sentences(optimum: Optimum, folder: Path) -> list[str]:
+    """The search in sentences, and the command that solves the first finger in its folder."""
     question = optimum.study
-    senses = " and ".join(f"{sense} {name}" for name, sense in question.objectives.items())
     limits = []
     for name, limit in question.constraints.items():
         bounds = (("at least", limit.at_least), ("at most", limit.at_most))
         words = " and ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
         limits.append(f"{name} {words} {QUANTITIES[name].unit}".rstrip())
-    load = [name for name in question.fixed if name in ("load", "stroke", "radius", "law")]
+    load = [name for name in question.fixed if name in ("load", "stroke", "radius", "friction", "law")]
     said = ", ".join(f"{name} = {question.fixed[name]}" for name in load)
     allowed = f", with {', '.join(limits)}" if limits else ""
     crossed = sum(each.through_itself for each in optimum.measurements)
     itself = f" {crossed} runs do not count: the finger goes through itself." if crossed else ""
+    best = (
+        "in the table, the best one first"
+        if question.single
+        else "on the front: none of them is beaten in every objective by another run"
+    )
+    command = COMMAND.format(quote(str(folder / PROBLEMS / "01.toml")))
     return [
-        f"Wanted: {senses}{allowed}. {len(optimum.front)} of {len(optimum.measurements)} runs of "
-        f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are on the "
-        f"front: none of them is beaten in every objective by another run.{itself} "
-        "An emulator proposed fingers; all numbers here are the solver's.",
+        f"Wanted: {question.wanted}{allowed}. {len(optimum.front)} of {len(optimum.measurements)} runs of "
+        f"{question.solver} ({said + ', ' if said else ''}elements of {question.mesh_size:g} mm) are {best}."
+        f"{itself} An emulator proposed fingers; all numbers here are the solver's.",
         "front/01.toml is the shape of the first finger of the table, for `pinnray design`. "
-        f"`{COMMAND.format('problems/01.toml')}` solves it with load, material and solver of this search.",
+        f"`{command}` solves it with load, material and solver of this search.",
     ]
 
 
@@ -128,7 +133,7 @@ def page_tables(optimum: Optimum) -> list[TextTable]:
     table = front_table(optimum).rename(columns=_in_lines)
     split = 2 + len(optimum.study.names) + len(optimum.study.varied)
     return [
-        text_table("Fingers on the front", table.iloc[:, :split]),
+        text_table(optimum.study.heading, table.iloc[:, :split]),
         text_table("Their other quantities", table.iloc[:, [0, *range(split, len(table.columns))]]),
     ]
 

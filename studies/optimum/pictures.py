@@ -14,35 +14,44 @@ from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.problem import Problem, contact_ends, front_points
 from pinnray.solvers.solution import Solution
 from pinnray.studies.optimum.search import Optimum, is_allowed
+from pinnray.studies.sweep.measurement import Measurement
 
 BLUE = "#0072b2"
 
+RUN = "run"
+"""Stands for a quantity where the number of a run is meant."""
+
 
 def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
-    """Draw the first two objectives of every run; those on the front are filled, the shown ones numbered."""
-    first, second, *third = optimum.study.objectives
+    """Draw every run over two quantities; the best are filled, the shown ones numbered, limits are dashed.
+
+    The first two objectives; or one over the first quantity with a limit, or over the runs.
+    """
+    question = optimum.study
+    limited = (name for name in question.constraints if name not in question.objectives)
+    across = [next(limited, RUN)] if question.single else []
+    first, second, *third = [*across, *question.objectives]
     with figure(3.9) as drawn:
-        senses = ", ".join(f"{sense} {name}" for name, sense in optimum.study.objectives.items())
-        solver = optimum.study.solver
         rest = f"the third objective, {third[0]}, is not drawn" if third else "every point is a run"
-        note = f"{len(optimum.measurements)} runs of {solver}; {rest}"
-        write_heading(drawn, f"Pareto front: {senses}", note)
+        note = f"{len(optimum.measurements)} runs of {question.solver}; {rest}"
+        write_heading(drawn, f"{question.heading}: {question.wanted}", note)
         axes = axes_at(drawn, (0.7, 0.55, WIDTH - 0.9, 2.75))
         others = [each for each in optimum.measurements if each.number not in optimum.front and each.values]
         allowed = np.array([is_allowed(optimum.study, each) for each in others], dtype=bool)
-        points = np.array([[each.values[name] for name in (first, second)] for each in others]).reshape(-1, 2)
+        points = np.array([_place(each, first, second) for each in others]).reshape(-1, 2)
         axes.plot(*points[allowed].T, "o", ms=3.5, mfc="none", c=MUTED, label="other runs")
         if not allowed.all():
             axes.plot(*points[~allowed].T, "x", ms=3.5, c=MUTED, label="impossible or against a constraint")
-        on_front = [optimum.measurements[run].values for run in optimum.front]
-        best = np.array([[values[name] for name in (first, second)] for values in on_front])
-        axes.plot(*best.T, "-" if not third else "", color=BLUE, lw=0.8)
-        axes.scatter(best[:, 0], best[:, 1], s=18, color=BLUE, zorder=3, label="front")
+        best = np.array([_place(optimum.measurements[run], first, second) for run in optimum.front])
+        axes.plot(*best.T, "-" if len(question.objectives) == 2 else "", color=BLUE, lw=0.8)
+        axes.scatter(best[:, 0], best[:, 1], s=18, color=BLUE, zorder=3, label=question.heading.lower())
+        for name, line in ((first, axes.axvline), (second, axes.axhline)):
+            for end in question.constraints[name].ends if name in question.constraints else ():
+                line(end, color=MUTED, lw=0.8, ls="--")
         for run in shown:
-            values = optimum.measurements[run].values
             axes.annotate(
                 str(optimum.place(run)),
-                (values[first], values[second]),
+                _place(optimum.measurements[run], first, second),
                 xytext=(5, 4),
                 textcoords="offset points",
                 color=CONTACT,
@@ -74,7 +83,11 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
     width = (WIDTH - 0.3) / columns - 0.1
     height = width * extent.height / extent.width
     with figure(0.55 + -(-len(meshes) // columns) * (height + label)) as drawn:
-        write_heading(drawn, "Fingers on the front", "grey: at rest; black: under the load; all to one scale")
+        write_heading(
+            drawn,
+            optimum.study.heading,
+            "grey: at rest; black: under the load; all to one scale",
+        )
         for place, (run, mesh) in enumerate(meshes.items()):
             row, column = divmod(place, columns)
             box = (0.1 + column * (width + 0.2), 0.5 + row * (height + label) + label, width, height)
@@ -100,8 +113,14 @@ def cylinder_at_end(problem: Problem) -> Circle | None:
     return Circle((centre[0], centre[1]), problem.load.radius, fill=False, color=CONTACT, lw=0.8)
 
 
+def _place(run: Measurement, first: str, second: str) -> tuple[float, float]:
+    """The place of a run in the picture."""
+    values = {RUN: run.number, **run.values}
+    return values[first], values[second]
+
+
 def _axis(name: str) -> str:
-    unit = _unit(name)
+    unit = "" if name == RUN else _unit(name)
     return f"{name}, {unit}" if unit else name
 
 

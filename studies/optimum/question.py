@@ -1,6 +1,7 @@
 """Objectives and constraints of an optimisation, as its file describes them."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Literal, Self, TypeVar, cast
 
 import numpy as np
@@ -9,7 +10,7 @@ from pydantic import Field, model_validator
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.finger_figures import QUANTITIES
-from pinnray.studies.sweep.study import Study
+from pinnray.studies.sweep.study import Study, Value
 
 Sense = Literal["least", "largest"]
 V = TypeVar("V", float, FloatArray)
@@ -19,6 +20,12 @@ ENOUGH = 12
 
 FEWEST = 20
 """Smallest number of solver runs: those samples, and a few proposals."""
+
+GRIP: Mapping[str, Value] = MappingProxyType({"load": "cylinder", "friction": 0.5})
+"""Load of a question with one objective: it asks for the best gripper, and an object has friction."""
+
+NONLINEAR = "fem-nonlinear"
+"""The solver that has this load."""
 
 
 class Limit(CheckedModel):
@@ -38,6 +45,11 @@ class Limit(CheckedModel):
             raise ValueError("give at_least, at_most or both")
         return self
 
+    @property
+    def ends(self) -> list[float]:
+        """The limits that there are."""
+        return [end for end in (self.at_least, self.at_most) if end is not None]
+
     def excess(self, value: V) -> V:
         """How far a value, or each of an array, is beyond the limits; negative or zero within them."""
         low = -np.inf if self.at_least is None else self.at_least
@@ -49,12 +61,13 @@ class Question(Study):
     """A study with objectives and constraints; its samples are those that the search starts from.
 
     Attributes:
-        objectives: Two or three quantities, each to be the least or the largest.
+        objectives: One to three quantities, each to be the least or the largest. With one, and no load named,
+            the finger grips a cylinder with friction; see `GRIP`.
         constraints: Limits of quantities.
         runs: Number of runs of the solver.
     """
 
-    objectives: dict[str, Sense] = Field(min_length=2, max_length=3)
+    objectives: dict[str, Sense] = Field(default_factory=dict)
     constraints: dict[str, Limit] = Field(default_factory=dict)
     runs: int = bounded(120, FEWEST, 100_000, "", "", "Number of runs of the solver")
 
@@ -65,16 +78,45 @@ class Question(Study):
             return values
         if said := [name for name in ("sampling", "samples") if name in values]:
             raise ValueError(f"{said[0]} belongs to a study; the search chooses its samples: give runs")
+        objectives, fixed, varied = (
+            each if isinstance(each := values.get(name), Mapping) else {}
+            for name in ("objectives", "fixed", "varied")
+        )
+        usual: dict[str, object] = {}
+        free = "load" not in {*fixed, *varied} and values.get("solver", NONLINEAR) == NONLINEAR
+        if free and len(objectives) == 1:
+            own = {name: value for name, value in GRIP.items() if name not in varied}
+            usual = {"solver": NONLINEAR, "fixed": {**own, **fixed}}
         runs = values.get("runs", cls.model_fields["runs"].default)
         start = max(runs // 3, ENOUGH) if isinstance(runs, int) else ENOUGH
-        return {**values, "sampling": "sobol", "samples": start}
+        return {**values, **usual, "sampling": "sobol", "samples": start}
 
     @model_validator(mode="after")
     def _known(self) -> Self:
+        if not 1 <= len(self.objectives) <= 3:
+            raise ValueError(
+                f'objectives: give one, two or three quantities, such as force = "largest", not '
+                f"{len(self.objectives)}"
+            )
         for name in (*self.objectives, *self.constraints):
             if name not in QUANTITIES:
                 raise ValueError(f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}")
         return self
+
+    @property
+    def wanted(self) -> str:
+        """The objectives in words."""
+        return " and ".join(f"{sense} {name}" for name, sense in self.objectives.items())
+
+    @property
+    def single(self) -> bool:
+        """Whether there is one objective, so that fingers have an order in place of a front."""
+        return len(self.objectives) == 1
+
+    @property
+    def heading(self) -> str:
+        """The heading of its fingers."""
+        return "Best fingers" if self.single else "Fingers on the front"
 
     @property
     def names(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""The search for a Pareto front: rounds of an emulator's proposals, each judged by the solver."""
+"""The search for the best fingers: rounds of an emulator's proposals, each judged by the solver."""
 
 from dataclasses import dataclass
 
@@ -27,6 +27,9 @@ from pinnray.studies.sweep.sweep import Sweep, finish
 
 QUESTION_FILE, FINGERS_FILE = "question.json", "fingers.json"
 
+BEST = 6
+"""Fingers that a search with one objective gives: the next ones may be easier to print."""
+
 ROUNDS = 8
 """Rounds of proposals."""
 
@@ -40,7 +43,8 @@ class Optimum(Sweep):
 
     Attributes:
         study: The question.
-        front: Numbers of the runs on the Pareto front, ordered by the first objective.
+        front: Numbers of the runs on the Pareto front, ordered by the first objective; of one objective those
+            of the few best, the best one first.
     """
 
     study: Question
@@ -167,7 +171,10 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
             "constraint, widen the ranges or take a smaller stroke"
         )
     costs = np.array([question.costs(each.values) for each in allowed])
-    on_front = [each.number for each, best in zip(allowed, unbeaten(costs), strict=True) if best]
     first = next(iter(question.objectives))
-    on_front.sort(key=lambda number: measured[number].values[first])
+    if question.single:
+        on_front = [allowed[place].number for place in np.argsort(costs[:, 0], kind="stable")[:BEST]]
+    else:
+        on_front = [each.number for each, best in zip(allowed, unbeaten(costs), strict=True) if best]
+        on_front.sort(key=lambda number: measured[number].values[first])
     return Optimum(question, fingers, measured, on_front)

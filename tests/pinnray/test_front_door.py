@@ -76,6 +76,27 @@ def test_measurements_can_be_a_data_frame_and_a_solver_an_object():
     assert not compared.observations.simulated
 
 
+class Raising(FemSolver):
+    """A solver with a fault."""
+
+    name = "raising"
+
+    def solve(self, problem, progress=None):
+        raise ZeroDivisionError("by nothing")
+
+
+def test_a_solver_that_raises_has_a_warning_a_row_and_a_traceback():
+    with pytest.warns(UserWarning, match="solver raising raised ZeroDivisionError: by nothing"):
+        compared = pr.compare("default", ["fem", Raising()], size=2.0)
+    row = compared.table().loc["raising"]
+    assert not row["converged"]
+    assert np.isnan(row["energy_N_mm_per_mm"])
+    assert row["status"] == compared.failed["raising"]
+    assert 'raise ZeroDivisionError("by nothing")' in compared.tracebacks["raising"]
+    with pytest.raises(pr.UserError, match="solver raising raised ZeroDivisionError"):
+        compared["raising"]
+
+
 def test_a_design_or_a_problem_is_solved_and_shows_itself():
     mesh = pr.mesh("default", **COARSE)
     solution = pr.solve(pr.Problem(mesh), pr.solver("fem"))

@@ -175,6 +175,22 @@ def test_a_point_that_is_missing_in_one_picture_is_left_out_and_named(where, bla
     np.testing.assert_allclose(result.observations.displacements[seen], MOVED[seen], atol=1e-9)
 
 
+def test_lists_that_lack_different_points_are_refused_unless_they_are_numbered():
+    numbers, lists = np.arange(1, 10), []
+    for places, missing in ((MARKERS, 3), (MARKERS + MOVED, 7)):
+        kept = numbers != missing
+        lists.append(Clicks(picture(places, 0.2).places[kept], None, tuple(numbers[kept].tolist())))
+    result = found(*lists)
+    assert result.observations.visible.tolist() == [n not in (3, 7) for n in numbers]
+    with pytest.raises(UserError, match="number them in a column point"):
+        found(*(Clicks(each.places, None) for each in lists))
+
+
+def test_lists_that_are_exchanged_are_told():
+    (remark,) = found(picture(MARKERS + MOVED, 0.2), picture(MARKERS, 0.2)).remarks
+    assert "nearer to the drawing than those at rest: exchanged?" in remark
+
+
 def test_a_row_without_numbers_is_a_missing_point_and_german_excel_is_read(tmp_path):
     path = tmp_path / "clicks.csv"
     path.write_text("\ufeffx;y\n1,5;2\nnan;nan\n3;4,25\n5;6\n", encoding="utf-8")

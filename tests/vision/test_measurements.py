@@ -119,7 +119,8 @@ def test_a_line_break_within_quotation_marks_ends_no_row(tmp_path, content, end)
 
 
 @pytest.mark.parametrize(
-    ("seen", "hidden"), [("True", "False"), ("TRUE", "FALSE"), ("yes", "No"), ("1.0", "0.0"), ("1", "0")]
+    ("seen", "hidden"),
+    [("True", "False"), ("TRUE", "FALSE"), ("yes", "No"), ("1.0", "0.0"), ("1", "0"), ("WAHR", "FALSCH")],
 )
 @pytest.mark.parametrize("cell", ["", "nan", "-", "3.5"])
 def test_what_stands_at_an_unseen_marker_is_not_read(tmp_path, seen, hidden, cell):
@@ -135,6 +136,19 @@ def test_a_marker_without_displacement_was_not_seen(tmp_path, cell):
     found = read(tmp_path, f"{HEADER},std_u_mm\n1,2,3,4,0.1\n5,6,{cell},{cell},{cell}\n")
     assert found.visible.tolist() == [True, False]
     assert found.displacements.tolist() == [[3, 4], [0, 0]]
+
+
+def test_a_german_spreadsheet_may_save_the_file(tmp_path):
+    """Semicolons between the cells, and decimal commas, also in a file of the rig's."""
+    path = tmp_path / "markers.csv"
+    written = observations(source="fem; finite strain", simulated=True)
+    write_measurements(path, written)
+    lines = path.read_text().splitlines()
+    saved = [lines[0] + ";" * 7, f'"{lines[1]}"' + ";" * 7, *lines[2:]]
+    saved[2:] = [line.replace(",", ";").replace(".", ",") for line in saved[2:]]
+    back = read(tmp_path, "\ufeff" + "\r\n".join(saved))
+    np.testing.assert_array_equal(back.displacements, written.displacements)
+    assert (back.source, back.simulated) == ("fem; finite strain", True)
 
 
 def test_comments_and_blank_lines_may_stand_anywhere(tmp_path):

@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.runtime.errors import UserError
 from pinnray.vision.discs.colour import DARK, Colour
 from pinnray.vision.frames.frame import Image
 
@@ -37,19 +36,14 @@ def propose_circles(
     Args:
         image: Shape (h, w) or (h, w, 3).
         colour: Of the markers.
-        radii: Least and largest radius, pixels.
+        radii: Least and largest radius, above 0, pixels.
         window: Part of the image to search, clipped to the image; all of it if not given.
 
     Returns:
         x, y and radius of every circle, the most disc-like first, shape (n, 3), pixels. The centres lie
         halfway between pixels, the resolution of OpenCV's accumulator.
-
-    Raises:
-        UserError: If the radii are not 0 < least <= largest.
     """
     least, largest = radii
-    if not 0 < least <= largest < np.inf:
-        raise UserError(f"radii from {least:g} to {largest:g} pixels; they must go from above 0 upwards")
     height, width = image.shape[:2]
     x0, y0, x1, y1 = window or (0, 0, width, height)
     x0, y0 = max(x0, 0), max(y0, 0)

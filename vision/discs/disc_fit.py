@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, frozen_array
-from pinnray.runtime.errors import UserError
 from pinnray.vision.discs import disc_image_model as model
 from pinnray.vision.discs.fit_priors import Known
 from pinnray.vision.discs.fit_stages import fit_discs_of_one_size
@@ -73,18 +72,11 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
         agrees with enough of the edge.
 
     Raises:
-        UserError: If the image is not grey in eight bits, or a radius is not above zero.
         ShapeError: If the guesses or radii have another shape.
     """
     guesses = frozen_array(guesses, dtype=np.float64, shape=(None, 3), name="guesses")
-    if grey.ndim != 2 or grey.dtype != np.uint8:
-        raise UserError(
-            f"discs are fitted in grey images of eight bits; this one is {grey.dtype} {grey.shape}"
-        )
     sizes = np.broadcast_to(guesses[:, 2] if radii is None else radii, (len(guesses),))
     sizes = frozen_array(sizes, dtype=np.float64, shape=(None,), name="radii")
-    if not (guesses[:, 2] > 0).all() or not (sizes > 0).all():
-        raise UserError("the radius of a disc must be above zero")
     fit = DiscFit.start(np.zeros((len(guesses), model.WIDTH)), np.zeros((len(guesses), 2), dtype=np.int64))
     known = Known.of(len(guesses), np.inf if radii is None else KNOWN_RADIUS)
     _fit(fit, grey, guesses, sizes, known, np.ones(len(guesses), dtype=bool))

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtri
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
@@ -17,6 +18,8 @@ STEADY = 2.0
 """Fiducial shift, in standard deviations, below which the camera counts as static."""
 UNKNOWNS = 6
 """Parameters of a pose."""
+EXCESS = 0.05
+"""Probability with which noise leaves more of the fiducials' motion than counts as noise."""
 
 
 class CameraMotion(NamedTuple):
@@ -28,12 +31,17 @@ class CameraMotion(NamedTuple):
             in a row.
         deviation: Standard deviation of a coordinate that is corrected by planes without a camera, pixels.
         poses: Covariances of the camera's poses at both ends, by the fiducials' noise; none without a camera.
+        enlargement: Scale of the picture at the end over that at the start, less one.
+        remains: Root mean square of what the planes leave of the fiducials' motion, beyond noise, pixels: a
+            lens whose zoom or focus changed is not undone by another pose.
     """
 
     shift: float
     planes: tuple[MarkerPlane, MarkerPlane] | None
     deviation: float = 0.0
     poses: tuple[FloatArray, ...] = ()
+    enlargement: float = 0.0
+    remains: float = 0.0
 
     def undone(self, final: DiscDetections) -> DiscDetections:
         """Discs at the end, mapped to where a static camera would have seen them."""
@@ -43,7 +51,8 @@ class CameraMotion(NamedTuple):
         centres, known = final.centres.copy(), np.isfinite(final.radii)
         points = end.points(centres[known])
         centres[known] = start.pixels(points)
-        covariances = final.covariances + (0.0 if self.poses else self.deviation**2) * np.eye(2)
+        by_planes = 0.0 if self.poses else self.deviation**2
+        covariances = final.covariances + (by_planes + self.remains**2) * np.eye(2)
         for plane, pose in zip(self.planes, self.poses, strict=False):
             # At another height than the fiducials' a wrong tilt moves the markers farther.
             by_pose = plane.projection.jacobians(points, plane.parameters).parameters[:, :, :6]
@@ -81,4 +90,15 @@ def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDe
         for plane, fiducials in ((start, before), (end, after))
     ]
     known = tuple(pose for pose in poses if pose is not None)
-    return CameraMotion(shift, (start, end), noise * np.sqrt(UNKNOWNS / (2 * count)), known)
+    deviation = noise * np.sqrt(UNKNOWNS / (2 * count))
+    larger = float((end.scales(points) / start.scales(points)).mean()) - 1
+    away = [
+        plane.on_sheet.circles(fiducials.centres[common], scene.workspace.fiducial_diameter / 2)
+        for plane, fiducials in ((start, before), (end, after))
+    ]
+    left = (away[1] - away[0]) * end.scales(points)[:, None]
+    freedom = 2 * count - (UNKNOWNS if known else len(end.parameters))
+    squares = float((left**2 / variances).sum())
+    chance = freedom < 1 or squares < chdtri(freedom, EXCESS)
+    remains = 0.0 if chance else noise * np.sqrt(squares / freedom - 1)
+    return CameraMotion(shift, (start, end), deviation, known, larger, remains)

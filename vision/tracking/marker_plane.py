@@ -60,6 +60,13 @@ class MarkerPlane:
     residual: float
     bending: float = 0.0
 
+    @property
+    def on_sheet(self) -> "MarkerPlane":
+        """The plane of the fiducials, which the markers of a camera may be above."""
+        if not isinstance(self.projection, CameraProjection):
+            return self
+        return replace(self, projection=replace(self.projection, height=0.0))
+
     def points(self, pixels: FloatArray) -> FloatArray:
         """Points of the plane at pixels; shapes (n, 2), mm."""
         return self.projection.points(pixels, self.parameters)

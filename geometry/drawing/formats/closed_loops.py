@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Mark, Scale, place
+from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Mark, MarkerSize, Scale, place
 from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, joined
 from pinnray.geometry.drawing.formats.pieces import Piece
 from pinnray.geometry.section.loop import STRAIGHT, Loop
@@ -44,16 +44,11 @@ def assembled(
         facts: Further attributes of the drawing.
 
     Raises:
-        UserError: If a curve does not close, the markers differ in diameter, or one is no circle.
+        UserError: If a curve does not close, or a marker is no circle.
     """
     check_extent(pieces, scale)  # in a wrong unit no marker would be a circle
     discs = _discs([piece for piece in pieces if piece.label == "markers"])
-    diameters = [diameter for _, diameter in discs]
-    if diameters and np.ptp(diameters) > 0.01 * max(diameters):
-        raise UserError(
-            f"the markers have diameters from {min(diameters):.4g} to {max(diameters):.4g} mm; "
-            "give all the same"
-        )
+    size = MarkerSize.of(np.array([diameter for _, diameter in discs]))
     contacts = [mark.centre for mark in marks if mark.label == "contact"]
     if len(contacts) > 1:
         raise UserError(f"two points are called contact, {place(contacts[0])} and {place(contacts[1])}")
@@ -62,9 +57,9 @@ def assembled(
     points = [mark.centre for mark in marks if mark.label == "markers"]
     return Drawing(
         loops=closed.loops,
-        note=note + closed.note,
+        note=note + closed.note + size.note,
         markers=np.array([*points, *(centre for centre, _ in discs)]).reshape(-1, 2),
-        marker_diameter=float(np.mean(diameters)) if diameters else None,
+        marker_diameter=size.diameter,
         contact=contacts[0] if contacts else None,
         **facts,
     )

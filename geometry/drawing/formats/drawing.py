@@ -65,6 +65,23 @@ class Drawing:
     sha256: str = ""  # of the content, in hexadecimal
 
 
+class MarkerSize(NamedTuple):
+    """Diameter of all markers, mm, and what a note says of those that are larger."""
+
+    diameter: float | None
+    note: str = ""
+
+    @classmethod
+    def of(cls, diameters: FloatArray) -> "MarkerSize":
+        """The mean of equal diameters (m,), mm, or the least of others: means over discs hardly differ."""
+        if not len(diameters):
+            return cls(None)
+        low, high = float(diameters.min()), float(diameters.max())
+        if high - low <= 0.01 * high:
+            return cls(float(diameters.mean()))
+        return cls(low, f", markers of {low:.4g} to {high:.4g} mm taken as of {low:.4g} mm")
+
+
 def label_of(text: str) -> str:
     """A label in lower case, without the number that Fusion adds to names, as in `clamp:2`."""
     return re.sub(r":\d+$", "", text.strip().lower())

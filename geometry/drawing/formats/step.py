@@ -12,7 +12,7 @@ import cadquery as cq
 import numpy as np
 
 from pinnray.geometry.drawing.formats.closed_loops import closed_loops
-from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Scale
+from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, MarkerSize, Scale
 from pinnray.geometry.drawing.formats.pieces import Piece, arcs_along, line
 from pinnray.geometry.drawing.formats.planes import axes_across, plane_of, plane_text
 from pinnray.geometry.drawing.formats.step_parts import parts_of
@@ -101,16 +101,16 @@ def read_step(
         for piece in _pieces(edge, unit)
     ]
     discs = np.array([_disc(marker.moved(cut.frame.inverse)) for marker in markers]).reshape(-1, 4) * unit
-    depth = f"{cut.depth * unit:.6g} mm"
+    size, depth = MarkerSize.of(discs[:, 2]), f"{cut.depth * unit:.6g} mm"
     how = f"extruded by {depth}" if apart <= SAME else f"cut, {depth} across"
     how += f" but for {100 * apart:.2g} % of the volume" if 1e-6 < apart <= SAME else ""
     closed = closed_loops(pieces, scale=scale, tolerance=tolerance)
     return Drawing(
         loops=closed.loops,
         unit=unit,
-        note=f"STEP, {how}, at {cut.plane}{closed.note}",
+        note=f"STEP, {how}, at {cut.plane}{closed.note}{size.note}",
         markers=discs[:, :2],
-        marker_diameter=float(discs[:, 2].mean()) if markers else None,
+        marker_diameter=size.diameter,
         marker_height=float(discs[:, 3].mean()) if markers else None,
         depth=cut.depth * unit,
     )
@@ -147,9 +147,8 @@ def _across(solid: cq.Solid) -> tuple[cq.Shape, Cut]:
             if abs(sum(face.Area() for face in cap) - cut.area) < 1e-7 * cut.area:
                 cut = cut._replace(faces=cap, offset=offset)
                 break
-        if _apart(turned, cut) <= SAME:
-            return turned, cut
-        found.append((round(abs(layer.volume / solid.Volume() - 1), 1), turned, cut))
+        apart, shown = _apart(turned, cut), abs(layer.volume / solid.Volume() - 1)
+        found.append((round(apart, 7) if apart <= SAME else 1 + round(shown, 1), turned, cut))
     if not found:
         raise UserError('the solid has no flat face; give depth, and the plane, such as plane = "z = 6"')
     _, turned, cut = min(found, key=lambda each: each[0])

@@ -12,10 +12,10 @@ def command(
     *,
     options: StudyOptions = StudyOptions(),
 ) -> int:
-    """Find the fingers that no other finger beats: the Pareto front of two or three quantities.
+    """Find the fingers that no other finger beats: the best ones by a quantity, or the front of two or three.
 
-    An emulator proposes fingers and the solver judges each of them. Writes the front as a table, a design
-    file for each finger on it, and a page with pictures. Each run is kept: the same command again goes on
+    An emulator proposes fingers and the solver judges each of them. Writes the fingers as a table, a design
+    file for each of them, and a page with pictures. Each run is kept: the same command again goes on
     where it was stopped.
 
     Args:
@@ -35,7 +35,7 @@ def command(
         with stages.stage("pictures"):
             paths, designs = write_front(found, job, job.out, stages.record(), formats)
     columns = [0, *range(2, 2 + len(read.objectives))]  # the table in the file is too wide for a terminal
-    shown = text_table("Fingers on the front", front_table(found).iloc[:, columns])
+    shown = text_table(read.heading, front_table(found).iloc[:, columns])
     Console().print(terminal_table(shown.title, shown.headings, shown.rows))
     for path in [*paths, designs[0], designs[-1]]:
         print(path)

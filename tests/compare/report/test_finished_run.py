@@ -21,7 +21,13 @@ Save = Callable[..., Path]
 def folder(compared, estimated, evaluate, finished, tmp_path) -> Path:
     """A run with a truth, a found force and its place, and figures."""
     given = evaluate("fem-asm", 1.02)
-    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(36.0, 35.0, 37.5))
+    force = IdentifiedForce(
+        Estimated(0.5, 0.4, 0.8),
+        Estimated(36.0, 35.0, 37.5),
+        Estimated(0.45, 0.35, 0.7),
+        {"markers": 0.8, "contact": 0.2},
+        "80% of the variance of the force comes from the errors of the markers.",
+    )
     given = replace(given, in_sample=True, left_out=estimated.marker_displacement, identified=force)
     network = evaluate("pinn-asm", 1.01)
     network = replace(network, in_sample=True, left_out=estimated.marker_displacement, twin="fem-asm")
@@ -41,6 +47,7 @@ def test_a_run_gives_its_answers(folder: Path, capsys: pytest.CaptureFixture[str
     said = capsys.readouterr().out
     assert "May the network be trusted here?\n  Yes, as a solver" in said
     assert "gp was left out: too slow." in said
+    assert re.search(r"finds a force of 0\.5.* 80% of the variance of the force comes from the errors", said)
     assert said.endswith(f"report: {folder / 'report.html'}\n")
     assert [path.name for path in folder.iterdir()] == ["metrics.json"]
 

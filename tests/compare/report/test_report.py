@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+import yaml  # type: ignore[import-untyped]
 from PIL import Image
 
 from pinnray.comparison.evaluation.certifier import with_certificates
@@ -18,6 +19,7 @@ from pinnray.runtime.tables import percent
 from pinnray.solvers.fem.adaptive_refinement import Adaptation, RefinementRound
 from pinnray.solvers.problem import Load, Problem
 
+ROOT = Path(__file__).parents[3]
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 
 
@@ -213,3 +215,21 @@ def test_type_stands_out_from_what_it_stands_on(html, number) -> None:
     for first, second, least in pairs:
         low, high = sorted(_luminance(colours[name]) for name in (first, second))
         assert (high + 0.05) / (low + 0.05) >= least, (first, second)
+
+
+def test_the_report_can_be_cited_as_the_citation_file_says(content: Results) -> None:
+    """The same title, version, years and paper."""
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    text = report_html(content, [], {})
+    bibtex = text[text.index("@software") : text.index("</pre>")]
+    plain = " ".join(bibtex.replace("{", "").replace("}", "").split())
+    paper = cited["references"][0]
+    assert f"title = {cited['title']}," in plain
+    assert f"version = {cited['version']}," in plain
+    assert f"year = {str(cited['date-released'])[:4]}" in plain
+    assert f"author = {cited['authors'][0]['name']}," in plain
+    assert f"title = {paper['title']}," in plain
+    assert f"year = {paper['year']}," in plain
+    assert " and ".join(each["name"] for each in paper["authors"]) in plain
+    assert paper["url"].endswith("2407.08222")
+    assert bibtex.count("{") == bibtex.count("}")

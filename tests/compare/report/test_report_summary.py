@@ -10,6 +10,7 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.report.summary import RunAnswer, answers
 from pinnray.geometry.observations import Observations
+from pinnray.solvers.finger_figures import FingerFigures
 
 TRUST, MARKERS = "May the network be trusted here?", "Did the markers help?"
 CONVERGED = "What is not converged?"
@@ -67,3 +68,20 @@ def test_stress_and_force_are_answered_where_they_are_known(compared, fem, given
     answer = asked(compared(fem, stronger, truth=evaluate("fem-nonlinear", 1.5)))[MARKERS]
     assert answer.verdict.endswith("in displacement fem-asm, in von Mises stress fem-asm, in force none.")
     assert "simulated body" in answer.verdict
+
+
+def test_the_first_answer_is_by_the_solver_nearest_to_the_truth_and_says_how_far_its_force_is(
+    compared, fem, evaluate
+):
+    """`fem` is 1 / 1.5 of the truth; the other one is as far in displacement as its force, and no worse."""
+    figures = FingerFigures(force=4.0, tip_u=0.3, tip_v=0.4, principal_strain=0.05)
+    plain, near = replace(fem, figures=figures), replace(evaluate("fem-id", 1.45), figures=figures)
+    truth = evaluate("fem-nonlinear", 1.5)
+    said = asked(compared(plain, near, truth=truth))["What does the finger do?"].verdict
+    assert said.replace("\N{NO-BREAK SPACE}", " ").startswith(
+        "By fem-id it grips with 4.00 N (−3.3 % off the simulated finger’s), its tip moves by 0.500 mm"
+    )
+    said = asked(compared(plain, truth=truth))["What does the finger do?"].verdict
+    assert "By fem it grips with 4.00 N (−33 % off" in said.replace("\N{NO-BREAK SPACE}", " ")
+    off = asked(compared(plain, replace(near, converged=False), truth=truth))
+    assert off["What does the finger do?"].verdict.startswith("By fem ")

@@ -106,6 +106,20 @@ def test_markers_and_contact_are_drawn_where_they_are(viewer: Page, pinn, mesh, 
     assert not (np.abs(shot(viewer) - (0xD1, 0x00, 0x6C)).max(axis=2) < 40).any()
 
 
+def test_the_colour_bar_says_where_values_go_beyond_its_ends(viewer: Page) -> None:
+    viewer.select_option("#viewer-quantity", label="Displacement magnitude")
+    for solver in ("fem", "pinn-std"):
+        viewer.select_option("#viewer-solver", label=solver)
+        viewer.wait_for_timeout(300)
+        shown = "pinnrayViewer.shown[0]"
+        high = viewer.evaluate("pinnrayFields.manifest.quantities[0].high")
+        most = viewer.evaluate(f"Math.max(...{shown}.field)")
+        least, end, _ = viewer.evaluate(f"{shown}.ends")
+        assert most > high
+        assert end.startswith("≥ ")
+        assert not least.startswith("≤")
+
+
 @pytest.mark.parametrize("key", ["0", "-"])
 def test_the_scale_bar_has_its_length(viewer: Page, mesh: TriangleMesh, key: str) -> None:
     """Beside the body at rest, which is as long as the mesh, at each zoom."""

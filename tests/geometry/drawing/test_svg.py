@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from pinnray.geometry.drawing.checks import body
-from pinnray.geometry.drawing.load import read_drawing
+from pinnray.geometry.drawing.description import Description
+from pinnray.geometry.drawing.load import finger_from_file, read_drawing
 from tests.geometry.drawing.files import write_svg
 
 BODY = '<rect width="60" height="10"/>'
@@ -101,3 +102,17 @@ def test_markers_of_curves_are_circles(tmp_path):
     drawing = read_drawing(path)
     assert drawing.markers == pytest.approx(np.array([[20, -5]]), abs=1e-3)
     assert drawing.marker_diameter == pytest.approx(1.6, rel=1e-3)
+
+
+def test_markers_of_different_sizes_count_as_the_least(tmp_path):
+    """Small ones in thin walls and larger ones in the tip."""
+    discs = "".join(
+        f'<circle cx="{x}" cy="{y}" r="{r}"/>' for x, y, r in ((9, 1, 0.4), (30, 4, 2), (50, 5, 1))
+    )
+    path = write_svg(tmp_path / "a.svg", f'{BODY}<g id="markers">{discs}</g>')
+    drawing = read_drawing(path)
+    assert drawing.marker_diameter == pytest.approx(0.8)
+    assert ", markers of 0.8 to 4 mm taken as of 0.8 mm" in drawing.note
+    finger = finger_from_file(path, Description(clamp=[[0, 0], [0, -10]], contact=[50, 0]))
+    assert len(finger.markers) == 3
+    assert finger.sources["marker_diameter"] == "drawn"

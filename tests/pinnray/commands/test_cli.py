@@ -47,10 +47,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_table_and_the_report_are_named(folder, capsys, without_pictures):
     assert compare_main([*SMALL[1:], "--measurements", "good.csv"]) == 0
     output = capsys.readouterr()
-    mae = json.loads(Path("out/default/metrics.json").read_text())["solvers"]["fem"]["markers"]["mae_u"]
+    mae = json.loads(Path("out/default-good/metrics.json").read_text())["solvers"]["fem"]["markers"]["mae_u"]
     row, _ = [line for line in output.out.splitlines() if line.startswith("  fem ")]
     assert f"{mae:.3f}" in row
-    assert Path("out/default/report.html").is_file()
+    assert Path("out/default-good/report.html").is_file()
     stages = [line.split(":")[0] for line in output.err.splitlines()]
     assert stages == [
         "mesh",
@@ -171,7 +171,7 @@ def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsy
     warnings = [line for line in output.err.splitlines() if line.startswith("warning: ")]
     assert len(warnings) == 3
     assert not any(line.startswith("gp:") for line in output.err.splitlines())
-    run = json.loads(Path("out/default/run.json").read_text())
+    run = json.loads(Path("out/default-good/run.json").read_text())
     assert (list(run["solvers"]), list(run["left_out"])) == (["fem"], ["fem-id", "fem-nonlinear", "gp"])
 
 
@@ -200,9 +200,26 @@ def test_an_interrupted_run_says_how_to_go_on(folder, capsys, monkeypatch, witho
         assert main(options) == INTERRUPTED
     output = capsys.readouterr()
     assert output == ("", "interrupted; what was finished is kept; --resume goes on from it\n")
-    assert not Path("out/default").exists()
+    assert not Path("out/default-good").exists()
     assert main([*options, "--resume"]) == 0
-    assert not Path("out/default.partial").exists()
+    assert not Path("out/default-good.partial").exists()
+
+
+def test_another_jobs_finished_run_is_not_replaced_without_being_asked(folder, capsys, without_pictures):
+    """By a folder of its own for measurements, by a refusal for other options; --out asks."""
+    again = ["compare", "--from", "out/default/run.json", "--quiet"]
+    assert main([*SMALL, "--quiet"]) == 0
+    before = Path("out/default/run.json").read_bytes()
+    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == 0
+    assert Path("out/default-good/run.json").is_file()
+    capsys.readouterr()
+    assert main([*SMALL, "--quiet", "--stroke", "5", "--seed", "1"]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "out/default holds the finished run of another job (other seed, stroke); give --out" in said
+    assert Path("out/default/run.json").read_bytes() == before
+    assert main([*again, "--design", "default", "--load", "mean"]) == 0  # as by default: the same job
+    assert main([*again, "--stroke", "5", "--out", "out/default"]) == 0
+    assert json.loads(Path("out/default/run.json").read_text())["options"]["stroke"] == 5.0
 
 
 def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, monkeypatch, without_pictures):
@@ -212,7 +229,17 @@ def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, mo
     assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == NOT_CONVERGED
     said = "error: fem did not converge: stopped at 40 % of the load; take smaller steps\n"
     assert capsys.readouterr() == ("", said)
-    assert Path("out/default/report.html").is_file()
+    assert Path("out/default-good/report.html").is_file()
+
+
+@pytest.mark.parametrize(("width", "mm"), [("85", 85), ("85mm", 85), ("18 cm", 180), ("3.35in", 85.09)])
+def test_a_width_has_a_unit_or_is_in_mm(folder, monkeypatch, width, mm):
+    found = []
+    monkeypatch.setattr(
+        "pinnray.comparison.pipeline.pipeline.draw_all", lambda *given: found.append(given[-1]) or []
+    )
+    assert main([*SMALL, "--quiet", "--width", width]) == 0
+    assert found == [pytest.approx(mm)]
 
 
 def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
@@ -325,7 +352,7 @@ def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder, monkeypatch, caps
     assert told["message"] == "solved directly"
     # The same elements as those of `fem`, assembled by another program: rounding.
     assert told["to_reference"]["rel_l2_displacement"] < 1e-8
-    assert Path("out/default/fields/skfem-p2.vtu").is_file()
+    assert Path("out/default-good/fields/skfem-p2.vtu").is_file()
 
 
 # Help

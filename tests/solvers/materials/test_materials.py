@@ -85,6 +85,7 @@ CURVE = [(0.02 * n, 0.2 * n) for n in range(1, 26)]
         ("Strain\tStress\n(mm/mm)\t(N/mm²)", 1, 1),  # units below
         ("Dehnung in %;Spannung in MPa", 100, 1),
         ("strain_ratio,stress_Pa", 1, 1e6),
+        ("ε / -;σ / kPa", 1, 1e3),
     ],
 )
 def test_titles_of_many_programs_are_known(tmp_path, titles, strain, stress):

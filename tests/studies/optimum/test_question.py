@@ -39,3 +39,22 @@ def test_costs_are_least_at_the_best(tmp_path: Path) -> None:
     arrays = {name: np.array([value, value]) for name, value in values.items()}
     np.testing.assert_allclose(question.costs(arrays), [[-20.0] * 2, [3.0] * 2])
     np.testing.assert_allclose(question.excesses(arrays), [[-0.5] * 2, [0.1] * 2])
+
+
+GRIPS = 'objectives = {force = "largest"}\n[varied]\nrib_thickness = {from = 0.6, to = 2.5}\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "solver", "fixed"),
+    [
+        (GRIPS, "fem-nonlinear", {"load": "cylinder", "friction": 0.5}),
+        (f"{GRIPS}[fixed]\nfriction = 0.2\n", "fem-nonlinear", {"load": "cylinder", "friction": 0.2}),
+        (f"{GRIPS}friction = {{from = 0, to = 1}}\n", "fem-nonlinear", {"load": "cylinder"}),
+        (f'{GRIPS}[fixed]\nload = "mean"\n', "fem", {"load": "mean"}),  # as it was asked
+        (f'solver = "fem"\n{GRIPS}', "fem", {}),  # which has no cylinder
+        (GOOD, "fem", {}),  # a front
+    ],
+)
+def test_the_best_gripper_grips_a_cylinder_with_friction(tmp_path, text, solver, fixed):
+    question = asked(tmp_path, text)
+    assert (question.solver, dict(question.fixed)) == (solver, fixed)

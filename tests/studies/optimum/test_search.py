@@ -1,10 +1,14 @@
 """The search on a law with a known front, its repetition, and the command on real fingers."""
 
+import html
+import re
+import shlex
 from collections.abc import Iterator, Mapping
 from json import loads
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pinnray.cli import main
@@ -83,6 +87,33 @@ def test_the_known_front_is_found(found: Optimum) -> None:
     assert all(each["von_mises"] <= 3.2 for each in values)
 
 
+def test_one_objective_with_limits_has_the_best_fingers_in_their_order(tmp_path, capsys, monkeypatch):
+    """Of this law the largest force is that of four ribs of 2.45 mm, at the limit of the stress."""
+    monkeypatch.setattr("pinnray.studies.optimum.search.finish", judge)
+    path = tmp_path / "grip.toml"
+    path.write_text(
+        'mesh_size = 4.0\nruns = 42\n[objectives]\nforce = "largest"\n[constraints]\n'
+        "von_mises = {at_most = 2.85}\nwrap = {at_least = 20}\n[fixed]\nload = 'mean'\n[varied]\n"
+        "rib_count = {from = 2, to = 6}\nrib_thickness = {from = 1.0, to = 2.5}\n"
+        "front_thickness = {from = 1.0, to = 2.5}\n",
+        encoding="utf-8",
+    )
+    out = tmp_path / "o u t"
+    assert main(["optimise", str(path), "--out", str(out), "--processes", "1"]) == 0
+    assert "Best fingers" in capsys.readouterr().out
+    table = pd.read_csv(out / "front.csv")
+    largest = 2.45**3 * 1.4
+    assert 0.95 * largest < table["force_N"][0] <= largest
+    assert table["force_N"].is_monotonic_decreasing
+    assert (table["von_mises_MPa"] <= 2.85).all()
+    assert (table["wrap_deg"] >= 20).all()
+    page = html.unescape((out / "front.html").read_text(encoding="utf-8"))
+    assert "largest force, with von_mises at most 2.85 MPa, wrap at least 20 deg" in page
+    command = re.search(r"`pinnray (compare --from .*?)`", page)
+    assert command
+    assert main([*shlex.split(command[1]), "--out", str(tmp_path / "again"), "--quiet"]) == 0
+
+
 @pytest.mark.slow
 def test_a_search_that_was_stopped_goes_on_to_the_same_runs(found, tmp_path, monkeypatch):
     def interrupted(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
@@ -113,7 +144,7 @@ def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, 
     crossed = [n for n, finger in enumerate(other.samples) if finger["rib_count"] == best]
     assert crossed
     assert not set(crossed) & set(other.front)
-    assert f"{len(crossed)} runs do not count: the finger goes" in " ".join(front_sentences(other))
+    assert f"{len(crossed)} runs do not count: the finger goes" in " ".join(front_sentences(other, tmp_path))
 
 
 @pytest.mark.slow

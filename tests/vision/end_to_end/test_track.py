@@ -139,6 +139,16 @@ def test_a_motion_that_too_few_fiducials_show_is_told(listed: ListedDiscs) -> No
     assert "the camera was not at rest" in tracking.warnings[2]
 
 
+def test_a_zoom_is_not_told_as_a_camera_that_moved(listed: ListedDiscs) -> None:
+    pictures = pressed(listed)
+    for number in (5, 6, 7):
+        for _, discs in listed.pictures[number]:
+            discs.centres[:] = discs.centres * 1.01
+    said = " ".join(track(film(pictures), SCENE).warnings)
+    assert "% larger at the end than at the start: the zoom changed" in said
+    assert "the camera was not at rest" not in said
+
+
 @pytest.mark.parametrize(("shift", "told"), [(0.28, False), (0.32, True)])
 def test_a_shift_of_three_tenths_of_a_pixel_is_worth_a_warning(listed, shift, told):
     pictures = pressed(listed)

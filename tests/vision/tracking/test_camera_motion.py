@@ -131,3 +131,35 @@ def test_a_nudge_is_undone_and_what_is_left_is_as_large_as_the_covariances_say(h
         shares.append(np.trace(undone.covariances, axis1=1, axis2=2).mean() / 2 / motion.deviation**2)
     assert 0.6 < np.mean(squares) < 1.5
     assert np.mean(shares) > least
+
+
+def zoomed(pixels: FloatArray, larger: float) -> FloatArray:
+    """Pixels after a zoom about the middle of the image."""
+    middle = np.array([CAMERA.width, CAMERA.height]) / 2
+    return middle + larger * (pixels - middle)
+
+
+@pytest.mark.parametrize("larger", [0.97, 1.03])
+def test_what_a_zoom_leaves_is_in_the_deviations(larger: float) -> None:
+    """A lens that is corrected bends by the old zoom, which no pose undoes: the fiducials show it."""
+    noise, places = 0.001, (WORKSPACE.points, DESIGN.markers)
+    start, truth = (seen(points, CAMERA, POSE) for points in places)
+    for camera in (CAMERA, None):
+        fiducials = [discs_at(pixels, variance=noise**2) for pixels in (start, zoomed(start, larger))]
+        motion = find_camera_motion(FilmedScene(DESIGN, WORKSPACE, camera), *fiducials)
+        assert motion.enlargement == pytest.approx(larger - 1, abs=0.002)
+        undone = motion.undone(discs_at(zoomed(truth, larger), variance=noise**2))
+        error = np.sqrt(((undone.centres - truth) ** 2).mean())
+        stated = np.sqrt(np.trace(undone.covariances, axis1=1, axis2=2).mean() / 2)
+        if camera is None:  # nothing is corrected, so the whole picture is enlarged alike
+            assert max(error, motion.remains) < noise
+        else:
+            assert error > 5 * noise
+            assert 0.4 < error / stated < 2
+
+
+def test_another_pose_leaves_nothing() -> None:
+    ends = [discs_at(seen(WORKSPACE.points, CAMERA, pose), variance=0.01**2) for pose in (POSE, NUDGED)]
+    motion = find_camera_motion(FilmedScene(DESIGN, WORKSPACE, CAMERA), *ends)
+    assert motion.remains == 0
+    assert abs(motion.enlargement) < 0.001
