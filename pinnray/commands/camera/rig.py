@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Group, Parameter
+from pydantic import Field
 
 from pinnray.film.rig_settings import RigSettings
 from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
@@ -19,7 +20,9 @@ MOTION = Parameter(name="*", group=Group("Motion", sort_key=6))
 class Scene(RigSettings):
     """The settings of the rig by the names of options."""
 
-    frame: Annotated[str, Parameter(name="--size")] = RigSettings.model_fields["frame"]
+    frame: Annotated[str, Parameter(name="--size")] = Field(
+        default="1280x720", description="Width and height of the frames, pixels"
+    )
 
 
 def command(
