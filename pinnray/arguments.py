@@ -68,8 +68,7 @@ def read_job(
     if words and isinstance(load, Load):
         raise UserError(f"{next(iter(words))} is part of the load that is given; change it there")
     if isinstance(material, str):
-        known = preset(material).material  # whose law is only usual: a linear solver has the linear one
-        material = Material(young=known.young, poisson=known.poisson).made_of(known.substance)
+        material = preset(material).material
     if material is not None and not isinstance(material, Material):
         raise UserError(f"material must be a Material, such as pr.Material(young=5), not {material!r}")
     if not isinstance(load, Load):

@@ -17,7 +17,7 @@ STRETCH = 2.0 - 2.0**-2
 class MaterialPreset(NamedTuple):
     """An elastic material with what else a designer needs."""
 
-    material: Material  #: With the law of finite strain that suits it
+    material: Material  #: Its elastic constants, for whatever law a solver has
     density: float  #: g/cm^3
     strain_at_break: float  #: Nominal strain
     source: str
@@ -47,7 +47,7 @@ _SHEETS = (
 
 MATERIALS: Mapping[str, MaterialPreset] = {
     name: MaterialPreset(
-        Material(young=young, poisson=poisson, law="neo-hookean").made_of(Substance(name, density, strain)),
+        Material(young=young, poisson=poisson).made_of(Substance(name, density, strain)),
         density,
         strain,
         source,

@@ -46,7 +46,7 @@ def test_a_silicone_has_the_stress_of_its_sheet_at_twice_its_length():
     stress = material.young * nominal_stress("neo-hookean", np.array([1.0]), material.poisson)[0]
     assert stress == pytest.approx(86 * 0.006895, rel=0.03)
     for known in MATERIALS.values():
-        assert known.material.law == "neo-hookean"
+        assert "law" not in known.material.model_fields_set  # a linear solver has the linear one
         assert 0.9 < known.density < 1.4
         assert known.source
     with pytest.raises(UserError, match="no material 'tpu'; there are tpu-85a"):

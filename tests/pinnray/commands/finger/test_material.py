@@ -61,6 +61,8 @@ def test_a_known_material_gives_modulus_and_ratio_unless_they_are_given(tmp_path
 
 def test_a_material_is_named_in_python_too():
     solution = pr.solve("default", material="dragon-skin-30", size=2.0)
+    same = pr.solve("default", material=pr.MATERIALS["dragon-skin-30"].material, size=2.0)
+    assert same.force == solution.force
     assert solution.problem.material.young == pr.MATERIALS["dragon-skin-30"].material.young
     assert solution.figures.force == pytest.approx(solution.force)
     assert solution.figures.force_at(5.0) == pytest.approx(solution.force / 2)
