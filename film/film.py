@@ -1,6 +1,5 @@
 """A film to track: its source, its camera, its fiducials and the colour of the markers."""
 
-from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,10 +9,7 @@ from pinnray.geometry.finger.parameters import CheckedModel
 from pinnray.runtime.content_hash import file_digest
 
 if TYPE_CHECKING:  # options are of this class, and `--help` has to be quick
-    from pinnray.comparison.pipeline.job import Measured
     from pinnray.geometry.finger.finger import Finger
-    from pinnray.runtime.stages import Stages
-    from pinnray.vision.frames.frame import Frame
     from pinnray.vision.tracking.scene import FilmedScene
 
 
@@ -41,7 +37,7 @@ class FilmSettings(CheckedModel):
 
 
 class Film(FilmSettings):
-    """A film; it can be the markers of a comparison as a `comparison.pipeline.job.MarkerSource`.
+    """A film.
 
     Raises:
         UserError: If the camera's or the workspace's file does not exist.
@@ -76,30 +72,6 @@ class Film(FilmSettings):
             colour=read_colour(self.colour),
             method=self.method,
             markers_only=self.workspace is None,
-        )
-
-    def measured(self, design: "Finger", folder: Path, stages: "Stages") -> "Measured":
-        """Track the film into the folder `track`; solutions are drawn into its last frame.
-
-        Raises:
-            UserError: If the film cannot be read or tracked.
-        """
-        from pinnray.comparison.pipeline.job import Measured
-        from pinnray.film.predicted_frame import predicted_frame
-        from pinnray.film.track_film import track_figures, track_film
-
-        last: deque[Frame] = deque(maxlen=1)
-        track = folder / "track"
-        with stages.stage("track") as progress:
-            track.mkdir()
-            tracking, observations = track_film(
-                self, design, track, progress, video=False, watch=lambda frame, _: last.append(frame)
-            )
-        return Measured(
-            observations,
-            tracking.warnings,
-            track_figures(track, tracking),
-            lambda comparison: [predicted_frame(track, comparison, tracking, last[0].image)],
         )
 
     def provenance(self) -> dict[str, Any]:

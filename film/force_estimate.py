@@ -18,7 +18,7 @@ from pinnray.solvers.identification.tracker import ForceReading, ForceTracker
 from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import make_solver
-from pinnray.solvers.solver import Progress
+from pinnray.solvers.solver import Progress, check_law
 from pinnray.vision.tracking.trajectories import Tracking
 
 MESH = MeshSettings(size=1.0, corner_size=0.2)
@@ -47,13 +47,13 @@ def force_tracker(mesh: TriangleMesh, finger: Finger, material: Material, points
     Args:
         mesh: Of the finger.
         finger: The finger.
-        material: If its law is the linear one, the neo-Hookean one is taken.
+        material: Of a law of finite strain; of the neo-Hookean one if none was given.
         points: Markers at rest, shape (m, 2), mm.
 
     Raises:
         UserError: If DOLFINx is missing.
     """
-    make_solver("fem-id")  # or says which library is missing
+    check_law([make_solver("fem-id")], material)  # or says which library is missing
     from pinnray.solvers.fem.identification import FemBody
 
     law = "neo-hookean" if material.law == "linear" else material.law

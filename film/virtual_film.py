@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from pinnray.comparison.evaluation.truths import experiment_source, simulate
+from pinnray.comparison.evaluation.truths import SLIDING, experiment_source, simulate
 from pinnray.film.filmed_force import LONGEST_STEP, filmed_course, true_forces
 from pinnray.film.rig_settings import RigSettings
 from pinnray.runtime.errors import UserError
@@ -34,6 +34,11 @@ def filmed_solution(problem: Problem, solver: Solver | None, stages: Stages) -> 
         UserError: If there is no solution to film.
     """
     if solver is None:
+        law, kind = problem.material.law, problem.load.kind
+        if "law" in problem.material.model_fields_set and law != SLIDING.law:
+            raise UserError(f"law {law}: the simulated finger has {SLIDING.law}; name a solver that has it")
+        if kind != "mean":
+            raise UserError(f"load {kind}: a patch presses the simulated finger; name a solver that takes it")
         free = replace(problem, finger=None)
         with stages.stage("virtual experiment") as progress:
             solution = simulate(free, progress, max_step=LONGEST_STEP)

@@ -138,4 +138,4 @@ def read_solver(given: object, preset: str | None = None) -> Solver:
 
 def mesh_settings(size: float | MeshSettings | None) -> MeshSettings | None:
     """Element sizes, by the size in walls and ribs, mm; None if none is given."""
-    return MeshSettings(size=size) if isinstance(size, int | float) else size
+    return size if size is None or isinstance(size, MeshSettings) else MeshSettings(size=size)

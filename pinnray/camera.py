@@ -115,7 +115,7 @@ def film_forces(
     Args:
         source: The film, as for `track`.
         design: The finger.
-        material: The elastic constants, or the name of a material; if the law is the linear one, the law of
+        material: The elastic constants, or the name of a material; unless a law is given, the law of
             finite strain that the markers tell is taken. The force is in proportion to Young's modulus.
         progress: Whether to show the stages; if None in a notebook only.
         given: How the film is read, as for `track`, and parameters of the finger and the material, as for

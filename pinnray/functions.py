@@ -97,8 +97,8 @@ def solve(
 
     Args:
         problem: A problem, or a design in one of the ways of `mesh`.
-        solver: A solver or its name, which takes the material law that it has; if None `fem`, or with a
-            preset `pinn-std`.
+        solver: A solver or its name, which takes the material law that it has unless one is given; if None
+            `fem`, or with a preset `pinn-std`.
         preset: Of a network: `fast`, `local`, `paper` or `trained`.
         size: Largest element in walls and ribs, mm, or `MeshSettings`; as the next arguments, for a design
             only.
@@ -111,7 +111,8 @@ def solve(
             `law`) and the load (`stroke`, mm, `direction`, degrees, `slide`, `radius`, mm, `friction`).
 
     Raises:
-        UserError: If the solver does not support the problem, or the measurements cannot be of it.
+        UserError: If the solver does not support the problem, the law or measurements, or these cannot be of
+            the finger.
     """
     from pinnray.comparison.evaluation.deformed_body import DeformedBody
     from pinnray.comparison.evaluation.plausibility import (
@@ -160,7 +161,7 @@ def compare(
     *,
     preset: str | None = None,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
-    truth: str = "sliding",
+    truth: str | None = None,
     size: float | MeshSettings | None = None,
     adapt: float | None = None,
     material: Material | str | None = None,
@@ -182,7 +183,7 @@ def compare(
         preset: Of the networks among them: `fast`, `local`, `paper` or `trained`.
         measurements: Marker displacements: a data frame or CSV file (x_mm, y_mm, u_mm, v_mm), or a video to
             track without a camera file; simulated by a finite-strain run if None.
-        truth: What is simulated then: "sliding", "stvk", "gent", "cylinder", "oblique", "friction",
+        truth: What is simulated then: "sliding" (if None), "stvk", "gent", "cylinder", "oblique", "friction",
             "rubbing", "3d" or "sticking".
         size: Largest element in walls and ribs, mm.
         adapt: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
@@ -203,6 +204,8 @@ def compare(
     from pinnray.options.solver_choice import spare_solvers
     from pinnray.runtime.stages import shown_stages
 
+    if resume and out is None:
+        raise UserError("resume goes on with the output folder of an earlier run; name it as out")
     if adapt is not None and (isinstance(adapt, bool) or not isinstance(adapt, int | float)):
         raise UserError(f"adapt = {adapt!r} is no number; give a tolerance in mm")
     words = ("solvers", "size", "adapt", "material", "load", "measurements", "truth", "preset", "reference")

@@ -11,8 +11,6 @@ from pathlib import Path
 from tempfile import TemporaryFile, mkdtemp
 from typing import Any, TypeVar
 
-from pinnray.runtime.atomic import remove_partials, write_bytes
-
 Result = TypeVar("Result")
 
 
@@ -79,6 +77,8 @@ def _unpickled(entry: Path) -> Any:
 
 
 def _pickled(made: object, entry: Path) -> None:
+    from pinnray.runtime.atomic import write_bytes
+
     write_bytes(entry, pickle.dumps(made))
 
 
@@ -100,6 +100,8 @@ def cached(
         load: Reads it from a file.
         save: Writes it into a file; None keeps nothing.
     """
+    from pinnray.runtime.atomic import remove_partials  # needs NumPy, for which `--help` has no time
+
     if entry.exists():
         try:
             return load(entry)

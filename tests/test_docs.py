@@ -303,7 +303,7 @@ def test_the_docs_have_every_field_of_a_model_as_it_is(page, column, model):
     assert names(table(page, column)) == list(model.model_fields)
 
 
-RIG_LINE = "rig --frame 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
+RIG_LINE = "rig --size 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
 FOLDS_LINE = "crossval --solvers fem,fem-asm --schemes one-out --seeds 1"
 
 

@@ -34,7 +34,7 @@ WATCHED = (OUT, f".{OUT}", CACHE)
 """Folders whose changes count."""
 
 FEM = "compare --design default --mesh-size 4 --solvers fem"
-RIG = "rig --mesh-size 4 --frame 320x240 --rest 4 --moving 2 --held 4 --codec png"
+RIG = "rig --mesh-size 4 --size 320x240 --rest 4 --moving 2 --held 4 --codec png"
 TRACK = "track FOLDER/film/frames --camera FOLDER/film/camera.json"
 JOBS = {
     "compare": (FEM,),
@@ -168,7 +168,7 @@ def filled(folder: Path) -> Iterator[Path]:
     from pinnray.runtime.figure import Figure
 
     blank = gallery.Illustration(Figure(1.0), "Blank", "Blank.", "Blank.")
-    drawings = {name: (what, lambda _: blank) for name, (what, _) in gallery.GALLERY.items()}
+    drawings = {name: (what, lambda *_: blank) for name, (what, _) in gallery.GALLERY.items()}
     # The same files with blank pictures, in a tenth of the time.
     with patch.object(gallery, "GALLERY", drawings), patch("pinnray.runtime.figure.DPI", 20):
         with patch.dict(os.environ, PINNRAY_CACHE=str(folder / CACHE)):

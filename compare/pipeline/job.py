@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from pinnray.comparison.evaluation.comparison import Results, supported_solvers
-from pinnray.comparison.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
+from pinnray.comparison.evaluation.truths import SLIDING, TRUTHS, Truth, check_truths, check_walls
 from pinnray.comparison.figures import Picture, check_formats, page_width
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.finger import Finger
@@ -56,7 +56,7 @@ class Job:
     load: Load = field(default_factory=Load)  #: Motion of the indenter.
     #: Marker displacements, their CSV file, or a source such as a film; simulated if None.
     measurements: Observations | Path | MarkerSource | None = None
-    truth: str = SLIDING.name  #: Key of `TRUTHS` to simulate.
+    truth: str | None = None  #: Key of `TRUTHS` to simulate where nothing is measured; None: `sliding`.
     reference: str | None = None  #: Solver to compare the others with; `fem`, else the first, if None.
     out: Path = Path("out/default")  #: Output folder.
     resume: bool = False  #: Whether to take over the finished solutions of an earlier run.
@@ -66,6 +66,11 @@ class Job:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", mesh_sizes(self.design, self.mesh))
+
+    @property
+    def simulated(self) -> Truth:
+        """The truth of a finger that is not measured."""
+        return TRUTHS[SLIDING.name if self.truth is None else self.truth]
 
     @property
     def names(self) -> list[str]:
@@ -101,8 +106,11 @@ def checked(job: Job) -> Job:
             )
     check_formats(job.picture_formats)
     page_width(job.picture_width)
-    check_truths([job.truth], job.design)
-    check_walls(TRUTHS[job.truth])
+    if job.truth is not None:
+        if job.measurements is not None:
+            raise UserError("a truth is for a simulated experiment; with measurements leave it out")
+        check_truths([job.truth], job.design)
+    check_walls(job.simulated)
     check_law(job.solvers, job.material)
     supported_solvers(job.solvers, job.spare, job.material, job.load)
     if isinstance(job.measurements, Path):

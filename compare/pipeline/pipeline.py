@@ -13,7 +13,6 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.force_curves import force_curves, write_force_displacement
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
 from pinnray.comparison.evaluation.truths import (
-    TRUTHS,
     UnfinishedExperimentError,
     no_displacements,
     virtual_experiment,
@@ -90,7 +89,7 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
         if observations is None:
             radius = job.design.marker_radius
             try:
-                observations, truth = virtual_experiment(problem, radius, progress, TRUTHS[job.truth])
+                observations, truth = virtual_experiment(problem, radius, progress, job.simulated)
             except UnfinishedExperimentError as error:
                 solvers, without = _without_markers(solvers, job.spare, error)
                 unsupported |= without

@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from pinnray.comparison.evaluation.comparison import Results
+from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import fact_table
 from pinnray.runtime.text_files import as_path
 
@@ -48,7 +49,8 @@ class Comparison(Results):
         from pinnray.comparison.figures import page_width
         from pinnray.comparison.figures.gallery import draw
 
-        return draw(self, picture, solvers, page_width(width)).figure
+        chosen = [solvers] if isinstance(solvers, str) else solvers
+        return draw(self, picture, chosen, page_width(width)).figure
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one HTML file that holds its pictures, and return its path."""
@@ -64,6 +66,8 @@ class Comparison(Results):
             "machine": machine(),
         }
         file = as_path(path, "the report")
+        if file.is_dir():
+            raise UserError(f"the report {file} is a folder; name a file, such as report.html")
         with TemporaryDirectory() as folder:
             write_report(file, self, draw_all(Path(folder), self), provenance)
         return file

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from pinnray.comparison.evaluation.scores import FigureScores, Scores, SolverScores
 from pinnray.runtime.tables import NONE, TextTable, number, percent
-from pinnray.solvers.finger_figures import break_warning
+from pinnray.solvers.finger_figures import break_answer
 
 TRUTH_FIELDS = ("displacement", "von Mises stress", "force")
 """Quantities that are compared with the simulated finger, in the order of `_to_truth`."""
@@ -43,15 +43,23 @@ FIGURES = (
     ("tip_u_mm", "tip, along the finger", "mm"),
     ("tip_v_mm", "tip, toward the indenter", "mm"),
     ("wrap_deg", "wrap of the front face", "deg"),
+    ("contact_angle_deg", "angle of the cylinder that is touched", "deg"),
+    ("contact_length_mm", "length of the contact", "mm"),
+    ("lift_kg", "mass that two such fingers hold **", "kg"),
     ("compliance_across_mm_per_N", "compliance across, at rest", "mm/N"),
     ("compliance_along_mm_per_N", "compliance along, at rest", "mm/N"),
     ("von_mises_MPa", "largest von Mises stress *", "MPa"),
     ("principal_strain", "largest principal strain *", ""),
+    ("peak_strain", "largest principal strain, corners included", ""),
+    ("peak_radius_mm", "radius of the corner there, 0 if sharp", "mm"),
+    ("strain_over_break", "that over the material's strain at break", ""),
     ("strain_energy_mJ", "strain energy", "mJ"),
     ("mass_g", "mass", "g"),
     ("thinnest_wall_mm", "thinnest wall", "mm"),
 )
 """Key in the metrics, words and unit of each figure that is shown."""
+SHARES = ("principal_strain", "peak_strain", "strain_over_break")
+"""Those that are shown in per cent."""
 
 
 def _figures(scores: Scores) -> RunAnswer | None:
@@ -76,18 +84,20 @@ def _figures(scores: Scores) -> RunAnswer | None:
         f"the largest strain away from corners is {percent(strain, 2)}": strain,
     }
     said = _listed([words for words, value in parts.items() if isfinite(value)])
-    shares = [each.values.get("strain_over_break", nan) for each in known.values()]
-    broken = break_warning(max(filter(isfinite, shares), default=0.0))
+    breaks = break_answer(*(values.get(key, nan) for key in ("strain_over_break", "peak_radius_mm")))
     rows = []
     for key, words, unit in FIGURES:
         cells = [_figure(each, key) for each in known.values()]
         if any(cell != NONE for cell in cells):
             rows.append([f"{words}, {unit}" if unit else words, *cells])
-    caption = "* At nodes that are a wall thickness away from re-entrant corners, base and contact."
+    caption = (
+        "* At nodes that are a wall thickness away from re-entrant corners, base and contact. ** By "
+        "friction, 2 µ F / g: µ is the load's, else 0.5."
+    )
     return RunAnswer(
         "What does the finger do?",
         f"By {scores.label(name)} {said}." if said != NONE else f"{scores.label(name)} does not tell.",
-        [broken] if broken else [],
+        [breaks],
         TextTable("", ["", *map(scores.label, known)], rows, caption, left=[""]),
     )
 
@@ -106,7 +116,7 @@ def _figure(known: FigureScores, key: str) -> str:
     value = known.values.get(key)
     if value is None or not isfinite(value):
         return NONE
-    said = percent(value, 2) if key == "principal_strain" else number(value, 3)
+    said = percent(value, 2) if key in SHARES else number(value, 3)
     name, _, unit = key.rpartition("_")
     low, high = (known.values.get(f"{name}_{end}_{unit}") for end in ("low", "high"))
     return said if low is None or high is None else f"{said} ({number(low, 3)} to {number(high, 3)})"

@@ -49,8 +49,12 @@ class FingerOptions(CheckedModel):
         design: Preset (default, csiro, slender, ...) or .toml file.
         section: A drawing instead of a design: a .step, .dxf or .svg file, or a .msh mesh. A .toml file of
             the same name beside it may say where it is clamped, touched and marked.
+        clamp: Clamped part of the drawing's outline, such as "[[0,0],[0,-30]]"; default: the file's own, else
+            proposed, as for the next two.
+        contact: Point of the drawing's outline where the indenter touches, such as "[35,0]".
+        markers: Centres of the markers on the drawing, such as "[[10,-1],[20,-1]]", or their number.
         set: Change a parameter, such as rib_count=6 or N=6; on a drawing a line of its description, such as
-            depth=12, clamp=[[0,0],[0,-30]], contact=[35,0] or markers=5; may be repeated.
+            depth=12; may be repeated.
         mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip. A .msh
             file that is a mesh of the section is taken as it is unless a size is given.
         yes: Go on although the mesh is so fine that a run takes more than five minutes or much memory.
@@ -58,6 +62,9 @@ class FingerOptions(CheckedModel):
 
     design: str = "default"
     section: Path | None = None
+    clamp: str | None = None
+    contact: str | None = None
+    markers: str | None = None
     set: Repeated = ()
     mesh_size: float | None = None
     yes: Flag = False
@@ -103,9 +110,17 @@ class FingerOptions(CheckedModel):
 
             check_mesh_cost(finger, mesh, solvers, simulated=simulated)
 
+    @property
+    def _places(self) -> dict[str, str]:
+        """Where a drawing is held, touched and marked, as far as it is given."""
+        given = {"clamp": self.clamp, "contact": self.contact, "markers": self.markers}
+        return {name: text for name, text in given.items() if text is not None}
+
     def _designed(self) -> "Design":
         from pinnray.geometry.finger.presets import load_design, parse_overrides
 
+        if self._places:
+            raise UserError(f"--{next(iter(self._places))} belongs to a drawing; give it by --section FILE")
         changes = parse_overrides(self.set)
         design = load_design(self.design, changes)
         if changes and "name" not in changes:  # so that it has its own output folder
@@ -120,7 +135,8 @@ class FingerOptions(CheckedModel):
 
         if self.design != "default":
             raise UserError(f"--section {file} and --design {self.design}: give one of them")
-        settings = [setting.partition("=") for setting in self.set]
+        places = [f"{name}={text}" for name, text in self._places.items()]
+        settings = [setting.partition("=") for setting in (*places, *self.set)]
         keys = [key.strip() for key, _, _ in settings]
         if twice := [key for key in keys if keys.count(key) > 1]:
             raise UserError(f"{twice[0]} is set twice; give it once")

@@ -1,7 +1,7 @@
 """`fem-3d`: linear and finite-strain elasticity of the extruded finger with DOLFINx."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -19,7 +19,8 @@ from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status, unstable_phrase
 from pinnray.solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
 
-LINEAR = LoadSteps(first_step=1.0, max_step=1.0)
+STEPS = LoadSteps(first_step=1.0, max_step=1.0, min_step=0.01, max_iterations=20)
+"""In small ones the friction of a solid hardly settles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +69,8 @@ class Fem3dSolver(FieldSettings):
     layers: int = 4  # Layers of elements in half of the depth
     grading: float = 0.25  # Thickness of the layer at the side face over that at the middle plane
     sides: Literal["free", "held"] = "free"  # Side faces that are "held" do not move along z: plane strain
+    # Fractions of the load at which a step ends; with any, no step is that of the plane
+    stops: tuple[float, ...] = ()
     name = "fem-3d"
     family = "finite elements"
     laws = ("linear", "neo-hookean", "st-venant-kirchhoff")
@@ -96,9 +99,9 @@ class Fem3dSolver(FieldSettings):
         started = time.perf_counter()
         space, linear = self.space(problem), problem.material.law == "linear"
         way = None
-        if not (linear or problem.load.friction):  # friction depends on the way
+        if not (linear or problem.load.friction or self.stops):  # friction depends on the way
             way = FemNonlinearSolver().path(problem, space.section, rough=True)
-        path = LoadPath(problem, space, steps=LINEAR if linear else LoadSteps())
+        path = LoadPath(problem, space, steps=replace(STEPS, stops=self.stops))
         whole = followed(path, way, progress)
         last, history, region = path.points[-1], whole.history(), whole.regions()[-1]
         unstable = 0 if linear else path.equilibrium.unstable
@@ -131,7 +134,7 @@ class Fem3dSolver(FieldSettings):
 def _status(path: LoadPath, taken: str, region: ContactRegion | None, unstable: int) -> Status:
     """Success at the full load, or advice."""
     if path.points[-1].fraction < 1:
-        return Status(False, f"{taken}; take a finer mesh, a wider contact or a smaller stroke")
+        return Status(False, f"{taken}; {path.advice}")
     if region and region.at_end:
         return Status(False, CONTACT_AT_END)
     if unstable:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
+from warnings import warn
 
 import numpy as np
 
@@ -10,9 +11,11 @@ from pinnray.geometry.finger.finger import Finger
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.finger_figures.measures import (
     Extreme,
+    contact_arc,
     force_curve,
     front_ends,
     largest_away_from_corners,
+    largest_strain,
     narrowest_gap,
     thinnest_wall,
     wrap_angle,
@@ -28,6 +31,8 @@ DENSITY = 1.2
 """Of a printed polyurethane, g/cm^3: where the substance is not known."""
 NEAR_BREAK = 0.5
 """Largest strain over the strain at break from which a finger is said to be near it."""
+FRICTION, GRAVITY = 0.5, 9.81
+"""Coefficient of friction where the load has none, that of printed fingers is 0.5 to 0.95, and m/s^2."""
 NORMAL = 1.96
 """Half of a 95 % interval over the standard deviation."""
 
@@ -40,10 +45,11 @@ class Quantity(NamedTuple):
 
     unit: str  #: Empty for a ratio
     meaning: str  #: A clause for tables and captions
+    always: bool = True  #: Whether every converged solution has it
 
 
-def _figure(unit: str, meaning: str) -> Any:
-    return field(default=float("nan"), metadata={"quantity": Quantity(unit, meaning)})
+def _figure(unit: str, meaning: str, *, always: bool = True) -> Any:
+    return field(default=float("nan"), metadata={"quantity": Quantity(unit, meaning, always)})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,22 +58,27 @@ class FingerFigures:
 
     Attributes:
         intervals: 95 % intervals by the names of the figures, where the solver knows them.
-        places: Drawn points of the largest stress and strain, mm, by the names of these figures.
+        places: Drawn points of the largest stress and strains, mm, by the names of these figures.
         curve: Travel of the indenter, mm, and its force along it, N, from rest on; one pair where the way to
             the end is not known.
-        strain_over_break: Largest nominal strain over the material's strain at break, of a known material.
-        strain_energy: Elastic energy of the whole finger, mJ.
+        straight: Whether the force is in proportion to the travel.
     """
 
     force: float = _figure(
-        "N", "force of the indenter at the full stroke, along the travel, for the whole depth"
+        "N", "force of the indenter at the end of its travel, along it, for the whole depth"
     )
-    force_25: float = _figure("N", "the same at 25 % of the stroke")
-    force_50: float = _figure("N", "the same at 50 % of the stroke")
-    force_75: float = _figure("N", "the same at 75 % of the stroke")
+    force_25: float = _figure("N", "the same at 25 % of the stroke", always=False)
+    force_50: float = _figure("N", "the same at 50 % of the stroke", always=False)
+    force_75: float = _figure("N", "the same at 75 % of the stroke", always=False)
+    lift: float = _figure(
+        "kg",
+        "mass that two such fingers hold by friction, 2 µ force / g; µ is the load's, else 0.5",
+    )
     tip_u: float = _figure("mm", "displacement of the front's tip along the finger")
     tip_v: float = _figure("mm", "displacement of the front's tip across it, positive toward the indenter")
     wrap: float = _figure("deg", "wrap angle: how far the front face folds around the indenter")
+    contact_angle: float = _figure("deg", "angle of the cylinder over which it is touched", always=False)
+    contact_length: float = _figure("mm", "length of the front that touches the cylinder", always=False)
     compliance_along: float = _figure(
         "mm/N", "displacement of the contact along the finger per force, at rest"
     )
@@ -76,18 +87,29 @@ class FingerFigures:
         "MPa", "largest von Mises stress, a wall thickness away from corners and contact"
     )
     principal_strain: float = _figure("", "largest principal strain there")
+    peak_strain: float = _figure("", "largest principal strain of all nodes, corners included")
+    peak_radius: float = _figure(
+        "mm",
+        "radius of the corner there; 0 at a sharp corner or edge, where it grows with finer elements",
+        always=False,
+    )
+    strain_over_break: float = _figure(
+        "", "peak strain, as a nominal one, over the material's strain at break: 1 breaks", always=False
+    )
     area: float = _figure("mm2", "area of the section")
     mass: float = _figure("g", "mass of the body")
     thinnest_wall: float = _figure("mm", "thinnest wall or rib")
     narrowest_gap: float = _figure("mm", "narrowest clear width of a cavity")
-    strain_over_break: float = float("nan")
-    strain_energy: float = float("nan")
+    strain_energy: float = _figure("mJ", "elastic energy of the whole finger")
     intervals: Mapping[str, Interval] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict)
     curve: tuple[tuple[float, float], ...] = ()
+    straight: bool = False
 
     def force_at(self, stroke: float) -> float:
         """Force of the indenter, N, after a travel, mm; between computed equilibria it is interpolated.
+
+        That is warned of; the `stops` of a solver are fractions of the stroke at which it is computed.
 
         Raises:
             UserError: If the travel is longer than the load's, or the way to the end is not known.
@@ -101,6 +123,11 @@ class FingerFigures:
             raise UserError(
                 f"the force is known at {travels[-1]:.4g} mm only; fem and fem-nonlinear know the way there"
             )
+        near = np.abs(travels - stroke).min() <= 1e-6 * travels[-1]
+        if not (near or self.straight):
+            after = int(np.searchsorted(travels, stroke))
+            steps = f"{travels[after - 1]:.4g} and {travels[after]:.4g} mm"
+            warn(f"the force at {stroke:g} mm is interpolated between steps at {steps}", stacklevel=2)
         return float(np.interp(stroke, travels, forces))
 
     def values(self) -> dict[str, float]:
@@ -115,19 +142,14 @@ class FingerFigures:
             found[f"{name}{unit}"] = value
             for end, bound in zip(("low", "high"), self.intervals.get(name, ()), strict=False):
                 found[f"{name}_{end}{unit}"] = bound
-        if np.isfinite(self.strain_over_break):
-            found["strain_over_break"] = self.strain_over_break
-        return found | {"strain_energy_mJ": self.strain_energy}
+        return found
 
     def rows(self) -> list[tuple[str, str, str]]:
         """What, how much with its unit and interval, and its meaning: a row for each figure that is known."""
         known = {name: value for name, value in self.values().items() if not np.isnan(value)}
         return [
-            *(
-                (name.replace("_", " "), self._said(name, value), self._meaning(name))
-                for name, value in known.items()
-            ),
-            ("strain energy", f"{self.strain_energy:.4g} mJ", "elastic energy of the whole finger"),
+            (name.replace("_", " "), self._said(name, value), self._meaning(name))
+            for name, value in known.items()
         ]
 
     def _said(self, name: str, value: float) -> str:
@@ -155,12 +177,21 @@ def heading(name: str, quantity: Quantity | None = None) -> str:
     return f"{name}_{unit}" if unit else name
 
 
-def break_warning(share: float) -> str:
-    """A sentence if the largest strain is near the strain at break or beyond, by their ratio; else empty."""
-    if not share >= NEAR_BREAK:
-        return ""
-    end = "it breaks" if share >= 1 else "a printed part breaks earlier than the data sheet says"
-    return f"The largest strain is {share:.0%} of the material's strain at break: {end}."
+def break_answer(share: float, radius: float) -> str:
+    """Whether a finger breaks, in a sentence.
+
+    Args:
+        share: Its `strain_over_break`.
+        radius: Its `peak_radius`.
+    """
+    if np.isnan(share):
+        return "Whether it breaks is not known: that takes a material with a known strain at break."
+    said = f"The largest strain, corners included, is {share:.0%} of the material's strain at break"
+    if share >= NEAR_BREAK:
+        said += ": it breaks" if share >= 1 else ": a printed part breaks earlier than the data sheet says"
+    if radius == 0:
+        said += "; it is at a sharp corner or edge, where it grows with finer elements: round it"
+    return f"{said}."
 
 
 def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> FingerFigures:
@@ -175,30 +206,38 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
     """
     problem, depth = solution.problem, _finger(solution.problem).depth
     curve = force_curve(solution, depth)
-    length, force = curve[-1]
+    (travels, forces), length = curve.T, float(np.linalg.norm(problem.load.values))
+    force, known = float(forces[-1]), len(curve) > 1
     ways = {
-        name: float(np.interp(share * length, *curve.T)) if len(curve) > 1 else float("nan")
+        name: float(np.interp(share * length, travels, forces, right=np.nan)) if known else float("nan")
         for name, share in FRACTIONS.items()
     }
     tip_u, tip_v = solution.displacement(front_ends(problem)[1:])[0]
-    stress, strain = largest_away_from_corners(solution)
+    (stress, strain), (peak, radius) = largest_away_from_corners(solution), largest_strain(solution)
+    angle, touching = contact_arc(solution)
     return FingerFigures(
-        force=float(force),
+        force=force,
         **ways,
+        lift=_lift(problem.load, force),
+        contact_angle=angle,
+        contact_length=touching,
         tip_u=float(tip_u),
         tip_v=float(tip_v),
         wrap=wrap_angle(solution),
         von_mises=stress.value,
         principal_strain=strain.value,
         **(figures_at_rest(problem) if rest is None else rest),
-        strain_over_break=_strain_over_break(problem.material, strain.value),
+        peak_strain=peak.value,
+        peak_radius=radius,
+        strain_over_break=_strain_over_break(problem.material, peak.value),
         strain_energy=float(solution.energy) * depth,
         intervals=_intervals(solution, depth, stress),
         places={
             name: (float(each.place[0]), float(each.place[1]))
-            for name, each in (("von_mises", stress), ("principal_strain", strain))
+            for name, each in (("von_mises", stress), ("principal_strain", strain), ("peak_strain", peak))
             if np.isfinite(each.value)
         },
+        straight=problem.material.law == "linear" and len(curve) > 1,
         curve=tuple((float(travel), float(size)) for travel, size in curve),
     )
 
@@ -256,11 +295,17 @@ def _strain_over_break(material: Material, strain: float) -> float:
     return float(nominal / material.substance.strain_at_break)
 
 
+def _lift(load: Load, force: float) -> float:
+    """Mass that two fingers hold by friction, kg, each with a force, N."""
+    return 2 * (load.friction or FRICTION) * max(force, 0.0) / GRAVITY
+
+
 def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, Interval]:
     """The 95 % intervals of force and stress that a solver knows."""
     found: dict[str, Interval] = {}
     if solution.identified is not None and (along := solution.identified.along) is not None:
-        found["force"] = depth * along.low, depth * along.high
+        low, high, load = depth * along.low, depth * along.high, solution.problem.load
+        found |= {"force": (low, high), "lift": (_lift(load, low), _lift(load, high))}
     known = solution.uncertainty
     if known is not None and known.von_mises is not None and np.isfinite(stress.value):
         half = NORMAL * float(known.von_mises(solution.problem.mesh.locate(stress.place[None]))[0])

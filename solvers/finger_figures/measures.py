@@ -1,20 +1,26 @@
 """The measures of a loaded finger: force over stroke, wrap angle, extremes away from corners, thin places."""
 
+from math import asin, degrees
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pinnray.geometry.mesh.boundary import mean_thickness, singular_points
+from pinnray.geometry.mesh.boundary import mean_thickness, re_entrant_points, singular_points
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import cavity_widths, wall_thickness
-from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.solvers.elasticity import strain_of
 from pinnray.solvers.problem import Problem, contact_ends, contact_nodes, front_points
 from pinnray.solvers.solution import SmoothField, SolidField, Solution, State
 
 RAY_SPACING = 0.5
 """Distance of the points from which wall thickness and gaps are measured, mm."""
+
+
+AT_CORNER = 0.25
+"""Distance of a node from a corner over the mean wall thickness up to which it is said to be at it."""
 
 
 class Extreme(NamedTuple):
@@ -67,23 +73,54 @@ def largest_away_from_corners(solution: Solution) -> tuple[Extreme, Extreme]:
     problem = solution.problem
     mesh = problem.mesh
     singular = np.concatenate([singular_points(mesh), mesh.points[contact_nodes(problem)]])
-    middles = None if mesh.moduli is None else mesh.at_centroids()
-    places = mesh.points if middles is None else middles.points
+    places, gradient, cells = _gradients(solution)
     far = cKDTree(singular).query(places)[0] > mean_thickness(mesh)
     if not far.any():
         nowhere = Extreme(np.nan, np.full(2, np.nan))
         return nowhere, nowhere
-    places = places[far]
-    if middles is None:
-        state = State.from_gradient(_nodal_gradient(solution)[far], problem)
-    else:
-        gradient = solution.field.gradient(middles)[far]
-        state = State.from_gradient(gradient, problem, middles.cells[far])
-    principal = np.linalg.eigvalsh(state.strain)[:, -1]
+    state = State.from_gradient(gradient[far], problem, None if cells is None else cells[far])
     stress, strain = (
-        Extreme(float(values.max()), places[values.argmax()]) for values in (state.von_mises, principal)
+        Extreme(float(values.max()), places[far][values.argmax()])
+        for values in (state.von_mises, _principal(state.strain))
     )
     return stress, strain
+
+
+def largest_strain(solution: Solution) -> tuple[Extreme, float]:
+    """The largest principal strain of all nodes, and the radius of the corner there, mm.
+
+    The radius is zero at a sharp corner, an end of the clamp and a contact that is no cylinder's, where the
+    strain has no limit as elements shrink, and NaN away from corners. Gradients at nodes are those of
+    `largest_away_from_corners`.
+    """
+    problem, mesh = solution.problem, solution.problem.mesh
+    places, gradient, _ = _gradients(solution)
+    strain: FloatArray = np.moveaxis(np.array(strain_of(problem.material.law, gradient)), -1, 0)
+    principal = _principal(strain[:, :2, :2])
+    peak = Extreme(float(principal.max()), places[principal.argmax()])
+    sharp, arcs, radii = re_entrant_points(mesh)
+    edges = contact_nodes(problem)[: 0 if problem.load.kind == "cylinder" else None]
+    corners = np.concatenate([sharp, mesh.points[edges], arcs])
+    distance, nearest = cKDTree(corners).query(peak.place)
+    known = np.concatenate([np.zeros(len(sharp) + len(edges)), radii])
+    at_corner = distance <= AT_CORNER * mean_thickness(mesh)
+    return peak, float(known[nearest]) if at_corner else np.nan
+
+
+def contact_arc(solution: Solution) -> tuple[float, float]:
+    """Angle of a cylinder over which the finger touches it, degrees, and deformed length that touches, mm.
+
+    Both NaN of other loads, and zero where the cylinder does not touch.
+    """
+    problem, contact = solution.problem, solution.contact
+    if problem.load.kind != "cylinder" or not problem.load.radius:
+        return np.nan, np.nan
+    if contact is None:
+        return 0.0, 0.0
+    ends = front_points(problem.mesh, np.array([contact.start, contact.end]))
+    chord = float(np.linalg.norm(np.diff(ends + solution.displacement(ends), axis=0)))
+    angle = 2 * degrees(asin(min(1.0, chord / (2 * problem.load.radius))))
+    return angle, float(solution.stats.get("contact_width_mm", np.nan))
 
 
 def thinnest_wall(section: Section) -> float:
@@ -113,6 +150,23 @@ def turn(points: FloatArray) -> float:
     """Angle from the chord between the first two of three points to that between the last two, degrees."""
     (x0, y0), (x1, y1) = np.diff(points, axis=0)
     return float(np.degrees(np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)))
+
+
+def _gradients(solution: Solution) -> tuple[FloatArray, FloatArray, IntArray | None]:
+    """Nodes, shape (n, 2), mm, and displacement gradients there.
+
+    In a body of several materials the middles of triangles, and these, shape (n,).
+    """
+    mesh = solution.problem.mesh
+    if mesh.moduli is None:
+        return mesh.points, _nodal_gradient(solution), None
+    middles = mesh.at_centroids()
+    return middles.points, solution.field.gradient(middles), middles.cells
+
+
+def _principal(strain: FloatArray) -> FloatArray:
+    """Largest principal values of strains in the plane, (n, 2, 2): shape (n,)."""
+    return np.asarray(np.linalg.eigvalsh(strain)[:, -1])
 
 
 def _nodal_gradient(solution: Solution) -> FloatArray:

@@ -31,7 +31,7 @@ SOURCES = {
     "finger": "walls, clamp and Poisson's ratio: measure the walls, and leave those that are as drawn out of "
     "the parameters",
     "frames": "the frames of the pictures: show fiducials, and fix the camera",
-    "law": "the choice between the laws: give --law, or press farther",
+    "law": "the choice between the laws: give the law, or press farther",
 }
 """What the variance of a force comes from, and what would narrow its interval."""
 

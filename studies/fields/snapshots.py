@@ -55,7 +55,8 @@ class KnownSamples:
         sweep = load_sweep(folder)
         if sweep.study.strokes is None:
             raise UserError(
-                f"the sweep in {folder} keeps no fields: write strokes = 10 in the study and sweep again"
+                f"the sweep in {folder} keeps no fields; sweep a study with strokes = 10, which needs "
+                "solver = 'fem-nonlinear' and a fixed load = 'cylinder', into another folder"
             )
         finger: dict[str, Any] = read_json(folder / STUDY_FILE, "sweep").get("finger", {})
         having = [each for each in sweep.good if field_file(folder, each.number).is_file()]

@@ -65,7 +65,7 @@ def write_front(
     shown = spread(optimum)
     solutions = {run: _solved(tasks[run]) for run in shown}
     drawn = {
-        "front": (draw_front(optimum, shown), "Every run, with the fingers of the table."),
+        "front": (draw_front(optimum, shown), "Every run, with the fingers of the table; dashed: limits."),
         "fingers": (
             draw_front_fingers(optimum, solutions),
             "Fingers of the table at rest and under the load, by their numbers."

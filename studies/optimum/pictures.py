@@ -43,11 +43,12 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
         if not allowed.all():
             axes.plot(*points[~allowed].T, "x", ms=3.5, c=MUTED, label="impossible or against a constraint")
         best = np.array([_place(optimum.measurements[run], first, second) for run in optimum.front])
-        axes.plot(*best.T, "-" if len(question.objectives) == 2 else "", color=BLUE, lw=0.8)
+        line = "-" if len(question.objectives) == 2 else "none"
+        axes.plot(*best.T, color=BLUE, lw=0.8, ls=line)
         axes.scatter(best[:, 0], best[:, 1], s=18, color=BLUE, zorder=3, label=question.heading.lower())
-        for name, line in ((first, axes.axvline), (second, axes.axhline)):
+        for name, limit in ((first, axes.axvline), (second, axes.axhline)):
             for end in question.constraints[name].ends if name in question.constraints else ():
-                line(end, color=MUTED, lw=0.8, ls="--")
+                limit(end, color=MUTED, lw=0.8, ls="--")
         for run in shown:
             axes.annotate(
                 str(optimum.place(run)),
@@ -99,7 +100,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
             if circle := ends[run]:
                 axes.add_patch(circle)
             values = optimum.measurements[run].values
-            text = ", ".join(f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.objectives)
+            text = ", ".join(f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.names[:3])
             axes.set_title(f"{optimum.place(run)}:  {text}", size=SMALL, loc="left")
     return drawn
 

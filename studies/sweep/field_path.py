@@ -1,7 +1,7 @@
 """A finger's deformation along its load path, on a mesh that moves with the finger's walls."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Self
@@ -19,7 +19,6 @@ from pinnray.runtime.atomic import write_arrays
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.lagrange import LagrangeField
-from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Solver
 
@@ -104,23 +103,12 @@ class MovedMesh:
         return moved
 
 
-class Stepping(FemNonlinearSolver):
-    """`fem-nonlinear` with every step on the given elements, because the fields on the way are kept."""
-
-    def coarser(self, problem: Problem) -> None:
-        """None; see `FemNonlinearSolver`."""
-
-    def exact_from(self, problem: Problem) -> float:
-        """Zero; see `FemNonlinearSolver`."""
-        return 0.0
-
-
 def stepping(solver: Solver, strokes: int) -> Solver:
     """The solver of finite strain with its load steps at equal strokes, where it needs no shorter ones."""
     assert isinstance(solver, FemNonlinearSolver)
-    step = 1 / strokes
-    own = asdict(solver) | {"first_step": step, "max_step": step, "min_step": min(step, solver.min_step)}
-    return Stepping(**own)
+    step, stops = 1 / strokes, tuple(number / strokes for number in range(1, strokes + 1))
+    smallest = min(step, solver.min_step)
+    return replace(solver, first_step=step, max_step=step, min_step=smallest, stops=stops)
 
 
 @lru_cache(maxsize=1)

@@ -12,7 +12,7 @@ from pinnray.comparison.evaluation.plausibility import problem_remarks
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.rules import broken_rule
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.finger_figures import FRACTIONS
+from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.solver import TrainedSolver, TrainingContext, TrainingDiverged
 from pinnray.studies.sweep.field_path import FieldPath
 from pinnray.studies.sweep.job import Task
@@ -79,6 +79,7 @@ def measured(task: Task) -> Measurement:
         FieldPath.of(solution, task.fields.strokes).save(task.fields.file)
     status, _ = DeformedBody(problem.mesh).status(solution)
     said = "; ".join([status.message, *problem_remarks(problem)])
-    if unknown := [name for name, value in values.items() if np.isnan(value) and name not in FRACTIONS]:
+    sometimes = {name for name, quantity in QUANTITIES.items() if not quantity.always}
+    if unknown := [name for name, value in values.items() if np.isnan(value) and name not in sometimes]:
         return ended("not converged", f"{', '.join(unknown)} cannot be computed; {said}", values)
     return ended("done" if status.converged else "not converged", said, values)

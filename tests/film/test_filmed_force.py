@@ -67,7 +67,7 @@ def test_a_linear_solver_goes_straight(coarse_mesh, finger):
 
 @pytest.mark.slow
 def test_the_rig_writes_the_force_beside_the_film(tmp_path):
-    options = "--mesh-size 1 --frame 480x270 --rest 2 --moving 2 --held 2"
+    options = "--mesh-size 1 --size 480x270 --rest 2 --moving 2 --held 2"
     assert main(["rig", *options.split(), "--out", str(tmp_path / "film")]) == 0
     with (tmp_path / "film" / "truth_force.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

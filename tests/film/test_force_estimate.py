@@ -195,7 +195,7 @@ def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(caps
 @pytest.fixture(scope="module")
 def film(tmp_path_factory):
     out = tmp_path_factory.mktemp("film") / "rig"
-    options = "--mesh-size 1 --frame 960x540 --rest 4 --moving 5 --held 3 --noise 2 --tilt 4 --seed 1"
+    options = "--mesh-size 1 --size 960x540 --rest 4 --moving 5 --held 3 --noise 2 --tilt 4 --seed 1"
     assert main(["rig", *options.split(), "--out", str(out)]) == 0
     return out
 

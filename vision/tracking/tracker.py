@@ -184,17 +184,17 @@ def _warnings(
         yield "the camera file has no covariance, so the standard deviations leave the camera's errors out"
     if (hidden := int(np.isnan(after.radii).sum())) > 0:
         yield f"{hidden} of {len(after.radii)} fiducials were not seen"
+    remains = motion.remains / tracking.plane.scales(tracking.expected).mean()
+    left = f" but for {remains:.2g} mm, which are in the standard deviations" if remains else ""
     if abs(motion.enlargement) > SCALE:
         size = "larger" if motion.enlargement > 0 else "smaller"
-        remains = motion.remains / tracking.plane.scales(tracking.expected).mean()
-        left = f" but for {remains:.2g} mm, which are in the standard deviations" if remains else ""
         yield (
             f"the fiducials were {abs(motion.enlargement):.2%} {size} at the end than at the start: the zoom "
             f"changed, or the focus or distance of the camera, which they undo{left}; fix zoom, focus and "
             "camera"
         )
     elif motion.shift > SHAKE:
-        known = "which they undo" if motion.planes else "and too few of them are seen to undo it"
+        known = f"which they undo{left}" if motion.planes else "and too few of them are seen to undo it"
         yield (
             f"the fiducials moved by {motion.shift:.2f} pixels between start and end: the camera was not at "
             f"rest, {known}"

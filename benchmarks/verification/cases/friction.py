@@ -92,7 +92,7 @@ def shifted(problem: Problem) -> ContactRegion:
     )
     path.points = [replace(path.points[-1], fraction=fraction) for fraction in (-1.0, 0.0)]
     path.follow(silent)
-    region = path.region(path.points[-1])
+    region = path.regions()[-1]
     path.close()
     assert region is not None
     assert path.points[-1].fraction == 1

@@ -21,7 +21,8 @@ def command(
 
     Each list is a CSV file with the columns x and y, in pixels or any other unit, a row a marker, in the
     order of the design's markers or at least both in one order; y may run up or down. With a column point,
-    rows of one number are repeats. Another order of the pressed points and missing ones are told. Writes displacements for `compare --measurements`. Examples:
+    rows of one number are repeats. Another order of the pressed points and missing ones are told. Writes
+    displacements for `compare --measurements`. Examples:
 
     - pinnray points rest.csv pressed.csv --section finger.svg
     - pinnray points rest.csv pressed.csv --section finger.svg --scale lengths

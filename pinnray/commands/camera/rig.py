@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Group, Parameter
+from pydantic import Field
 
 from pinnray.film.rig_settings import RigSettings
 from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
@@ -16,13 +17,21 @@ EXPOSURE = Parameter(name="*", group=Group("Exposure", sort_key=5))
 MOTION = Parameter(name="*", group=Group("Motion", sort_key=6))
 
 
+class Scene(RigSettings):
+    """The settings of the rig by the names of options."""
+
+    frame: Annotated[str, Parameter(name="--size")] = Field(
+        default="1280x720", description="Width and height of the frames, pixels"
+    )
+
+
 def command(
     *,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     solver: str | None = None,
-    scene: Annotated[RigSettings, SCENE] = RigSettings(),
+    scene: Annotated[Scene, SCENE] = Scene(),
     exposure: Annotated[Exposure, EXPOSURE] = Exposure(),
     motion: Annotated[Motion, MOTION] = Motion(),
     codec: Annotated[str, Parameter(group=OUTPUT, show_default=True)] = "ffv1",
@@ -36,7 +45,7 @@ def command(
 
     - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
     - pinnray rig --boards 20 --board 9x6 --square 8
-    - pinnray rig --moving 0 --codec mjpg --frame 640x480
+    - pinnray rig --moving 0 --codec mjpg --size 640x480
 
     Args:
         solver: Solver of the filmed displacements; default: the finite-strain simulation of `compare`.

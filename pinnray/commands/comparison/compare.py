@@ -34,7 +34,7 @@ from pinnray.runtime.exits import NOT_CONVERGED, say
 from pinnray.runtime.machine import cores
 
 if TYPE_CHECKING:
-    from pinnray.film.film import Film
+    from pinnray.film.measured_film import MeasuredFilm
 
 
 def command(
@@ -124,7 +124,7 @@ def command(
             adapt=adapt,
             material=material,
             load=load,
-            truth=_truth(truth, measurements),
+            truth=truth,
             measurements=_measurements(measurements, film),
             reference=reference,
             out=folder,
@@ -184,19 +184,12 @@ def _millimetres(text: str) -> float:
     return float(given[1]) * {"cm": 10.0, "in": 25.4}.get(given[2], 1.0)
 
 
-def _truth(name: str | None, measurements: str | None) -> str:
-    """The name of what is simulated; nothing is where there are measurements."""
-    from pinnray.comparison.evaluation.truths import SLIDING
-
-    if name is not None and measurements is not None:
-        raise UserError("--truth is for a simulated experiment; with --measurements leave it out")
-    return SLIDING.name if name is None else name
-
-
-def _measurements(source: str | None, options: FilmSettings) -> "Path | Film | None":
+def _measurements(source: str | None, options: FilmSettings) -> "Path | MeasuredFilm | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
         if source is None and options.model_fields_set:
             raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
-        return None if source is None else options.of(source)
+        from pinnray.film.measured_film import MeasuredFilm
+
+        return None if source is None else MeasuredFilm(source=source, **options.model_dump())
     return existing(Path(source))

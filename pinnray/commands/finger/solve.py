@@ -1,7 +1,9 @@
 """Solve one finger with one solver."""
 
 from functools import partial
+from math import hypot, isfinite, nan
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pinnray.options.shared import (
     Adapt,
@@ -14,6 +16,9 @@ from pinnray.options.shared import (
 )
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import NOT_CONVERGED, say
+
+if TYPE_CHECKING:
+    from pinnray.solvers.finger_figures import FingerFigures
 
 
 def command(
@@ -50,17 +55,18 @@ def command(
     from pinnray.comparison.report.figures_table import figures_lines
     from pinnray.comparison.report.output_files import write_vtu
     from pinnray.runtime.stages import Stages
-    from pinnray.solvers.finger_figures import break_warning
+    from pinnray.solvers.finger_figures import break_answer
     from pinnray.solvers.problem import Problem
-    from pinnray.solvers.registry import unknown_solver
+    from pinnray.solvers.registry import make_solver, unknown_solver
     from pinnray.solvers.solver import check_asked, solved, with_law
     from pinnray.vision.measurements import read_measurements
 
     if not solver:
         raise UserError(unknown_solver(solver))
-    at_strokes = [_stroke(text) for text in comma_list(strokes or "")]
     chosen, settings = finger.read(options.preset)
     material, load = physics.read(options.preset)
+    travel = float(hypot(*load.values))
+    at_strokes = [_stroke(text, travel) for text in comma_list(strokes or "")]
     if out.suffix != ".vtu":
         raise UserError(f"--out {out}: the fields are a VTU file; give a name that ends in .vtu")
     if out.is_dir():
@@ -69,6 +75,8 @@ def command(
     if len(chosen_solvers) != 1:
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
     (made,) = chosen_solvers
+    if at_strokes and "stops" in made.settings():
+        made = make_solver(made.name, **made.settings() | {"stops": [each / travel for each in at_strokes]})
     given = None
     if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)
@@ -95,7 +103,7 @@ def command(
             certified = with_certificates([evaluated(solution, triangles)], problem)
             (evaluation,), remarks = with_body_checks(certified, triangles)
         figures = evaluation.figures
-        grip = [(stroke, figures.force_at(stroke)) for stroke in at_strokes] if figures else []
+        grip = [(stroke, _force(figures, stroke)) for stroke in at_strokes] if figures else []
         write_vtu(out, triangles, evaluation)
         written = [out]
         if curves := force_curves([evaluation], load):
@@ -109,17 +117,32 @@ def command(
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     if figures:
         print("\n".join(figures_lines(figures, grip)))
-        if said := break_warning(figures.strain_over_break):
-            say(f"warning: {said[:1].lower()}{said[1:-1]}")
+        print(break_answer(figures.strain_over_break, figures.peak_radius))
     if solution.identified:
         print(solution.identified.advice)
     for path in written:
         print(path)
-    return 0 if evaluation.converged and tolerance_reached(adaptation) else NOT_CONVERGED
+    whole = all(isfinite(force) for _, force in grip)
+    return 0 if evaluation.converged and whole and tolerance_reached(adaptation) else NOT_CONVERGED
 
 
-def _stroke(text: str) -> float:
+def _stroke(text: str, travel: float) -> float:
+    """A stroke, mm, of a load that goes as far as a travel, mm."""
     try:
-        return float(text)
+        stroke = float(text)
     except ValueError:
         raise UserError(f"--strokes {text}: give lengths in mm, such as 2,5,10") from None
+    if not 0 <= stroke <= travel * (1 + 1e-9):
+        raise UserError(
+            f"--strokes {text}: the stroke ends at {travel:.6g} mm; give lengths up to it, or a longer one"
+        )
+    return stroke
+
+
+def _force(figures: "FingerFigures", stroke: float) -> float:
+    """The force at a stroke, N; where it is not known, NaN and a warning."""
+    try:
+        return figures.force_at(stroke)
+    except UserError as error:
+        say(f"warning: {error}")
+        return nan

@@ -34,7 +34,7 @@ def command(
         found = search_front(job, stages)
         with stages.stage("pictures"):
             paths, designs = write_front(found, job, job.out, stages.record(), formats)
-    columns = [0, *range(2, 2 + len(read.objectives))]  # the table in the file is too wide for a terminal
+    columns = [0, *range(2, 2 + len(read.names))]  # the table in the file is too wide for a terminal
     shown = text_table(read.heading, front_table(found).iloc[:, columns])
     Console().print(terminal_table(shown.title, shown.headings, shown.rows))
     for path in [*paths, designs[0], designs[-1]]:

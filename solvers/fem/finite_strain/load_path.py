@@ -25,6 +25,13 @@ PENETRATION, ROUGH = 1e-5, 1e-3
 """Largest gap of a node in contact and penetration of any node, mm, and the same where near will do."""
 ROUGH_TOLERANCE = 1e-4
 """Largest residual force over the largest internal force where near will do."""
+QUARTERS = (0.25, 0.5, 0.75)
+"""Fractions of the load at which a step ends in any case, because the force is told there."""
+ALIKE = 2.0
+"""Largest ratio of the forces on coarse and fine elements at the full load; it scales those on the way."""
+LET_GO, LEAP = 0.05, 3.0
+"""Force over the largest one on the way below which a finger is leaving a cylinder where its path ends, and
+motion in a step, per load, over the median above which it is at a limit point."""
 SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
 """A finger whose contact is so many times stiffer than itself takes a step first with a contact that is only
 SOFTEST times as stiff, which is hardened by factors of at most HARDER. For a node leaves the contact within
@@ -41,6 +48,8 @@ class LoadSteps:
     min_step: float = 1e-3  # Fraction of the load below which the solver gives up
     tolerance: float = 1e-8  # Largest residual force over the largest internal force
     max_iterations: int = 12  # Newton iterations in one step
+    # Fractions of the load at which a step ends; with any, all steps are on the given elements, and exact
+    stops: tuple[float, ...] = ()
 
 
 class LoadPath:
@@ -69,8 +78,10 @@ class LoadPath:
         self._steps, self.space = steps, space
         self.equilibrium = DiscreteEquilibrium(problem, space, constraints)
         self._newton, self._exact_from = self._begin(), exact_from
-        rough = self._begin(tolerance=max(steps.tolerance, ROUGH_TOLERANCE)) if exact_from > 0 else None
+        rough = self._begin(tolerance=ROUGH_TOLERANCE) if exact_from > 0 else None
         self._rough = rough  # For equilibria that need be near only
+        rubs = problem.load.friction > 0  # Friction depends on the way
+        self._stops = {*steps.stops, *(() if self.equilibrium.linear or rubs else QUARTERS)}
         contact = self.equilibrium.contact
         self._max_step = steps.max_step if contact is None else min(steps.max_step, contact.longest_step)
         self._softer: list[float] | None = [] if contact is None else None  # Until it is needed
@@ -81,10 +92,11 @@ class LoadPath:
         self._weights: csr_matrix | None = None  # Of coarser nodes at this path's
         self._reason = ""  # Why the last failed step failed, for Newton's method in PETSc's word
 
-    def _begin(self, **settings: float) -> ConstrainedNewton:
-        """Newton's method, with other settings than those of the steps."""
-        usual = {"tolerance": self._steps.tolerance, "max_iterations": self._steps.max_iterations}
-        return ConstrainedNewton(self.equilibrium, **(usual | settings))
+    def _begin(self, tolerance: float = 0.0, max_iterations: int = 0) -> ConstrainedNewton:
+        """Newton's method, with the larger settings, these or those of the steps."""
+        steps = self._steps
+        most = max(steps.max_iterations, max_iterations)
+        return ConstrainedNewton(self.equilibrium, max(steps.tolerance, tolerance), most)
 
     def close(self) -> None:
         """Free what PETSc holds."""
@@ -95,9 +107,11 @@ class LoadPath:
 
     def follow(self, progress: Progress) -> None:
         """Go to the full load, or as far as equilibria are found."""
-        step = min(self._steps.first_step, self._max_step)
-        while (rest := 1 - self.points[-1].fraction) > 0:
-            fraction = 1 - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the end
+        step, stops = min(self._steps.first_step, self._max_step), sorted(self._stops)
+        while (last := self.points[-1].fraction) < 1:
+            stop = next((each for each in stops if each > last), 1.0)
+            rest = stop - last
+            fraction = stop - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the stop
             before = self._iterations
             point, hardest = self._step(fraction)
             if point is None:
@@ -117,8 +131,8 @@ class LoadPath:
     def take_over(self, way: "LoadPath") -> bool:
         """Go to the full load at once, from its equilibrium on coarser elements of the same body.
 
-        Not where that is not reached or buckles, or leads to no stable equilibrium near it: then `points`
-        stay as they are.
+        Not where that is not reached or buckles, or leads to no stable equilibrium near it with a like force:
+        then `points` stay as they are.
         """
         last = way.points[-1]
         if last.fraction < 1 or way.left or way.equilibrium.unstable:
@@ -147,7 +161,8 @@ class LoadPath:
             return False
         if not self._tangent:
             self.equilibrium.factorise(found)
-        if self.equilibrium.unstable:
+        forces = [np.linalg.norm(path.reaction(end)) for path, end in ((self, found), (way, last))]
+        if self.equilibrium.unstable or max(forces) > ALIKE * min(forces):
             return False
         self.points.append(found)
         return True
@@ -272,9 +287,40 @@ class LoadPath:
     def phrase(self) -> str:
         """The steps taken, in words; where the path ends before the full load, with the reason."""
         if (fraction := self.points[-1].fraction) < 1:
-            return f"stopped at {fraction:.1%} of the load: Newton's method fails beyond ({self._reason})"
+            reason = self._snap or f"Newton's method fails beyond ({self._reason})"
+            return f"stopped at {fraction:.1%} of the load: {reason}"
         steps = len(self.points) - 1
         return f"all of the load applied in {steps} steps, {self._iterations} Newton iterations"
+
+    @property
+    def advice(self) -> str:
+        """Advice where the path ends before the full load."""
+        if self._snap:
+            return "the figures are of the finger just before; take a smaller stroke"
+        wider = "a wider contact" if self.equilibrium.contact is None else "another radius"
+        return f"take a finer mesh, {wider} or a smaller stroke"
+
+    @property
+    def _snap(self) -> str:
+        """What the finger does where a path ends at the last equilibrium of its kind; else empty.
+
+        Near a limit point the finger moves ever farther in a step. A finger that leaves a cylinder by itself
+        has no force on it there.
+        """
+        steps = np.diff([point.fraction for point in self.points])
+        if len(steps) < 3:
+            return ""
+        ahead = np.array([value or 0.0 for value in self.equilibrium.problem.load.displacement])
+        stroke, last = np.linalg.norm(ahead), self.points[-1].fraction
+        forces = np.array([self.reaction(point) for point in self.points]) @ ahead
+        before, force = forces[-2:]
+        if self.equilibrium.contact is not None and force < min(LET_GO * forces.max(), before):
+            place = stroke * (last + max(force, 0.0) * steps[-1] / (before - force))
+            return f"the finger snaps away from the cylinder at {place:.4g} mm, where the force falls to zero"
+        moved = np.abs(np.diff([point.nodal for point in self.points], axis=0)).max(axis=(1, 2)) / steps
+        if moved[-1] > LEAP * np.median(moved):
+            return f"a limit point at {stroke * last:.4g} mm, beyond which the finger snaps to another shape"
+        return ""
 
     @property
     def stats(self) -> dict[str, float | int | str]:

@@ -54,11 +54,8 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
 
     def coarser(self, problem: Problem) -> Problem | None:
         """The problem on the coarse elements on which the load is followed; None for the given ones."""
-        return None if problem.load.friction else coarser(problem, MOST)  # friction depends on the way
-
-    def exact_from(self, problem: Problem) -> float:
-        """Fraction of the load before which the equilibria on the way need be near only; see `LoadPath`."""
-        return 1.0 if problem.load.kind == "cylinder" else 0.0
+        on_way = problem.load.friction or self.stops  # friction depends on the way, and stops are on it
+        return None if on_way else coarser(problem, MOST)
 
     def path(
         self,
@@ -69,14 +66,17 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
         rough: bool = False,
     ) -> LoadPath:
         """The load path, not yet followed; for the arguments see `LoadPath`."""
-        exact_from = np.inf if rough else self.exact_from(problem)
+        near = problem.load.kind == "cylinder" and not self.stops  # is near enough on the way to the end
+        exact_from = np.inf if rough else float(near)
         return LoadPath(problem, space, constraints, steps=self, exact_from=exact_from)
 
     def _solve(self, coarse: Problem | None, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         path = self.path(problem, space)
-        way = coarse and self.path(coarse, LagrangeSpace(coarse.mesh, self.degree), rough=True)
+        way = None
+        if coarse is not None:
+            way = self.path(coarse, LagrangeSpace(coarse.mesh, self.degree), rough=True)
         whole = followed(path, way, progress)
         last, history, regions = path.points[-1], whole.history(), whole.regions()
         abscissa = path.force_abscissa(last)
@@ -168,8 +168,7 @@ def _status(
     """Success at the full load with remarks, or advice."""
     contact = path.equilibrium.contact
     if path.points[-1].fraction < 1:
-        wider = "a wider contact" if contact is None else "another radius"
-        return Status(False, f"{taken}; take a finer mesh, {wider} or a smaller stroke")
+        return Status(False, f"{taken}; {path.advice}")
     if unstable:
         return Status(False, f"{taken}, but {unstable_phrase(unstable)}")
     if path.left:

@@ -85,7 +85,7 @@ def without_times(told: dict[str, Any]) -> dict[str, Any]:
 
 def test_every_file_of_the_design_is_there(finished):
     pictures = (
-        "convergence design force_displacement marker_errors mesh overlay strain_principal strain_xx "
+        "design force_displacement marker_errors mesh overlay strain_principal strain_xx "
         "strain_xy strain_yy von_mises"
     )
     others = (

@@ -94,7 +94,7 @@ def test_figures_are_in_newtons_with_their_places_and_open_the_report(finished):
     assert (values["force_N"], values["force_50_N"]) == pytest.approx((force, force / 2))
     assert values["strain_energy_mJ"] == pytest.approx(fem["energy"] * depth)
     assert "force_low_N" not in values
-    assert set(fem["figures"]["places"]) == {"von_mises", "principal_strain"}
+    assert set(fem["figures"]["places"]) == {"von_mises", "principal_strain", "peak_strain"}
     scores = Scores.read(finished)
     alone = scores.model_copy(update={"solvers": {"fem": scores["fem"]}})
     assert f"{values['force_N']:#.3g} N" in answers(alone)[0].verdict

@@ -12,7 +12,7 @@ from pinnray.vision.measurements import read_measurements
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
 
-QUICK = "--mesh-size 1 --frame 480x270 --rest 2 --moving 0 --held 2"
+QUICK = "--mesh-size 1 --size 480x270 --rest 2 --moving 0 --held 2"
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.finger_figures import QUANTITIES, break_warning, figures_of
+from pinnray.solvers.finger_figures import QUANTITIES, break_answer, figures_of
 from pinnray.solvers.finger_figures.measures import (
     force_curve,
     largest_away_from_corners,
@@ -122,7 +122,9 @@ def test_a_recorded_path_gives_the_force_on_the_way() -> None:
     depth = FINGER.depth / 10
     forces = found.force_25, found.force_50, found.force_75, found.force
     assert forces == pytest.approx((2 * depth, 4 * depth, 12 * depth, 20 * depth))
-    assert found.force_at(6.0) == pytest.approx(depth * (4 + 16 / 5))
+    with pytest.warns(UserWarning, match="at 6 mm is interpolated between steps at 5 and 10 mm"):
+        assert found.force_at(6.0) == pytest.approx(depth * (4 + 16 / 5))
+    assert found.force_at(5.0) == 4 * depth
     with pytest.raises(ValueError, match="known from 0 to 10 mm, not at 11 mm"):
         found.force_at(11.0)
     alone = figures_of(affine([[0, 0], [0, 0]], nonlinear), rest={})
@@ -147,14 +149,58 @@ def test_mass_and_break_are_of_the_substance() -> None:
     assert figures_of(affine(strained)).mass == pytest.approx(1.2 / 2.5 * found.mass)  # a print's
     assert found.strain_over_break == pytest.approx(0.5)
     assert found.columns()["strain_over_break"] == found.strain_over_break
-    assert "strain_over_break" not in figures_of(affine(strained)).columns()
+    assert np.isnan(figures_of(affine(strained)).strain_over_break)
     green = Material(law="neo-hookean").made_of(glass)
     finite = figures_of(affine([[0.01, 0.0], [0.0, 0.0]], replace(PROBLEM, material=green)))
     assert finite.strain_over_break == pytest.approx(0.5)  # the nominal strain, not Green and Lagrange's
 
 
-@pytest.mark.parametrize(("share", "said"), [(np.nan, ""), (0.4, ""), (0.6, "60% "), (1.2, "120% ")])
-def test_a_strain_near_the_break_is_said(share, said) -> None:
-    assert said in break_warning(share)
-    assert bool(break_warning(share)) == bool(said)
-    assert ("it breaks." in break_warning(share)) == (share > 1)
+@pytest.mark.parametrize(
+    ("share", "radius", "said"),
+    [
+        (np.nan, 0.5, "is not known"),
+        (0.4, 0.5, "is 40% of the material's strain at break."),
+        (0.6, np.nan, "60% of the material's strain at break: a printed part breaks earlier"),
+        (1.2, 0.5, "120% of the material's strain at break: it breaks."),
+        (
+            1.2,
+            0.0,
+            "it breaks; it is at a sharp corner or edge, where it grows with finer elements",
+        ),
+    ],
+)
+def test_whether_it_breaks_is_said(share, radius, said) -> None:
+    assert said in break_answer(share, radius)
+
+
+@pytest.mark.parametrize(("fillet", "radius"), [(0.8, 0.8), (0.0, 0.0)])
+def test_the_peak_strain_is_at_a_corner_with_its_radius(fillet, radius) -> None:
+    """It is larger than that away from corners, and at a sharp one it grows with finer elements."""
+    finger = Design(fillet_radius=fillet)
+    coarse, fine = (
+        figures_of(
+            FemSolver(estimate=False).solve(
+                Problem(
+                    finger_mesh(finger, settings=MeshSettings(size=1.0, corner_size=size)),
+                    Material(),
+                    Load("cylinder", stroke=5.0).as_mean(),
+                    finger=finger,
+                )
+            ),
+            rest={},
+        )
+        for size in (0.2, 0.1)
+    )
+    assert coarse.peak_radius == pytest.approx(radius, rel=0.05)
+    assert coarse.peak_strain > 1.2 * coarse.principal_strain
+    grown = fine.peak_strain / coarse.peak_strain
+    assert (grown > 1.15) == (radius == 0)
+
+
+def test_two_fingers_lift_by_friction() -> None:
+    """Of 2 N each and a coefficient of 0.5, 2 N hold 0.204 kg."""
+    solution = affine([[0, 0], [0, 0]])
+    found = figures_of(solution, rest={})
+    assert found.lift == pytest.approx(2 * 0.5 * found.force / 9.81)
+    rubbing = replace(PROBLEM, load=Load("cylinder", friction=0.9))
+    assert figures_of(affine([[0, 0], [0, 0]], rubbing), rest={}).lift == pytest.approx(1.8 * found.lift)

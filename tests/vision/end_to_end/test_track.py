@@ -1,5 +1,6 @@
 """From frames to displacements on lists of discs: means at rest, moved cameras, orientation, warnings."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -137,6 +138,16 @@ def test_a_motion_that_too_few_fiducials_show_is_told(listed: ListedDiscs) -> No
     assert tracking.final_plane is None
     assert "3 of 6 fiducials" in tracking.warnings[1]
     assert "the camera was not at rest" in tracking.warnings[2]
+
+
+def test_what_a_bumped_fiducial_leaves_of_a_motion_is_told(listed: ListedDiscs) -> None:
+    pictures = pressed(listed, pose=NUDGED)
+    for number in (5, 6, 7):
+        for _, discs in listed.pictures[number]:
+            if len(discs.radii) == len(SPACE.points):
+                discs.centres[0] += 3.0
+    said = " ".join(track(film(pictures), SCENE).warnings)
+    assert re.search(r"the camera was not at rest, which they undo but for 0\.\d+ mm", said)
 
 
 def test_a_zoom_is_not_told_as_a_camera_that_moved(listed: ListedDiscs) -> None:

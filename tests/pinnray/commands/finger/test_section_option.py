@@ -11,6 +11,7 @@ from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.options.shared import FingerOptions
+from pinnray.runtime.errors import UserError
 from pinnray.studies.crossval.study import CrossvalStudy
 from tests.geometry.drawing.files import write_beam_mesh
 
@@ -28,8 +29,8 @@ def drawing(folder: Path, path: str = BEAM, *, name: str = "beam.svg", size: str
 
 
 def test_lines_on_the_command_line_are_those_of_a_description(tmp_path: Path) -> None:
-    lines = "clamp=[[0, 0], [0, -10]]", "contact=[40, 0]", "markers=5", "depth=12"
-    options = FingerOptions(section=drawing(tmp_path), set=lines)
+    places = {"clamp": "[[0, 0], [0, -10]]", "contact": "[40, 0]", "markers": "5"}
+    options = FingerOptions(section=drawing(tmp_path), set=("depth=12",), **places)
     finger, _ = options.read()
     assert isinstance(finger, DrawnFinger)
     assert (finger.contact_abscissa, finger.depth, len(finger.markers)) == (40.0, 12.0, 5)
@@ -39,8 +40,13 @@ def test_lines_on_the_command_line_are_those_of_a_description(tmp_path: Path) ->
 def test_a_description_beside_the_drawing_counts_and_the_command_line_wins(tmp_path: Path) -> None:
     file = drawing(tmp_path)
     file.with_suffix(".toml").write_text("depth = 7\ncontact = [30, 0]\n")
-    finger, _ = FingerOptions(section=file, set=("contact=[45, 0]",)).read()
+    finger, _ = FingerOptions(section=file, contact="[45, 0]").read()
     assert (finger.depth, finger.contact_abscissa) == (7.0, 45.0)
+
+
+def test_places_on_a_drawing_are_refused_for_a_design() -> None:
+    with pytest.raises(UserError, match="--contact belongs to a drawing; give it by --section FILE"):
+        FingerOptions(contact="[45, 0]").read()
 
 
 def test_design_says_that_a_size_is_a_guess(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
