@@ -232,13 +232,16 @@ def _check_pair(here: FloatArray, there: FloatArray) -> None:
         nearer = "closer together" if ratio > 1 else "farther apart"
         raise UserError(
             f"the pressed points lie {max(ratio, 1 / ratio):.3g} times {nearer} than those at rest: give "
-            "both lists in one unit (10 is between mm and cm), or --scale lengths"
+            "both lists in one unit (10 is between mm and cm), or scale both by their lengths"
         )
 
 
 def _size(places: FloatArray) -> float:
     """Rms distance of the points from their middle, without those that are missing."""
-    return float(np.sqrt(np.nanvar(places, axis=0).sum()))
+    size = float(np.sqrt(np.nanvar(places, axis=0).sum()))
+    if size <= ROUNDING * float(np.nanmax(np.abs(places))):
+        raise UserError("all points of a picture are at one place")
+    return size
 
 
 def _listed(names: Sequence[float] | FloatArray | IntArray) -> str:

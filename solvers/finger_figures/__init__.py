@@ -1,7 +1,6 @@
 """Figures of a finger under its load, in its designer's units: force, tip, wrap, stress, compliance, mass."""
 
 from pinnray.solvers.finger_figures.figures import (
-    NEAR_BREAK,
     QUANTITIES,
     FingerFigures,
     Quantity,
@@ -12,7 +11,6 @@ from pinnray.solvers.finger_figures.figures import (
 )
 
 __all__ = [
-    "NEAR_BREAK",
     "QUANTITIES",
     "FingerFigures",
     "Quantity",

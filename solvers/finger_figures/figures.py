@@ -62,7 +62,6 @@ class FingerFigures:
         curve: Travel of the indenter, mm, and its force along it, N, from rest on; one pair where the way to
             the end is not known.
         straight: Whether the force is in proportion to the travel.
-        strain_energy: Elastic energy of the whole finger, mJ.
     """
 
     force: float = _figure(
@@ -101,7 +100,7 @@ class FingerFigures:
     mass: float = _figure("g", "mass of the body")
     thinnest_wall: float = _figure("mm", "thinnest wall or rib")
     narrowest_gap: float = _figure("mm", "narrowest clear width of a cavity")
-    strain_energy: float = float("nan")
+    strain_energy: float = _figure("mJ", "elastic energy of the whole finger")
     intervals: Mapping[str, Interval] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict)
     curve: tuple[tuple[float, float], ...] = ()
@@ -143,17 +142,14 @@ class FingerFigures:
             found[f"{name}{unit}"] = value
             for end, bound in zip(("low", "high"), self.intervals.get(name, ()), strict=False):
                 found[f"{name}_{end}{unit}"] = bound
-        return found | {"strain_energy_mJ": self.strain_energy}
+        return found
 
     def rows(self) -> list[tuple[str, str, str]]:
         """What, how much with its unit and interval, and its meaning: a row for each figure that is known."""
         known = {name: value for name, value in self.values().items() if not np.isnan(value)}
         return [
-            *(
-                (name.replace("_", " "), self._said(name, value), self._meaning(name))
-                for name, value in known.items()
-            ),
-            ("strain energy", f"{self.strain_energy:.4g} mJ", "elastic energy of the whole finger"),
+            (name.replace("_", " "), self._said(name, value), self._meaning(name))
+            for name, value in known.items()
         ]
 
     def _said(self, name: str, value: float) -> str:
@@ -189,7 +185,7 @@ def break_answer(share: float, radius: float) -> str:
         radius: Its `peak_radius`.
     """
     if np.isnan(share):
-        return "Whether it breaks is not known: that takes a --material with a strain at break."
+        return "Whether it breaks is not known: that takes a material with a known strain at break."
     said = f"The largest strain, corners included, is {share:.0%} of the material's strain at break"
     if share >= NEAR_BREAK:
         said += ": it breaks" if share >= 1 else ": a printed part breaks earlier than the data sheet says"
@@ -217,7 +213,7 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
         for name, share in FRACTIONS.items()
     }
     tip_u, tip_v = solution.displacement(front_ends(problem)[1:])[0]
-    (stress, strain), peak = largest_away_from_corners(solution), largest_strain(solution)
+    (stress, strain), (peak, radius) = largest_away_from_corners(solution), largest_strain(solution)
     angle, touching = contact_arc(solution)
     return FingerFigures(
         force=force,
@@ -232,7 +228,7 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
         principal_strain=strain.value,
         **(figures_at_rest(problem) if rest is None else rest),
         peak_strain=peak.value,
-        peak_radius=peak.radius,
+        peak_radius=radius,
         strain_over_break=_strain_over_break(problem.material, peak.value),
         strain_energy=float(solution.energy) * depth,
         intervals=_intervals(solution, depth, stress),

@@ -30,16 +30,6 @@ class Extreme(NamedTuple):
     place: FloatArray
 
 
-class Peak(NamedTuple):
-    """The largest principal strain of a finger, corners included."""
-
-    value: float
-    place: FloatArray  # Shape (2,), mm
-    # Of the corner there, mm: zero where it is sharp, so that the strain has no limit as elements shrink; NaN
-    # away from corners
-    radius: float
-
-
 def force_curve(solution: Solution, depth: float) -> FloatArray:
     """Travel of the indenter, mm, and its force along it for the whole depth, N, from rest on: shape (k, 2).
 
@@ -96,24 +86,25 @@ def largest_away_from_corners(solution: Solution) -> tuple[Extreme, Extreme]:
     return stress, strain
 
 
-def largest_strain(solution: Solution) -> Peak:
-    """The largest principal strain of all nodes, and the corner there: sharp, or round with its radius.
+def largest_strain(solution: Solution) -> tuple[Extreme, float]:
+    """The largest principal strain of all nodes, and the radius of the corner there, mm.
 
-    Ends of the clamp count as sharp, and a contact that is no cylinder's. Gradients at nodes are those of
+    The radius is zero at a sharp corner, an end of the clamp and a contact that is no cylinder's, where the
+    strain has no limit as elements shrink, and NaN away from corners. Gradients at nodes are those of
     `largest_away_from_corners`.
     """
     problem, mesh = solution.problem, solution.problem.mesh
     places, gradient, _ = _gradients(solution)
     strain: FloatArray = np.moveaxis(np.array(strain_of(problem.material.law, gradient)), -1, 0)
     principal = _principal(strain[:, :2, :2])
-    value, place = float(principal.max()), places[principal.argmax()]
+    peak = Extreme(float(principal.max()), places[principal.argmax()])
     sharp, arcs, radii = re_entrant_points(mesh)
     edges = contact_nodes(problem)[: 0 if problem.load.kind == "cylinder" else None]
     corners = np.concatenate([sharp, mesh.points[edges], arcs])
-    distance, nearest = cKDTree(corners).query(place)
+    distance, nearest = cKDTree(corners).query(peak.place)
     known = np.concatenate([np.zeros(len(sharp) + len(edges)), radii])
     at_corner = distance <= AT_CORNER * mean_thickness(mesh)
-    return Peak(value, place, float(known[nearest]) if at_corner else np.nan)
+    return peak, float(known[nearest]) if at_corner else np.nan
 
 
 def contact_arc(solution: Solution) -> tuple[float, float]:

@@ -55,7 +55,7 @@ def command(
     from pinnray.comparison.report.figures_table import figures_lines
     from pinnray.comparison.report.output_files import write_vtu
     from pinnray.runtime.stages import Stages
-    from pinnray.solvers.finger_figures import NEAR_BREAK, break_answer
+    from pinnray.solvers.finger_figures import break_answer
     from pinnray.solvers.problem import Problem
     from pinnray.solvers.registry import make_solver, unknown_solver
     from pinnray.solvers.solver import check_asked, solved, with_law
@@ -117,11 +117,7 @@ def command(
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     if figures:
         print("\n".join(figures_lines(figures, grip)))
-        said = break_answer(figures.strain_over_break, figures.peak_radius)
-        if figures.strain_over_break >= NEAR_BREAK:
-            say(f"warning: {said[:1].lower()}{said[1:-1]}")
-        else:
-            print(said)
+        print(break_answer(figures.strain_over_break, figures.peak_radius))
     if solution.identified:
         print(solution.identified.advice)
     for path in written:

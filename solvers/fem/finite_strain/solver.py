@@ -57,10 +57,6 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
         on_way = problem.load.friction or self.stops  # friction depends on the way, and stops are on it
         return None if on_way else coarser(problem, MOST)
 
-    def exact_from(self, problem: Problem) -> float:
-        """Fraction of the load before which the equilibria on the way need be near only; see `LoadPath`."""
-        return 1.0 if problem.load.kind == "cylinder" and not self.stops else 0.0
-
     def path(
         self,
         problem: Problem,
@@ -70,7 +66,8 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
         rough: bool = False,
     ) -> LoadPath:
         """The load path, not yet followed; for the arguments see `LoadPath`."""
-        exact_from = np.inf if rough else self.exact_from(problem)
+        near = problem.load.kind == "cylinder" and not self.stops  # is near enough on the way to the end
+        exact_from = np.inf if rough else float(near)
         return LoadPath(problem, space, constraints, steps=self, exact_from=exact_from)
 
     def _solve(self, coarse: Problem | None, problem: Problem, progress: Progress) -> Solution:
