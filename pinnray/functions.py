@@ -97,8 +97,8 @@ def solve(
 
     Args:
         problem: A problem, or a design in one of the ways of `mesh`.
-        solver: A solver or its name, which takes the material law that it has; if None `fem`, or with a
-            preset `pinn-std`.
+        solver: A solver or its name, which takes the material law that it has unless one is given; if None
+            `fem`, or with a preset `pinn-std`.
         preset: Of a network: `fast`, `local`, `paper` or `trained`.
         size: Largest element in walls and ribs, mm, or `MeshSettings`; as the next arguments, for a design
             only.
@@ -111,7 +111,8 @@ def solve(
             `law`) and the load (`stroke`, mm, `direction`, degrees, `slide`, `radius`, mm, `friction`).
 
     Raises:
-        UserError: If the solver does not support the problem, or the measurements cannot be of it.
+        UserError: If the solver does not support the problem, the law or measurements, or these cannot be of
+            the finger.
     """
     from pinnray.comparison.evaluation.deformed_body import DeformedBody
     from pinnray.comparison.evaluation.plausibility import (

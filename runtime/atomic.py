@@ -17,10 +17,10 @@ from math import isfinite
 from pathlib import Path
 from secrets import token_hex
 from time import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import ArrayLike
+if TYPE_CHECKING:  # `--help` has to be quick
+    from numpy.typing import ArrayLike
 
 _PARTIAL = re.compile(r"\..+\.[0-9a-f]{8}\.partial(\.[^.]*)?")
 
@@ -79,8 +79,10 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def write_arrays(path: Path, arrays: Mapping[str, ArrayLike]) -> None:
+def write_arrays(path: Path, arrays: "Mapping[str, ArrayLike]") -> None:
     """Write a NumPy archive atomically; compression takes a fifth off fields, and ten times as long."""
+    import numpy as np
+
     buffer = BytesIO()
     np.savez(buffer, **{name: np.asarray(array) for name, array in arrays.items()})
     write_bytes(path, buffer.getvalue())

@@ -66,8 +66,8 @@ def check_same_job(out: Path, options: Mapping[str, Any], usual: Mapping[str, An
     names = sorted(name for name in before | now if before.get(name) != now.get(name))
     if _written(out) and (names := [name for name in names if name not in WITHOUT_NUMBERS]):
         raise UserError(
-            f"{out} holds the finished run of another job (other {', '.join(names)}); give --out with "
-            f"another folder, or --out {out} to replace it"
+            f"{out} holds the finished run of another job (other {', '.join(names)}); name "
+            f"another output folder, or {out} itself to replace it"
         )
 
 

@@ -35,13 +35,16 @@ def test_only_the_front_door_names_an_option_of_the_command_line():
     """Messages of the other packages speak of the concept: truth, travel, seed."""
     found, option = [], re.compile(r"(?<![\w-])--[a-z]")
     for path in SOURCES:
-        if path.is_relative_to(ROOT / "pinnray/commands") or path.is_relative_to(ROOT / "pinnray/options"):
+        if {"commands", "options"} & {*path.parts} or path.name == "cli.py":
             continue
         text = path.read_text(encoding="utf-8")
         found += [
             f"{path.relative_to(ROOT)}:{node.lineno}"
             for node in (ast.walk(ast.parse(text)) if option.search(text) else ())
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and option.search(node.value)
+            if isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and option.search(node.value)
+            and not node.value.startswith("pinnray ")  # a whole command, to copy
         ]
     assert found == []
 

@@ -232,7 +232,7 @@ def _check_pair(here: FloatArray, there: FloatArray) -> None:
         nearer = "closer together" if ratio > 1 else "farther apart"
         raise UserError(
             f"the pressed points lie {max(ratio, 1 / ratio):.3g} times {nearer} than those at rest: give "
-            "both lists in one unit (10 is between mm and cm), or --scale lengths"
+            "both lists in one unit (10 is between mm and cm), or scale both by their lengths"
         )
 
 

@@ -185,7 +185,7 @@ def break_answer(share: float, radius: float) -> str:
         radius: Its `peak_radius`.
     """
     if np.isnan(share):
-        return "Whether it breaks is not known: that takes a --material with a strain at break."
+        return "Whether it breaks is not known: that takes a material with a known strain at break."
     said = f"The largest strain, corners included, is {share:.0%} of the material's strain at break"
     if share >= NEAR_BREAK:
         said += ": it breaks" if share >= 1 else ": a printed part breaks earlier than the data sheet says"

@@ -22,8 +22,8 @@ from pinnray.solvers.identification.unknowns import DEFAULT, LAWS, Unknowns
 from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver
 from pinnray.solvers.pinn.identification.network_body import NetworkBody
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.solution import Solution, Status
-from pinnray.solvers.solver import Cost, Family, Progress, check_problem, silent
+from pinnray.solvers.solution import Solution
+from pinnray.solvers.solver import Cost, Family, Progress, UnsupportedProblemError, check_problem, silent
 
 WINDOWS = PinnLocalSolver(wall_spacing=0.65, corner_spacing=0.026, growth=0.65, cell=0.42)
 """On the default finger with elements of 0.25 and 0.5 mm the von Mises stress is 4.5 and 5.2 % from the truth
@@ -69,23 +69,13 @@ class PinnIdSolver(IdentifyingSolver):
         super().__post_init__()
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Find the unknowns and solve with them; see `Solver`. Without markers it solves for the load."""
+        """Find the unknowns and solve with them; see `Solver`."""
         check_problem(self, problem)
-        if problem.observations is not None:
-            found, _, _ = self._solved(problem, problem.observations, progress)
-            progress(1.0, found.force_phrase)
-            return found
-        level = replace(
-            WINDOWS,
-            wall_spacing=self.spacing * WINDOWS.wall_spacing,
-            corner_spacing=self.spacing * WINDOWS.corner_spacing,
-            growth=self.spacing * WINDOWS.growth,
-            tolerance=0.02,
-            seed=self.seed,
-        )
-        plain = level.solve(problem, progress)
-        said = f"without markers, this is pinn-std with preset=local: {plain.status.message}"
-        return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
+        if problem.observations is None:
+            raise UnsupportedProblemError("pinn-id finds the contact by markers: give some, or take pinn-std")
+        found, _, _ = self._solved(problem, problem.observations, progress)
+        progress(1.0, found.force_phrase)
+        return found
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """A function that finds the unknowns for other observations; see `Refittable`.

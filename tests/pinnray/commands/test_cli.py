@@ -215,7 +215,10 @@ def test_another_jobs_finished_run_is_not_replaced_without_being_asked(folder, c
     capsys.readouterr()
     assert main([*SMALL, "--quiet", "--stroke", "5", "--seed", "1"]) == BAD_INPUT
     said = capsys.readouterr().err
-    assert "out/default holds the finished run of another job (other seed, stroke); give --out" in said
+    assert (
+        "out/default holds the finished run of another job (other seed, stroke); name another output folder"
+        in said
+    )
     assert Path("out/default/run.json").read_bytes() == before
     assert main([*again, "--design", "default", "--load", "mean"]) == 0  # as by default: the same job
     assert main([*again, "--stroke", "5", "--out", "out/default"]) == 0

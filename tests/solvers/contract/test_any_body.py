@@ -29,7 +29,7 @@ SETTINGS = QUICK | {
     "pinn-asm trained": TINY,
     "gp": {"clamp": True},
     "fem-id": {"law": "given"},
-    "pinn-id": QUICK["pinn-id"] | {"law": "given"},
+    "pinn-id": {"spacing": 3.0, "law": "given"},
 }
 
 SOLVERS = [

@@ -24,11 +24,10 @@ QUICK = {
     "pinn-std local": LOCAL,
     "pinn-asm": {"wall_spacing": 1.0, "corner_spacing": 0.2, "neurons": 4, "tolerance": 1.0},
     "pinn-asm local": LOCAL | {"wall_spacing": 0.9, "corner_spacing": 0.3, "tolerance": 1.0},
-    "pinn-id": {"spacing": 3.0},
 }
 """Settings that make a solver quick enough for the tests."""
 
-WITHOUT_MECHANICS = {"gp"}
+WITHOUT_ANSWER = {"gp", "pinn-id"}
 """Solvers that have nothing to say without markers, and nothing that this suite could test."""
 
 MEANT_OVER_DEPTH = {"fem-3d": 8e-3}
@@ -39,7 +38,7 @@ ends: 0.0002 mm of 2 mm, and 0.6 % of the energy, on this mesh.
 """
 
 NAMES = [
-    *(name for name in dict.fromkeys([*solver_names(), "skfem-p2"]) if name not in WITHOUT_MECHANICS),
+    *(name for name in dict.fromkeys([*solver_names(), "skfem-p2"]) if name not in WITHOUT_ANSWER),
     *("pinn-std local", "pinn-asm local"),
 ]
 """Ours, those of the packages that are installed, the package that lives in the tests, and presets."""
@@ -55,12 +54,12 @@ PAIRS = [(name, kind) for name in NAMES if name in LOADS for kind in ("mean", "p
 ACCURACY = {
     **dict.fromkeys(("fem", "fem-asm", "statfem", "fem-id", "skfem-p2"), 1e-8),
     **{"fem-nonlinear": 1e-6, "fem-3d": 1e-4},
-    **dict.fromkeys(("pinn-std", "pinn-asm", "pinn-id"), 0.02),
+    **dict.fromkeys(("pinn-std", "pinn-asm"), 0.02),
 }
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training."""
 
 
-SLOW = ("fem-3d", "fem-id", "pinn-std local", "pinn-asm", "pinn-asm local", "pinn-id")
+SLOW = ("fem-3d", "fem-id", "pinn-std local", "pinn-asm", "pinn-asm local")
 """Solvers that have a quicker one of their kind beside them."""
 
 
@@ -91,7 +90,7 @@ def relative(difference, reference):
 def test_every_registered_solver_is_in_this_suite(plugin_folder, monkeypatch):
     monkeypatch.syspath_prepend(str(plugin_folder))
     plain = {name for name in NAMES if " " not in name}
-    assert set(usable_solvers()) == plain | WITHOUT_MECHANICS == set(solver_names())
+    assert set(usable_solvers()) == plain | WITHOUT_ANSWER == set(solver_names())
 
 
 @pytest.mark.parametrize(

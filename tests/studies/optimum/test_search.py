@@ -109,7 +109,7 @@ def test_one_objective_with_limits_has_the_best_fingers_in_their_order(tmp_path,
     assert (table["wrap_deg"] >= 20).all()
     page = html.unescape((out / "front.html").read_text(encoding="utf-8"))
     assert "largest force, with von_mises at most 2.85 MPa, wrap at least 20 deg" in page
-    command = re.search(r"`pinnray (compare --from .*?)`", page)
+    command = re.search(r"<code>pinnray (compare --from .*?)</code>", page)
     assert command
     assert main([*shlex.split(command[1]), "--out", str(tmp_path / "again"), "--quiet"]) == 0
 

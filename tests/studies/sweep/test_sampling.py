@@ -9,7 +9,7 @@ from pinnray.studies.sweep.study import Range, Study
 VARIED = {
     "rib_count": {"from": 2, "to": 5},
     "height": {"from": 80, "to": 100},
-    "law": {"values": ["linear", "gent"]},
+    "plane": {"values": ["strain", "stress"]},
 }
 
 
