@@ -129,13 +129,13 @@ def text_table(title: str, table: pd.DataFrame) -> TextTable:
 
 
 def page_tables(optimum: Optimum) -> list[TextTable]:
-    """The front in two tables, narrow enough for a page."""
+    """The front in tables that are narrow enough for a page."""
     table = front_table(optimum).rename(columns=_in_lines)
     split = 2 + len(optimum.study.names) + len(optimum.study.varied)
-    return [
-        text_table(optimum.study.heading, table.iloc[:, :split]),
-        text_table("Their other quantities", table.iloc[:, [0, *range(split, len(table.columns))]]),
-    ]
+    found = [text_table(optimum.study.heading, table.iloc[:, :split])]
+    for columns in np.array_split(np.arange(split, len(table.columns)), 2):
+        found.append(text_table("Their other quantities", table.iloc[:, [0, *columns]]))
+    return found
 
 
 def _in_lines(heading: str) -> str:
