@@ -15,7 +15,7 @@ from pinnray.runtime.stages import Stages
 from pinnray.solvers.finger_figures import QUANTITIES, heading
 from pinnray.solvers.finger_figures.measures import narrowest_gap, thinnest_wall
 from pinnray.studies.emulator.gaussian_process import GaussianProcess
-from pinnray.studies.emulator.inputs import Inputs, Numbers
+from pinnray.studies.emulator.inputs import Features, Inputs
 from pinnray.studies.sweep.study import Study, Value, title
 from pinnray.studies.sweep.sweep import Sweep
 
@@ -174,7 +174,7 @@ def prediction_table(
     return pd.DataFrame(columns)
 
 
-def _learnt(values: FloatArray, name: str, numbers: Numbers, *, quick: bool) -> Learnt:
+def _learnt(values: FloatArray, name: str, numbers: Features, *, quick: bool) -> Learnt:
     good = np.isfinite(values)
     base = numbers.bases[name]
     positive = bool((values[good] > 0).all() and (base > 0).all())
@@ -184,7 +184,7 @@ def _learnt(values: FloatArray, name: str, numbers: Numbers, *, quick: bool) -> 
     return Learnt(process, positive)
 
 
-def _predicted(learnt: Learnt, name: str, numbers: Numbers) -> FloatArray:
+def _predicted(learnt: Learnt, name: str, numbers: Features) -> FloatArray:
     """Prediction and both ends of the interval, shape (3, n)."""
     middle, width = learnt.process.predict(numbers.inputs)
     ends = np.stack([middle, middle - width, middle + width])

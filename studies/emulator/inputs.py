@@ -32,7 +32,7 @@ LEAST_STRESS = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Numbers:
+class Features:
     """The numbers of n fingers.
 
     Attributes:
@@ -107,7 +107,7 @@ class Inputs:
         """Material and load of a finger."""
         return physics_of({**self.study.fixed, **finger})
 
-    def numbers(self, fingers: Sequence[Mapping[str, Value]], shapes: Sequence[Parameters]) -> Numbers:
+    def numbers(self, fingers: Sequence[Mapping[str, Value]], shapes: Sequence[Parameters]) -> Features:
         """The numbers of fingers and their parameters."""
         columns = self.columns(fingers)
         phase = 2 * np.pi * np.array([_rib_phase(shape) for shape in shapes])
@@ -126,7 +126,7 @@ class Inputs:
             **{"von_mises": modulus * largest, "principal_strain": largest},
         }
         forces = dict.fromkeys(("force", "force_25", "force_50", "force_75"), modulus * depth)
-        return Numbers(
+        return Features(
             np.concatenate([columns, np.stack([np.cos(phase), np.sin(phase)], axis=1), stress], axis=1),
             bases,
             {**dict.fromkeys(bases, one), **forces},
