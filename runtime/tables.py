@@ -5,6 +5,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from itertools import zip_longest
 from math import isfinite, isnan
 from pathlib import Path
 from types import MappingProxyType
@@ -107,7 +108,8 @@ def read_table(
         titles.pop()
     places, body = columns_of(titles, required, optional, str(path)), rows[1:]
     if body and all(UNIT.fullmatch(cell) for cell in body[0][1]):
-        titles = [" ".join(pair) for pair in zip(titles, body.pop(0)[1], strict=False)]
+        units = zip_longest(titles, body.pop(0)[1][: len(titles)], fillvalue="")
+        titles = [" ".join(pair).strip() for pair in units]
     commas = separator != "," and any(DECIMAL_COMMA.fullmatch(cell) for _, cells in body for cell in cells)
     read = []
     for line, cells in body:

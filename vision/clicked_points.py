@@ -238,7 +238,10 @@ def _check_pair(here: FloatArray, there: FloatArray) -> None:
 
 def _size(places: FloatArray) -> float:
     """Rms distance of the points from their middle, without those that are missing."""
-    return float(np.sqrt(np.nanvar(places, axis=0).sum()))
+    size = float(np.sqrt(np.nanvar(places, axis=0).sum()))
+    if size <= ROUNDING * float(np.nanmax(np.abs(places))):
+        raise UserError("all points of a picture are at one place")
+    return size
 
 
 def _listed(names: Sequence[float] | FloatArray | IntArray) -> str:

@@ -21,6 +21,8 @@ SIZES, ERRORS = (0.003, 0.01, 0.03, 0.1, 0.2), (3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.
 """Standard deviations of the field and of the errors."""
 SURE = 10.0
 """Gain in logarithmic likelihood from which on another order counts as the right one."""
+GAINED = 1e-6
+"""Smallest gain of an exchange, relative, above what rounding makes."""
 MOST = 60
 """Number of points above which the search takes too long."""
 
@@ -110,6 +112,6 @@ class _Field:
             trial[:] = order
             trial[rows, one], trial[rows, other] = order[other], order[one]
             found = self.likelihoods(there[trial] - base)  # the last is without an exchange
-            if found.argmax() == len(one) or not found.max() > found[-1] + 1e-9:
+            if not found.max() - found[-1] > GAINED * (1 + abs(found[-1])):  # or it would turn in circles
                 return order, float(found[-1])
             order = trial[found.argmax()].copy()

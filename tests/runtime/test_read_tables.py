@@ -39,6 +39,7 @@ def read(folder: Path, content: str | bytes) -> list[list[float]]:
         ",x,y\n0,1.5,-2\n1,1040.25,0.5\n",  # an index without a title
         "Specimen;7\nMachine;A\n\nx;y\n1,5;-2\n1040,25;0,5\n",  # a preamble
         "program, version\nx,y\n(mm),[mm]\n1.5,-2\n1040.25,0.5\n",  # and units
+        "x,y\nmm\n1.5,-2\n1040.25,0.5\n",  # a unit of the first column only
         "x,y\nmm,mm\n\n# a comment\n1.5,-2\n,\n1040.25,0.5\n",
     ],
 )

@@ -146,6 +146,7 @@ def test_a_right_list_is_left_as_it_is(shown):
         (picture(MARKERS, 0.2), "both lists have the same points"),
         (picture(MARKERS, 0.2, order=slice(None, None, -1)), "both lists have the same points"),
         (picture(MARKERS + MOVED, 0.2, flip=False), "y runs the other way in the pressed list"),
+        (picture(0 * MARKERS, 0.2), "all points of a picture are at one place"),
         (picture(MARKERS + MOVED, 2.0), " times closer together"),
         (picture(MARKERS + MOVED, 0.02), " times farther apart"),
     ],

@@ -80,8 +80,6 @@ class LoadPath:
         self._newton, self._exact_from = self._begin(), exact_from
         rough = self._begin(tolerance=ROUGH_TOLERANCE) if exact_from > 0 else None
         self._rough = rough  # For equilibria that need be near only
-        rubs = problem.load.friction > 0  # Friction depends on the way
-        self._stops = {*steps.stops, *(() if self.equilibrium.linear or rubs else QUARTERS)}
         contact = self.equilibrium.contact
         self._max_step = steps.max_step if contact is None else min(steps.max_step, contact.longest_step)
         self._softer: list[float] | None = [] if contact is None else None  # Until it is needed
@@ -107,7 +105,9 @@ class LoadPath:
 
     def follow(self, progress: Progress) -> None:
         """Go to the full load, or as far as equilibria are found."""
-        step, stops = min(self._steps.first_step, self._max_step), sorted(self._stops)
+        contact, step = self.equilibrium.contact, min(self._steps.first_step, self._max_step)
+        rubs = contact is not None and contact.coefficient > 0  # friction depends on the way
+        stops = sorted({*self._steps.stops, *(() if self.equilibrium.linear or rubs else QUARTERS)})
         while (last := self.points[-1].fraction) < 1:
             stop = next((each for each in stops if each > last), 1.0)
             rest = stop - last
