@@ -208,7 +208,9 @@ def test_the_finished_run_of_another_job_is_not_replaced_unasked(out):
     check_same_job(out, {"stroke": 5.0, "set": ("N=4",), "pictures": "pdf", "design": "default"}, usual)
     check_same_job(out.with_name("absent"), {"stroke": 6.0}, usual)
     for other, said in [({"stroke": 5.0}, "set"), ({"set": ["N=4"], "truth": "stvk"}, "stroke, truth")]:
-        with pytest.raises(UserError, match=rf"finished run of another job \(other {said}\); .*--out .*run "):
+        with pytest.raises(
+            UserError, match=rf"finished run of another job \(other {said}\); name another .*run itself "
+        ):
             check_same_job(out, other, usual)
 
 
