@@ -183,8 +183,7 @@ def compare(
         preset: Of the networks among them: `fast`, `local`, `paper` or `trained`.
         measurements: Marker displacements: a data frame or CSV file (x_mm, y_mm, u_mm, v_mm), or a video to
             track without a camera file; simulated by a finite-strain run if None.
-        truth: What is simulated then: "sliding" (if None), "stvk", "gent", "cylinder", "oblique", "friction",
-            "rubbing", "3d" or "sticking".
+        truth: What is simulated then, such as "sliding" (if None), "cylinder" or "3d".
         size: Largest element in walls and ribs, mm.
         adapt: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
         material: The elastic constants; each solver takes the law that it has.

@@ -62,8 +62,8 @@ class Load(CheckedModel):
     the displacement, as in `Travel`.
 
     Attributes:
-        kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_functional`);
-            well posed, the default. `point`: the displacement of the contact's middle node is prescribed, as
+        kind: `mean`: the mean displacement over the contact, weighted by `mean_weight`, is prescribed; well
+            posed, the default. `point`: the displacement of the contact's middle node is prescribed, as
             in the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact
             has the displacement. `cylinder`: a rigid cylinder, which does not turn and touches the front face
             at the contact's middle from outside, moves by the displacement; the contact zone is found.
@@ -137,6 +137,17 @@ class Load(CheckedModel):
         import numpy as np
 
         return np.array([value for value in self.displacement if value is not None], dtype=np.float64)
+
+
+def mean_weight(distance: "FloatArray", width: float) -> "FloatArray":
+    """Weight of the displacement at distances from the contact's middle, shape (n,), in the mean load, 1/mm.
+
+    The raised cosine (1 + cos(2 pi s / b)) / b at distance s, in mm, of a contact of width b: smooth, zero at
+    both ends, with integral one.
+    """
+    import numpy as np
+
+    return np.asarray((1 + np.cos(2 * np.pi * distance / width)) / width)
 
 
 class Physics(Travel, Material):

@@ -1,4 +1,4 @@
-"""Material: elastic constants, the name of their law, and what the finger is made of."""
+"""Material: elastic constants, the name of their law (see `elasticity`), and what the finger is made of."""
 
 from collections.abc import Sequence
 from typing import Literal, NamedTuple, Self

@@ -23,6 +23,7 @@ from pinnray.solvers.load import ROUGHEST as ROUGHEST
 from pinnray.solvers.load import Load as Load
 from pinnray.solvers.load import LoadKind as LoadKind
 from pinnray.solvers.load import Physics as Physics
+from pinnray.solvers.load import mean_weight
 from pinnray.solvers.material import Material as Material
 from pinnray.solvers.material import Substance as Substance
 
@@ -143,10 +144,8 @@ def contact_nodes(problem: Problem) -> IntArray:
 def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """The load's linear functional: points (q, 2), mm, and weights (q,), of sum one, of their displacements.
 
-    For `mean` the weight along the contact of width b, at distance s from its middle, both along x, is the
-    raised cosine (1 + cos(2 pi s / b)) / b: smooth, zero at both ends, with integral one. On a curved front
-    it weighs true lengths and is scaled to the integral one. For `point` it is the middle node, or the point
-    at `position`.
+    For `mean` the weights are `mean_weight` along x; on a curved front they weigh true lengths and are scaled
+    to the integral one. For `point` it is the middle node, or the point at `position`.
     """
     mesh, load = problem.mesh, problem.load
     if load.kind == "point" and load.position is None:
@@ -157,7 +156,7 @@ def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
         return front_points(mesh, np.array([middle])), np.ones(1)
     count = 12  # points on an edge, enough if one edge holds the whole contact
     points, lengths = segment_quadrature(*_front_between(mesh, left, right), count)
-    weights = lengths * (1 + np.cos(2 * np.pi * (points[:, 0] - middle) / width)) / width
+    weights = lengths * mean_weight(points[:, 0] - middle, width)
     return points, weights / weights.sum()
 
 

@@ -74,8 +74,8 @@ def command(
             complete table that support the problem.
         measurements: CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm), or a video, a folder or
             glob of pictures to track. Default: simulated by a finite-strain run, and labelled as such.
-        truth: What is simulated where nothing is measured: sliding (the default), stvk, gent, cylinder,
-            oblique, friction, rubbing, 3d or sticking; docs/how-to/own-truth.md explains them.
+        truth: What is simulated where nothing is measured, such as sliding (the default), cylinder or 3d;
+            docs/how-to/own-truth.md has all.
         reference: Solver that the others are compared with; default fem, else the first.
         from_: File with options that the command line leaves out: TOML or JSON with a table `options`, or the
             run.json of an earlier run, which is repeated so; default: none.

@@ -52,8 +52,8 @@ def command(
         solvers: Names of solvers, separated by commas. One that can choose the weight of the markers runs in
             three variants (linear law).
         schemes: Hold-out schemes, separated by commas.
-        truth: Truths, separated by commas, or all: sliding, stvk, gent, print, base, cylinder, oblique,
-            mixed, friction, rubbing, 3d, sticking.
+        truth: Truths, separated by commas, such as sliding,cylinder,3d, or all; docs/how-to/own-truth.md has
+            them.
         layouts: Marker layouts at which the same truth is sampled, separated by commas; default: the
             design's own.
         seeds: Number of noise draws.

@@ -93,6 +93,7 @@ def test_the_quantities_of_the_default_finger() -> None:
     solution = FemSolver(estimate=False).solve(PROBLEM)
     found = figures_of(solution).values()
     assert list(found) == list(QUANTITIES)
+    assert [name for name, each in QUANTITIES.items() if each.always and not np.isfinite(found[name])] == []
     assert found["force"] == pytest.approx(-solution.reaction[1] * FINGER.depth)
     assert found["force_25"] == pytest.approx(found["force"] / 4)
     assert found["area"] == pytest.approx(PROBLEM.mesh.areas.sum(), rel=1e-9)
