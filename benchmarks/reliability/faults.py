@@ -1,12 +1,11 @@
 """A fault at every change of a file of commands: what they leave, and whether the same command goes on.
 
 Each command runs in a forked process whose changes of files are counted. Then it runs again for each,
-with a fault there: killed before it, killed in the middle of a write, a disk that is full from there on, one
-failed call. After each, no process is left and no file is in part under its final name; an output folder
-that is replaced as a whole is the last result or the new one; an error is told in one line; and the same
-command gives the numbers of an undisturbed run to the bit. x86-64 Linux only. `--rows rig` tries the jobs
-with this word in their names; all take some five hours of one core. Broken promises are printed as they are
-found.
+with a fault there: killed before it, a disk that is full from there on, one failed call. After each, no
+process is left and no file is in part under its final name; an output folder that is replaced as a whole is
+the last result or the new one; an error is told in one line; and the same command gives the numbers of an
+undisturbed run to the bit. x86-64 Linux only. `--rows rig` tries the jobs with this word in their names; all
+take some five hours of one core. Broken promises are printed as they are found.
 """
 
 import os
@@ -85,7 +84,7 @@ def trials(commands: Sequence[str], place: Path, cache: Path, every: int = 1) ->
 
 
 def faults(points: Sequence[Point]) -> list[Fault]:
-    """Every fault at every point that differs: writes are torn, and a full disk stops what needs more of it.
+    """Every fault at every point that differs; a full disk stops what needs more of it.
 
     Of a series of equal calls on a file the first, the middle and the last differ.
     """
@@ -93,12 +92,8 @@ def faults(points: Sequence[Point]) -> list[Fault]:
     for _, group in groupby(range(len(points)), key=lambda at: (points[at].call, plain(points[at].path))):
         series = list(group)
         chosen += sorted({series[0], series[len(series) // 2], series[-1]})
-    calls = {"torn": {"write"}, "ENOSPC": GROWING}
     return [
-        Fault(kind, at)
-        for kind in KINDS
-        for at in chosen
-        if kind not in calls or points[at].call in calls[kind]
+        Fault(kind, at) for kind in KINDS for at in chosen if kind != "ENOSPC" or points[at].call in GROWING
     ]
 
 

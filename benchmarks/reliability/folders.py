@@ -3,9 +3,7 @@
 import csv
 import hashlib
 import json
-import sqlite3
 from collections.abc import Callable, Mapping
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,7 @@ from PIL import Image
 
 TIMES = ("second", "started", "time", "rate_hz", "pace", "live")
 """Words in the names of entries that differ from run to run."""
-PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", "run.json")
+PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", ".sqlite", "run.json")
 """Ends of files of which only the presence is compared: they, or the files that they list, tell times."""
 CUT = "cut off"
 
@@ -33,8 +31,7 @@ def _digest(path: Path) -> str:
     try:
         content = READERS.get(path.suffix, Path.read_bytes)(path)
     except Exception:  # whatever a reader says of half a file
-        # What is half done in a data base, the next to open it undoes.
-        return "" if path.suffix == ".sqlite" else CUT
+        return CUT
     return "" if path.name.endswith(PRESENT) else hashlib.sha256(repr(content).encode()).hexdigest()
 
 
@@ -65,12 +62,6 @@ def _arrays(path: Path) -> Any:
     return headers, [(name, each.shape, each.tobytes()) for name, each in arrays.items() if name not in texts]
 
 
-def _journal(path: Path) -> Any:
-    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as connection:
-        query = "select number, state, message, quantities from samples order by number"
-        return connection.execute(query).fetchall()
-
-
 def _ended(path: Path) -> bytes:
     """The content of a file of elements, which the end of the outermost has to close."""
     content = path.read_bytes()
@@ -83,7 +74,6 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ".json": lambda path: _timeless(json.loads(path.read_text(encoding="utf-8"))),
     ".csv": _csv,
     ".npz": _arrays,
-    ".sqlite": _journal,
     ".parquet": lambda path: _timeless(pd.read_parquet(path).to_dict("list")),
     ".png": lambda path: Image.open(path).tobytes(),
     **dict.fromkeys((".html", ".vtu", ".svg"), _ended),

@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 from pinnray.runtime.errors import UserError
 
-KINDS = ("kill", "torn", "ENOSPC", "EIO")
-"""Faults: killed before a call, killed within a write, disk full from a call on, one failed call."""
+KINDS = ("kill", "ENOSPC", "EIO")
+"""Faults: killed before a call, disk full from a call on, one failed call."""
 
 BY_FILE = {
     **{1: ("write", 0), 18: ("pwrite64", 0), 20: ("writev", 0), 40: ("sendfile", 0)},
@@ -196,7 +196,7 @@ class _Supervisor:
             return
         identity, task, _, number, _, _, *arguments = _NOTIFICATION.unpack(received.raw)
         point = self._point(task, number, arguments)
-        error = self._strike(point, task, arguments) if point else 0
+        error = self._strike(point, task) if point else 0
         if error is None:  # the caller was killed; an answer would let its call begin before it ends
             return
         answer = _ANSWER.pack(identity, 0, -error, 0 if error else _CONTINUE)
@@ -223,7 +223,7 @@ class _Supervisor:
         futile = os.path.lexists(path) == FUTILE.get(name)
         return Point(name, path) if path.startswith(tuple(self.watched)) and not futile else None
 
-    def _strike(self, point: Point, task: int, arguments: Sequence[int]) -> int | None:
+    def _strike(self, point: Point, task: int) -> int | None:
         """Count a point and put the fault into it; the error number that the call ends with, or 0.
 
         None if the process that waits for the answer was killed.
@@ -237,18 +237,9 @@ class _Supervisor:
             return errno.ENOSPC if point.call in GROWING else 0
         if fault.kind == "EIO":
             return errno.EIO
-        if fault.kind == "torn" and point.call == "write":
-            _write_half(task, *arguments[:3])
         own = os.path.exists(f"/proc/{self.child}/task/{task}")
         os.kill(self.child, signal.SIGKILL)
         return None if own else 0
-
-
-def _write_half(task: int, file: int, address: int, length: int) -> None:
-    """Do the first half of a write for a process that is about to be killed."""
-    position = int(Path(f"/proc/{task}/fdinfo/{file}").read_text().split()[1])
-    with open(f"/proc/{task}/fd/{file}", "r+b", buffering=0) as place:
-        os.pwrite(place.fileno(), _memory(task, address, length // 2), position)
 
 
 def _memory(task: int, address: int, length: int) -> bytes:

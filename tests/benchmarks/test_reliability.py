@@ -59,7 +59,6 @@ def test_every_change_of_a_file_is_a_point_also_those_of_children(tmp_path: Path
     ("kind", "at", "code", "left"),
     [
         ("kill", 1, -9, {".a.partial.txt": ""}),  # before the write
-        ("torn", 1, -9, {".a.partial.txt": "hal"}),  # half of it
         ("kill", 2, -9, {".a.partial.txt": "hallo!"}),  # before the rename
         ("EIO", 1, 1, {}),  # the temporary file is removed
         ("ENOSPC", 0, 1, {}),
@@ -91,7 +90,6 @@ def test_of_equal_calls_on_a_file_the_first_the_middle_and_the_last_are_chosen()
     struck = {kind: [fault.at for fault in faults(points) if fault.kind == kind] for kind in KINDS}
     assert struck == {
         "kill": [0, 1, 4, 7, 8, 9],
-        "torn": [1, 4, 7],
         "ENOSPC": [0, 1, 4, 7],
         "EIO": struck["kill"],
     }
