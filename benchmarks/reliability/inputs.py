@@ -19,6 +19,7 @@ from pinnray.geometry.finger.parameters import Parameters, parameter_info
 from pinnray.geometry.finger.presets import load_design, preset_names
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
+from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.registry import make_solver
 from pinnray.studies.sweep.job import Task
 from pinnray.studies.sweep.measurement import Measurement, measured
@@ -119,8 +120,9 @@ def answer_to(task: Task) -> Measurement:
 
 def fault_of(answer: Measurement, seconds: float) -> str:
     """The broken promise in the end of an input; empty if there is none."""
-    # Of a section without cavities these quantities are infinite.
-    free = [name for name in ("thinnest_wall", "narrowest_gap") if answer.values.get(name) == math.inf]
+    # Some quantities are not of every finger; of a section without cavities these are infinite.
+    free = {name for name, quantity in QUANTITIES.items() if not quantity.always}
+    free |= {name for name in ("thinnest_wall", "narrowest_gap") if answer.values.get(name) == math.inf}
     bad = [name for name, value in answer.values.items() if not math.isfinite(value) and name not in free]
     faults = {
         f"an error of the program: {answer.message}": answer.state == "failed",
