@@ -57,6 +57,7 @@ nitpick_ignore_regex = [
         r"(numpy|pathlib|annotated_types|collections\.abc|types|pandas|pd|matplotlib|pydantic|pyvista)\..*",
     ),
     ("py:.*", r"(Figure|Path|ArrayLike|Array|FloatArray|Value|shapely\..*|(.*\.)?T|.*Options)"),
+    ("py:.*", r"typing\.Annotated\[.*|lambda"),  # numbers that JSON has as null
     ("py:.*", r"pinnray\.comparison\.(figures|evaluation\.truths)\..*"),
     ("py:.*", r"pinnray\.geometry\.(finger\.(rules|parameters)|drawing\.placement)\..*"),
     ("py:.*", r"pinnray\.(film|measurements|robots|runtime|studies|vision)\..*"),
