@@ -97,7 +97,7 @@ class FingerFigures:
         "", "peak strain, as a nominal one, over the material's strain at break: 1 breaks", always=False
     )
     area: float = _figure("mm2", "area of the section")
-    mass: float = _figure("g", "mass of the body")
+    mass: float = _figure("g", "mass of a body of this section and depth")
     thinnest_wall: float = _figure("mm", "thinnest wall or rib")
     narrowest_gap: float = _figure("mm", "narrowest clear width of a cavity")
     strain_energy: float = _figure("mJ", "elastic energy of the whole finger")

@@ -87,11 +87,12 @@ def read_step(
     apart = _apart(turned, cut)
     if apart > SAME and not depth_known:
         deep = _depths(_layers(turned, cut.frame))
+        depth = max(deep, key=np.prod)[1]
         sections = ", ".join(f"{area * unit**2:.4g} mm2 over {depth * unit:.4g} mm" for area, depth in deep)
         raise UserError(
             f"the solid is not extruded: across {cut.plane} its section is {sections}, and its volume "
             f"{turned.Volume() * unit**3:.5g} mm3; give the depth of the finger and its plane, such as "
-            f'depth = {deep[0][1]:.4g} and plane = "{cut.plane}"'
+            f'depth = {depth:.4g} and plane = "{cut.plane}"'
         )
     pieces = [
         piece
@@ -101,8 +102,9 @@ def read_step(
         for piece in _pieces(edge, unit)
     ]
     discs = np.array([_disc(marker.moved(cut.frame.inverse)) for marker in markers]).reshape(-1, 4) * unit
-    size, depth = MarkerSize.of(discs[:, 2]), f"{cut.depth * unit:.6g} mm"
-    how = f"extruded by {depth}" if apart <= SAME else f"cut, {depth} across"
+    size, across = MarkerSize.of(discs[:, 2]), f"{cut.depth * unit:.6g} mm"
+    whole = f"{turned.Volume() * unit**3:.5g} mm3"
+    how = f"extruded by {across}" if apart <= SAME else f"cut, {across} across, of a solid of {whole}"
     how += f" but for {100 * apart:.2g} % of the volume" if 1e-6 < apart <= SAME else ""
     closed = closed_loops(pieces, scale=scale, tolerance=tolerance)
     return Drawing(
@@ -126,9 +128,10 @@ def _united(faces: Sequence[cq.Face]) -> Sequence[cq.Face]:
 
 
 def _filled(body: cq.Solid, markers: Sequence[cq.Solid]) -> cq.Solid:
-    """The body with its markers in their pockets; the body alone if they do not touch it."""
+    """The body with its markers in their pockets; the body alone if they are outside it or stand out."""
     whole = body.fuse(*markers).clean().Solids() if markers else [body]
-    return whole[0] if len(whole) == 1 else body
+    size, before = (each.BoundingBox().DiagonalLength for each in (whole[0], body))
+    return whole[0] if len(whole) == 1 and size < before + 1e-6 else body
 
 
 def _across(solid: cq.Solid) -> tuple[cq.Shape, Cut]:

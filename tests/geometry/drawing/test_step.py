@@ -181,9 +181,11 @@ def test_a_face_without_a_normal_somewhere_is_no_hindrance(tmp_path, kind):
 def stepped(kind: str) -> cq.Shape:
     """A bar of 60 mm by 12 mm that is 20 mm deep, and not everywhere."""
     bar = cq.Workplane("XY").box(60, 12, 20)
+    hollow = bar.cut(cq.Workplane("XY").box(40, 4, 20))
     return {
         "foot": lambda: bar.union(cq.Workplane("XY").box(8, 16, 40).translate((-34, 0, 0))),
         "foot flush": lambda: bar.union(cq.Workplane("XY").box(8, 16, 40).translate((-34, 0, 10))),
+        "thin foot": lambda: hollow.union(cq.Workplane("XY").box(8, 12, 10).translate((-34, 0, 0))),
         "boss": lambda: bar.faces(">Z").workplane().rect(10, 8).extrude(5),
         "step": lambda: bar.cut(cq.Workplane("XY").box(20, 10, 10).translate((25, 0, 10))),
         "chamfer": lambda: bar.edges().chamfer(2),
@@ -204,6 +206,7 @@ def stepped(kind: str) -> cq.Shape:
             "z = 0 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm, and .* 19520 mm3; .* depth = 20",
         ),
         ("foot flush", "z = -10 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm"),
+        ("thin foot", "656 mm2 over 10 mm, 560 mm2 over 20 mm, and .* 12160 mm3; .* depth = 20"),
         ("boss", "720 mm2 over 20 mm, 80 mm2 over 25 mm"),
         ("step", "720 mm2 over 15 mm, 570 mm2 over 20 mm"),
         ("chamfer", "712 mm2 over 20 mm, and its volume 13707"),
@@ -218,6 +221,15 @@ def test_the_depth_of_a_solid_is_asked_for_unless_its_volume_is_area_times_depth
         read_drawing(path, plane="z = 1")
     drawing = read_drawing(path, plane="z = 1", depth_known=True)
     assert "cut, " in drawing.note
+    assert f"of a solid of {stepped(kind).Volume():.5g} mm3" in drawing.note
+
+
+def test_markers_that_stand_out_do_not_make_the_finger_deeper(tmp_path):
+    whole = cq.Assembly(name="whole").add(BODY, name="body")
+    whole.add(cq.Workplane("XY").circle(1).extrude(2).translate((0, 9, 11)), name="marker-1")
+    drawing = read_drawing(exported(tmp_path, whole))
+    assert drawing.depth == pytest.approx(12)
+    assert "extruded by 12 mm, at" in drawing.note
 
 
 def test_a_sheared_solid_is_extruded_along_its_one_straight_direction(tmp_path):
