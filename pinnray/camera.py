@@ -115,8 +115,8 @@ def film_forces(
     Args:
         source: The film, as for `track`.
         design: The finger.
-        material: The elastic constants, or the name of a material; unless a law is given, the law of
-            finite strain that the markers tell is taken. The force is in proportion to Young's modulus.
+        material: The elastic constants, or the name of a material; unless a law of finite strain
+            is given, the neo-Hookean one is taken. The force is in proportion to Young's modulus.
         progress: Whether to show the stages; if None in a notebook only.
         given: How the film is read, as for `track`, and parameters of the finger and the material, as for
             `solve`.

@@ -108,7 +108,7 @@ def gripper_mjcf(name: str, chain: str, place: FloatArray, radius: float, depth:
         depth: Of the finger, mm.
         stroke: How far each carriage moves beyond the first touch, mm.
     """
-    root = _model(name, "implicitfast")
+    root = _model(name, "implicitfast", STEP / 2)  # a held object shakes loose in whole ones
     ET.SubElement(ET.SubElement(root, "asset"), "model", name="finger", file=chain)
     world, drives = ET.SubElement(root, "worldbody"), ET.SubElement(root, "actuator")
     for side, sign, turn in (("left", -1, 0.0), ("right", 1, np.pi)):
@@ -170,10 +170,10 @@ def with_header(text: str, lines: Sequence[str]) -> str:
     return f"<!--\n{said}\n-->\n{text}"
 
 
-def _model(name: str, integrator: str) -> ET.Element:
+def _model(name: str, integrator: str, step: float = STEP) -> ET.Element:
     root = ET.Element("mujoco", model=name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-    ET.SubElement(root, "option", timestep=_text(STEP), integrator=integrator, gravity="0 0 0")
+    ET.SubElement(root, "option", timestep=_text(step), integrator=integrator, gravity="0 0 0")
     return root
 
 

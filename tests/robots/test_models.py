@@ -101,7 +101,7 @@ def test_a_gripper_of_two_fingers_closes_on_its_object_in_its_own_time_step(tmp_
     scene = gripper_mjcf("gripper", "chain.xml", place, 6.0, SHORT.depth, 2.0)
     (tmp_path / "gripper.xml").write_text(scene)
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "gripper.xml"))
-    assert model.opt.timestep <= 1e-3
+    assert model.opt.timestep <= 5e-4  # of 1 ms, an object of 15 mm was held for two seconds only
     assert model.ntendon == 2 * (chain.hinges + 1)
     data = mujoco.MjData(model)
     for step in range(1000):

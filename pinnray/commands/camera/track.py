@@ -46,8 +46,8 @@ def command(
     Args:
         source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
         force: Estimate the indenter's force and its place in every frame; with --live in the newest one. It
-            is in proportion to Young's modulus; the markers correct Poisson's ratio and choose the law of
-            finite strain unless --law gives one.
+            is in proportion to Young's modulus; the markers correct Poisson's ratio. The law is the
+            neo-Hookean one unless --law gives one of finite strain.
         live: Show the newest force or, without --force, the displacements of every frame as it comes.
         publish: As --live, and write a line of JSON for every frame, with the newest force if --force, to the
             standard output; tables then go to standard error.
