@@ -18,11 +18,15 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import shown
 
 SEPARATORS = ",;\t"
-UNIT = re.compile(r"|[(\[].{0,12}[)\]]|mm|mm/mm|px|%|[mk]?pa|n|s|-", re.I)
+UNIT = re.compile(r"|[(\[].{0,12}[)\]]|mm|mm/mm|n/mm(?:\^?2|²)|px|%|[mkg]?pa|psi|n|s|-", re.I)
 """A cell of a line of units below the titles."""
 DECIMAL_COMMA = re.compile(r"[-+]?(\d*|\d{1,3}(\.\d{3})+),\d+(e[-+]?\d+)?", re.I)
-THOUSANDS = re.compile(r"[-+]?\d{1,3}(\.\d{3})+")
-"""A whole number with points between its thousands, as it stands in a table with decimal commas."""
+THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}((\.\d{3})+|(,\d{3})+)")
+"""A whole number with points or commas between its thousands."""
+WHOLE = re.compile(r"[-+]?(\d{3}|\d+([.,]\d{3}){2,})")
+"""A number that is written without decimals in a column in which other marks may part thousands."""
+POINT = re.compile(rf"(?!{THOUSANDS.pattern}$)[-+]?\d*\.\d+(e[-+]?\d+)?", re.I)
+"""A number with a decimal point."""
 EMPTY = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
 """Texts of a number that is not there, in lower case: as of pandas, R and spreadsheets."""
 MOST_TITLES = 12
@@ -97,9 +101,10 @@ def read_table(
             reason = "a quotation mark is opened and not closed" if open_mark else "it is not a CSV file"
             fault = UserError(f"cannot read the {what} {path}: {reason}")
             continue
-        starts = [n for n, (_, cells) in enumerate(rows) if all(_places(cells, required).values())]
         width = len(rows[0][1]) if rows else 0
-        tables.append((bool(starts), width, separator, rows[starts[0] if starts else 0 :], comments))
+        named = [sum(map(bool, _places(cells, required).values())) for _, cells in rows]
+        start = named.index(max(named)) if named else 0
+        tables.append((len(required) in named, width, separator, rows[start:], comments))
     if fault and not any(found for found, *_ in tables):
         raise fault
     _, _, separator, rows, comments = max(tables, key=lambda table: table[:2])
@@ -110,7 +115,6 @@ def read_table(
     if body and all(UNIT.fullmatch(cell) for cell in body[0][1]):
         units = zip_longest(titles, body.pop(0)[1][: len(titles)], fillvalue="")
         titles = [" ".join(pair).strip() for pair in units]
-    commas = separator != "," and any(DECIMAL_COMMA.fullmatch(cell) for _, cells in body for cell in cells)
     read = []
     for line, cells in body:
         while len(cells) > len(titles) and not cells[-1]:
@@ -120,8 +124,10 @@ def read_table(
                 f"{path}, line {line}: the header names {len(titles)} columns, this line has {len(cells)}; "
                 "name every column, and write decimals with a point or put semicolons between the cells"
             )
-        found = {name: cells[place] for name, place in places.items()}
-        read.append((line, {name: _with_point(cell) for name, cell in found.items()} if commas else found))
+        read.append((line, {name: cells[place] for name, place in places.items()}))
+    commas = separator != "," and any(DECIMAL_COMMA.fullmatch(cell) for _, cells in body for cell in cells)
+    columns = {name: _with_points([cells[name] for _, cells in read], commas) for name in places}
+    read = [(line, {name: columns[name][n] for name in places}) for n, (line, _) in enumerate(read)]
     return ReadTable(path, {name: titles[place] for name, place in places.items()}, read, comments)
 
 
@@ -205,10 +211,14 @@ def _places(titles: Sequence[str], columns: Mapping[str, str]) -> dict[str, list
     }
 
 
-def _with_point(cell: str) -> str:
-    """A cell of a table with decimal commas, its number with a decimal point."""
-    is_number = DECIMAL_COMMA.fullmatch(cell) or THOUSANDS.fullmatch(cell)
-    return cell.replace(".", "").replace(",", ".") if is_number else cell
+def _with_points(column: list[str], commas: bool) -> list[str]:
+    """A column's cells, their numbers with a decimal point; without marks where those part thousands."""
+    marked = [cell for cell in column if "," in cell or "." in cell]
+    whole = all(map(THOUSANDS.fullmatch, marked)) and any(map(WHOLE.fullmatch, column))
+    if not whole and (not commas or any(map(POINT.fullmatch, marked))):
+        return column
+    number, point = re.compile(f"{DECIMAL_COMMA.pattern}|{THOUSANDS.pattern}", re.I), "" if whole else "."
+    return [c.replace(".", "").replace(",", point) if number.fullmatch(c) else c for c in column]
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, Cell | None]]) -> None:

@@ -15,7 +15,7 @@ from pinnray.geometry.picture_frame import HAND_HELD, Homography, nearest_simila
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import read_table
-from pinnray.vision.point_order import likeliest_order, likelihoods, order_text
+from pinnray.vision.point_order import SURE, likeliest_order, likelihoods, order_text
 
 FEWEST = 3
 """Points that tell a picture's mirror image from itself."""
@@ -25,8 +25,10 @@ ROUNDING = 1e-6
 """Misfit that says nothing, over the points' extent."""
 UNKNOWN_BY = 1.5
 """A mirror image that fits worse by less than this factor may be the right one."""
-OTHER_UNIT = 2.0
-"""Ratio of the sizes of both pictures' points beyond which they are in two units."""
+OTHER_UNIT = 1.25
+"""Ratio of the sizes of both pictures' points beyond which they are in two units or scales."""
+FARTHEST = 0.5
+"""Movement of a point, over the points' extent, beyond which the pictures may be turned or cut."""
 MOST_CHOICES, CLEAR = 5000, 5.0
 """Number of ways to leave out points of the longer list up to which they are tried, and lead in logarithmic
 likelihood from which on one is the right one."""
@@ -133,7 +135,16 @@ def clicked_points(
         raise UserError(
             "y runs the other way in the pressed list than at rest; save both with y down, or both with y up"
         )
-    owner, mirrored = _matched(here, markers, one if len(rest.places) == len(markers) else None)
+    far = np.linalg.norm(zoom * there[found.order] - here, axis=1).max() / np.ptp(here, axis=0).max()
+    if far > FARTHEST:
+        remarks.append(
+            f"a point moves by {far:.0%} of the points' extent: is a picture cut, turned or mirrored?"
+        )
+    clicked = np.flatnonzero(np.isfinite(rest.places[:, 0]))
+    clicked = clicked if len(clicked) <= len(markers) else one
+    listed = clicked if len(rest.places) == len(markers) else None
+    owner, mirrored = _matched(rest.places[clicked], markers, listed)
+    owner = owner[np.searchsorted(clicked, one)]
     own, sign = markers[owner], np.array([1.0, -1.0 if mirrored else 1.0])
     order = found.order if not rest.numbers else np.arange(len(here))
     here, given = here * sign, there * sign
@@ -149,12 +160,13 @@ def clicked_points(
     here, there, given = motion.moved(here), motion.moved(there), motion.moved(given)
     if (found.order != np.arange(len(here))).any():
         text = order_text(found.order, names)
+        mixed = found.order != np.arange(len(here))
         far, least = (
-            float(np.linalg.norm(each - here, axis=1).max()) for each in (given, given[found.order])
+            float(np.linalg.norm((each - here)[mixed], axis=1).max()) for each in (given, given[found.order])
         )
         remarks.append(
-            f"the pressed points are in another order than those at rest: {text} the farthest moves by "
-            f"{least:.3g} mm, not {far:.3g}; "
+            f"the pressed points are in another order than those at rest: {text} the farthest of "
+            f"them moves by {least:.3g} mm, not {far:.3g}; "
             + ("see their numbers" if rest.numbers else "they were taken in that order")
         )
     if _misfit(there, own) < _misfit(here, own) / UNKNOWN_BY - ROUNDING * float(np.ptp(own)):
@@ -202,11 +214,25 @@ def _paired(rest: Clicks, pressed: Clicks, zoom: float) -> tuple[IntArray, IntAr
         one, other = _likeliest_choice(rest.places[spots[0]], zoom * pressed.places[spots[1]])
     if len(one) < FEWEST:
         raise UserError(f"{len(one)} points are in both pictures; give at least {FEWEST}")
+    if rest.numbers != pressed.numbers:
+        _check_numbers(rest.places, zoom * pressed.places, one, other)
     missing = {"in the pressed picture": np.delete(labels[0], one), "at rest": np.delete(labels[1], other)}
     remarks = [
         f"left out, as missing {where}: point {_listed(each)}" for where, each in missing.items() if len(each)
     ]
     return spots[0][one], spots[1][other], [f"{label:g}" for label in labels[0][one]], remarks
+
+
+def _check_numbers(here: FloatArray, there: FloatArray, one: IntArray, other: IntArray) -> None:
+    """Refuse numbers of which those of one list look shifted: in their order the points are likelier."""
+    listed = (np.arange(len(here)),) * 2
+    try:
+        listed = listed if len(here) == len(there) else _likeliest_choice(here, there)
+    except UserError:
+        return
+    found = [likelihoods(here[i], there[j][None])[0] / len(i) for i, j in (listed, (one, other))]
+    if (found[0] - found[1]) * len(here) > SURE:
+        raise UserError("the numbers of one list look shifted; give a point the same number in both lists")
 
 
 def _likeliest_choice(here: FloatArray, there: FloatArray) -> tuple[IntArray, IntArray]:
@@ -234,6 +260,8 @@ def _check_pair(here: FloatArray, there: FloatArray) -> None:
             f"the pressed points lie {max(ratio, 1 / ratio):.3g} times {nearer} than those at rest: give "
             "both lists in one unit (10 is between mm and cm), or scale both by their lengths"
         )
+    if min(len(np.unique(each, axis=0)) for each in (here, there)) < len(here):
+        raise UserError("two points of one picture are at one place; click each of them once")
 
 
 def _size(places: FloatArray) -> float:
@@ -271,7 +299,7 @@ def _matched(places: FloatArray, markers: FloatArray, listed: IntArray | None) -
         if min(misfits) > FAR * size:
             raise UserError(
                 f"the points at rest do not lie as the markers do: at best {min(misfits):.3g} mm off (rms); "
-                "give the points of this drawing"
+                "give the points of this drawing, those at rest first"
             )
         listed = found[int(np.argmin(misfits))][0]
     if max(misfits) < UNKNOWN_BY * min(misfits) + ROUNDING * size:

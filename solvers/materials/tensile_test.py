@@ -23,17 +23,20 @@ from pinnray.solvers.problem import Material
 LAWS: tuple[LawName, ...] = ("linear", "neo-hookean", "st-venant-kirchhoff")
 UNITS = {
     "strain": {"": 1.0, "ratio": 1.0, "mm/mm": 1.0, "-": 1.0, "percent": 0.01, "%": 0.01},
-    "stress_MPa": {"mpa": 1.0, "n/mm2": 1.0, "n/mm²": 1.0, "kpa": 1e-3, "pa": 1e-6, "psi": 6.894757e-3},
+    "stress_MPa": dict.fromkeys(("mpa", "n/mm2", "n/mm²", "n/mm^2"), 1.0)
+    | {"kpa": 1e-3, "pa": 1e-6, "psi": 6.894757e-3},
 }
 """Units of the columns that are read, in lower case, with the factor to a ratio and to MPa."""
+WORDS = "strain|dehnung|d[ée]formation|ε", "stress|spannung|contrainte|σ"
 TITLES = {
-    name: rf"(?:(?:nominal|engineering|eng\.?|tensile|axial)[\s_]+)*{word}[\s_/,]*(?:in\s+)?"
+    name: rf"(?:(?:nominale?|engineering|eng\.?|tensile|axial|technische|zug)[\s_]*)*(?:{word})"
+    r"(?:\s*\((?:extension|strain \d+)\))?[\s_/,]*(?:[ie]n\s+)?"
     rf"[(\[]?\s*(?P<unit>|{'|'.join(map(re.escape, UNITS[name]))})\s*[)\]]?"
-    for name, word in (("strain", "(?:strain|dehnung|ε)"), ("stress_MPa", "(?:stress|spannung|σ)"))
+    for name, word in zip(UNITS, WORDS, strict=True)
 }
-"""Titles of the columns, in English and German; those of true strain and stress are none."""
-MOST_RATIO = 10.0
-"""Strain from which on a column without a unit must be per cent: no elastomer is drawn so far."""
+"""Titles of the columns, in English, German and French; those of true strain and stress are none."""
+LIKELY_RATIO, MOST_RATIO = 1.5, 10.0
+"""Strains beyond which a column without a unit may and must be per cent: no elastomer is drawn so far."""
 FALL = 0.03
 """Fall of the stress, over its peak, from which on a test is not one rising curve."""
 
@@ -133,14 +136,14 @@ def read_tensile_test(path: Path) -> TensileTest:
     stress = stress * _factor(path, "stress_MPa", table.titles["stress_MPa"])
     loaded = strain > 0
     strain, stress = strain[loaded], stress[loaded]
-    if len(strain) and strain.max() >= MOST_RATIO and _unit("strain", table.titles["strain"]) == "":
-        raise UserError(
-            f"{path}: strains up to {strain.max():g} are not ratios; are they per cent? Then call the column "
-            "strain_percent, else strain_ratio"
-        )
+    if strain.max(initial=0) > LIKELY_RATIO and _unit("strain", table.titles["strain"]) == "":
+        ask = "are they per cent? Then call the column strain_percent, else strain_ratio"
+        if strain.max() >= MOST_RATIO:
+            raise UserError(f"{path}: strains up to {strain.max():g} are not ratios; {ask}")
+        warnings.warn(f"{path}: strains up to {strain.max():g} have no unit; {ask}", stacklevel=2)
     kept = _first_loading(strain, stress)
     if kept.sum() < 3:
-        raise UserError(f"{path}: three points or more with a strain above zero are needed")
+        raise UserError(f"{path}: three points or more of a loading with strains above zero are needed")
     if not kept.all():
         fault = "its strain goes back" if (np.diff(strain) < 0).any() else "its stress falls after the peak"
         warnings.warn(

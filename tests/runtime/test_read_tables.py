@@ -47,6 +47,19 @@ def test_it_is_one_table_however_it_was_saved(tmp_path, content):
     assert read(tmp_path, content) == [[1.5, -2], [1040.25, 0.5]]
 
 
+@pytest.mark.parametrize(
+    ("content", "cells"),
+    [
+        ("x;y\n900;1.000\n1.000;800\n", [[900, 1000], [1000, 800]]),  # whole, of German Excel
+        ("x\ty\n900\t1,000,000\n1,000\t0\n", [[900, 1e6], [1000, 0]]),  # and of an English one
+        ("x;y;note\n0.020;1.000;2,5\n0.500;0.900;3,5\n", [[0.02, 1], [0.5, 0.9]]),  # decimals
+        ("x;y\n900,5;1.000\n1,5;800,2\n", [[900.5, 1000], [1.5, 800.2]]),
+    ],
+)
+def test_marks_between_thousands_are_no_decimal_points(tmp_path, content, cells):
+    assert read(tmp_path, content) == cells
+
+
 def test_units_below_the_titles_are_part_of_them(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("x;y\n(mm);(%)\n1,5;2\n")
@@ -63,6 +76,7 @@ def test_units_below_the_titles_are_part_of_them(tmp_path):
         ("x,y,x\n1,2,3\n", "has the column x twice"),
         ("u,v\n1,2\n", "has no column x; the header must name x, y and may name note; it names 'u', 'v'"),
         ("", "it is empty"),
+        ("Results\n1,2\nx,z\n1,2\n", "it names 'x', 'z'"),
         (b"PK\x03\x04\0\0", "it is not a CSV file"),  # a workbook
         ('x,y\n1,"2\n', "a quotation mark is opened and not closed"),
     ],

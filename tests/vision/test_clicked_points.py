@@ -149,6 +149,11 @@ def test_a_right_list_is_left_as_it_is(shown):
         (picture(0 * MARKERS, 0.2), "all points of a picture are at one place"),
         (picture(MARKERS + MOVED, 2.0), " times closer together"),
         (picture(MARKERS + MOVED, 0.02), " times farther apart"),
+        (picture(MARKERS + MOVED, 0.2 / 1.5), " times farther apart"),
+        (
+            picture(MARKERS + MOVED, 0.2, order=[0, 0, *range(2, 9)]),
+            "two points of one picture are at one place",
+        ),
     ],
 )
 def test_a_pressed_list_of_another_kind_is_refused(pressed, said):
@@ -185,6 +190,30 @@ def test_lists_that_lack_different_points_are_refused_unless_they_are_numbered()
     assert result.observations.visible.tolist() == [n not in (3, 7) for n in numbers]
     with pytest.raises(UserError, match="number them in a column point"):
         found(*(Clicks(each.places, None) for each in lists))
+
+
+@pytest.mark.parametrize("missing", [None, 4])
+def test_numbers_of_one_list_that_are_shifted_are_refused(missing):
+    kept = np.arange(9) != missing
+    pressed = Clicks(picture(MARKERS + MOVED, 0.2).places[kept], None, tuple(range(missing is not None, 9)))
+    with pytest.raises(UserError, match="look shifted"):
+        found(Clicks(picture(MARKERS, 0.2).places, None, tuple(range(1, 10))), pressed)
+
+
+@pytest.mark.parametrize("change", [lambda p: p * [-1, 1] + [1700, 0], lambda p: p + 300])
+def test_a_picture_that_is_cut_or_mirrored_is_told(change):
+    pressed = Clicks(change(picture(MARKERS + MOVED, 0.2, turn=0).places), None)
+    remarks = found(picture(MARKERS, 0.2, turn=0), pressed).remarks
+    assert "of the points' extent: is a picture cut" in " ".join(remarks)
+
+
+def test_a_point_that_is_missing_from_one_line_leaves_the_markers_of_the_full_list():
+    """Without it the points at rest and their mirror image fit alike."""
+    markers = np.array([[10.0, -1], [20, -1], [30, -1], [40, -1], [50, -9]])[[4, 0, 1, 2, 3]]
+    rest, pressed = (Clicks(each[::-1], None) for each in (markers, markers - np.array([0.0, 2.0])))
+    lost = Clicks(np.where(np.arange(5)[:, None] == 4, np.nan, pressed.places), None)
+    result = clicked_points(rest, lost, markers, marker_radius=0.5, source="clicks")
+    assert result.observations.visible.tolist() == [False, True, True, True, True]
 
 
 def test_lists_that_are_exchanged_are_told():

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from pinnray.options.shared import OutputPath
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.exits import say
 
 
 def command(
@@ -51,6 +52,8 @@ def command(
     for fit in fits:
         young, missed = number(fit.material.young, 4), percent(fit.misfit)
         print(f"{fit.material.law:<20} E = {young} MPa, misses the stress by {missed} (rms)")
+    if fits[0].misfit > 0.05:
+        say(f"warning: no law is near the test ({percent(fits[0].misfit)} off): take off preload or slack")
     for part in (0.05, 0.1, 0.25, 0.5, 1.0):
         if measured.strain.min() <= part <= largest:
             print(f"secant modulus at {part:.0%}: {number(measured.secant(part), 4)} MPa")

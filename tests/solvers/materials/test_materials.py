@@ -1,10 +1,12 @@
 """Presets, and moduli from tensile tests whose answer is known."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
 
+from pinnray.commands.finger.material import command
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.materials import MATERIALS, TensileTest, fitted, preset, read_tensile_test
 from pinnray.solvers.materials.tensile_test import nominal_stress
@@ -86,6 +88,9 @@ CURVE = [(0.02 * n, 0.2 * n) for n in range(1, 26)]
         ("Dehnung in %;Spannung in MPa", 100, 1),
         ("strain_ratio,stress_Pa", 1, 1e6),
         ("ε / -;σ / kPa", 1, 1e3),
+        ("Déformation (%);Contrainte en MPa", 100, 1),
+        ("Technische Dehnung [%];Zugspannung [N/mm^2]", 100, 1),
+        ("Tensile strain (Strain 1),Tensile stress\n(%),N/mm²", 100, 1),
     ],
 )
 def test_titles_of_many_programs_are_known(tmp_path, titles, strain, stress):
@@ -98,6 +103,28 @@ def test_titles_of_many_programs_are_known(tmp_path, titles, strain, stress):
     best, *_ = fitted(read_tensile_test(file))
     assert best.material.law == "linear"
     assert best.material.young == pytest.approx(10)
+
+
+def test_strains_that_may_be_per_cent_are_asked_about(tmp_path):
+    file = tmp_path / "strip.csv"
+    for title in ("strain", "strain_ratio"):
+        file.write_text(f"{title},stress_MPa\n" + "".join(f"{10 * s},{p}\n" for s, p in CURVE))
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            read_tensile_test(file)
+        assert [str(each.message) for each in said] == [
+            f"{file}: strains up to 5 have no unit; are they per cent? Then call the column strain_percent, "
+            "else strain_ratio"
+        ] * (title == "strain")
+
+
+@pytest.mark.parametrize(("preload", "said"), [(0, ""), (1, "no law is near the test")])
+def test_a_preload_that_spoils_the_fit_is_told(tmp_path, capsys, preload, said):
+    file = tmp_path / "strip.csv"
+    file.write_text("strain,stress_MPa\n" + "".join(f"{s},{p + preload}\n" for s, p in CURVE))
+    assert command(file) == 0
+    err = capsys.readouterr().err
+    assert said in err if said else not err
 
 
 BACK = [(s, p - 1.0) for s, p in CURVE[::-1]]
