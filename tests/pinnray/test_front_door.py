@@ -1,6 +1,7 @@
 """The front door: names, quick import, forgiving inputs, objects that show themselves."""
 
 import dataclasses
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -142,6 +143,13 @@ def test_the_first_call_warns_as_every_other(tmp_path: Path):
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path
     )
     assert int(done.stdout) > 0
+
+
+def test_a_folder_of_temporary_files_that_cannot_be_written_ends_nothing(tmp_path: Path):
+    """MPI would abort with a page of text."""
+    code = "import pinnray as pr; pr.solve('default', 'fem', size=2)"
+    environment = os.environ | {"TMPDIR": "/proc/none"}
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, env=environment)
 
 
 def test_a_design_or_a_problem_is_solved_and_shows_itself():
