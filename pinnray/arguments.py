@@ -19,7 +19,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import as_path
 from pinnray.solvers.load import Load, LoadKind, Physics
 from pinnray.solvers.material import Material
-from pinnray.solvers.materials.presets import preset
+from pinnray.solvers.materials.presets import of_preset
 from pinnray.solvers.registry import PRESETS
 from pinnray.solvers.solver import Solver
 
@@ -63,12 +63,12 @@ def read_job(
         if name not in allowed:
             raise UserError(unknown_parameter(name, Parameters, besides=(*allowed, *besides)))
     constants = taken(words, Material)
+    if isinstance(material, str):
+        material, constants = of_preset(material, **constants), {}
     if constants and material is not None:
         raise UserError(f"{next(iter(constants))} is part of the material that is given; change it there")
     if words and isinstance(load, Load):
         raise UserError(f"{next(iter(words))} is part of the load that is given; change it there")
-    if isinstance(material, str):
-        material = preset(material).material
     if material is not None and not isinstance(material, Material):
         raise UserError(f"material must be a Material, such as pr.Material(young=5), not {material!r}")
     if not isinstance(load, Load):

@@ -92,8 +92,8 @@ def solve(
     """Solve a problem, or a design with the usual material and load, with one solver.
 
     Warns of numbers that look like another unit, of unlikely measurements, of a solver that is to fit markers
-    and has none, and of a body that is turned inside out or goes through itself; the solution's status has
-    these faults, too.
+    and has none, of a result that did not converge, by itself or by its certificate, and of a body that is
+    turned inside out or goes through itself; the solution's status has these faults, too.
 
     Args:
         problem: A problem, or a design in one of the ways of `mesh`.
@@ -114,7 +114,9 @@ def solve(
         UserError: If the solver does not support the problem, the law or measurements, or these cannot be of
             the finger.
     """
+    from pinnray.comparison.evaluation.certifier import with_certificates
     from pinnray.comparison.evaluation.deformed_body import DeformedBody
+    from pinnray.comparison.evaluation.evaluation import Evaluation
     from pinnray.comparison.evaluation.plausibility import (
         check_positions,
         displacement_remarks,
@@ -146,10 +148,15 @@ def solve(
             remarks += displacement_remarks(seen, problem)
         with stages.stage(chosen.name) as report:
             solution = solved(chosen, problem, report)
+        with stages.stage("certificate"):
+            (judged,) = with_certificates([Evaluation.of(solution, problem.mesh)], problem)
     if seen is None and Traits.of(chosen).assimilates:
         said = solution.status.message
         remarks.append(f"{chosen.name} fits markers, and no measurements were given: {said}")
-    status, faults = DeformedBody(problem.mesh).status(solution)
+    certified = replace(solution.status, converged=judged.converged, message=judged.message)
+    status, faults = DeformedBody(problem.mesh).status(replace(solution, status=certified))
+    if not status.converged:
+        remarks.append(f"{chosen.name} did not converge: {status.message}")
     for remark in [*status.warnings, *remarks, *faults]:
         warnings.warn(remark, stacklevel=2)
     return Solution.of(solution, status=status)
@@ -229,7 +236,7 @@ def compare(
         else:
             with TemporaryDirectory() as folder:
                 compared = compute(checked(job), stages, Path(folder))
-    for remark in [*compared.remarks, *compared.failed.values()]:
+    for remark in [*compared.remarks, *compared.unfinished]:
         warnings.warn(remark, stacklevel=2)
     return compared
 

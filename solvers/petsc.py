@@ -8,8 +8,10 @@ for them.
 """
 
 import ctypes
+import os
 import sys
 from pathlib import Path
+from tempfile import gettempdir
 
 import petsc4py
 
@@ -29,6 +31,9 @@ def wheels_mpi(prefix: Path, package: Path) -> Path | None:
 
 if (mpi := wheels_mpi(Path(sys.prefix), Path(petsc4py.__file__))) is not None:
     ctypes.CDLL(str(mpi), mode=ctypes.RTLD_GLOBAL)
+
+if "TMPDIR" in os.environ:
+    os.environ["TMPDIR"] = gettempdir()  # or MPI ends the process where that cannot be written
 
 share_cache()  # DOLFINx, which is imported after this, asks for the folder of its cache only then
 

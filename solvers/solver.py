@@ -35,6 +35,10 @@ class NoSolutionError(UserError):
     """A solver looked for a solution of a sound problem and found none; says what was tried."""
 
 
+class UnsoundSolutionError(UserError):
+    """A solver returned something that is no solution, such as numbers that are not finite."""
+
+
 class SolverFailedError(UserError):
     """A solver raised an exception, the cause of this one."""
 
@@ -227,7 +231,7 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
     """The solution of a solver, checked, so that a fault of a plug-in is not found far from it.
 
     Raises:
-        UserError: If it is no `Solution`, or an array in it has a wrong shape or is not finite.
+        UnsoundSolutionError: If it is no `Solution`, or an array in it has a wrong shape or is not finite.
         SolverFailedError: If it raises anything but an error of the input or of the system.
     """
     return _checked(solver, lambda: solver.solve(problem, progress), problem)
@@ -246,14 +250,14 @@ def _checked(solver: Solver, solve: Callable[[], Solution], problem: Problem) ->
     for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):
         if not isinstance(value, kind):
             said = f"{_named(value)} as its {kind.__name__}"
-            raise UserError(f"solver {solver.name} returned {said}; see docs/own-solver.md")
+            raise UnsoundSolutionError(f"solver {solver.name} returned {said}; see docs/own-solver.md")
     try:
         fault = _fault(solution, problem)
     except Exception as error:  # of the field's own methods
         raise SolverFailedError(solver, error) from error
     if fault:
         article = "an" if fault.startswith("energy") else "a"
-        raise UserError(f"solver {solver.name} returned {article} {fault}; see docs/own-solver.md")
+        raise UnsoundSolutionError(f"solver {solver.name} returned {article} {fault}; see docs/own-solver.md")
     # A solver that passes on another one's solution would be a second row of that name.
     return solution if solution.solver == solver.name else replace(solution, solver=solver.name)
 

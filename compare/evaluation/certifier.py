@@ -23,8 +23,9 @@ def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> li
     """Certify the evaluations of the linear law, sampled on the problem's mesh, and judge their convergence.
 
     The least energy settles the question for the linear law only, whose energy is quadratic. It does not
-    judge a solver that was given observations, which pays energy for them, a body in three dimensions or of
-    several materials, nor a found contact. Without DOLFINx there are no certificates, and a warning says so.
+    judge a solver that was given observations, which pays energy for them, a body in three dimensions, of
+    several materials or at rest, nor a found contact. Without DOLFINx there are no certificates, and a
+    warning says so.
     """
 
     def certifiable(evaluation: Evaluation) -> bool:
@@ -33,6 +34,7 @@ def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> li
     if (
         problem.mesh.moduli is not None
         or problem.load.kind == "cylinder"
+        or not problem.load.values.any()
         or not any(map(certifiable, evaluations))
     ):
         return list(evaluations)

@@ -103,6 +103,17 @@ class Results:
         """Results that do not count as converged."""
         return [evaluation for evaluation in self.evaluations if not evaluation.converged]
 
+    @property
+    def unfinished(self) -> list[str]:
+        """A sentence on each solver that failed or did not converge, and on a tolerance that was missed."""
+        said = list(self.failed.values())
+        for each in self.unconverged:
+            why = "" if each.message in each.warnings else f": {each.message}"
+            said.append(f"{each.solver} did not converge{why}")
+        if self.adaptation is not None and not self.adaptation.reached:
+            said.append(self.adaptation.message)
+        return said
+
     def table(self) -> "pd.DataFrame":
         """The main numbers, a row a solver, as `summary.csv`; units are in the names of the columns.
 

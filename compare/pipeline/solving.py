@@ -37,6 +37,7 @@ from pinnray.solvers.solver import (
     TrainedSolver,
     TrainingContext,
     Traits,
+    UnsoundSolutionError,
     UnsupportedProblemError,
     solved,
     with_law,
@@ -216,7 +217,7 @@ class _Part:
                 if solver.name not in self.job.spare:
                     raise
                 outcome.unsupported[solver.name] = str(error)
-            except (NoSolutionError, SolverFailedError) as error:
+            except (NoSolutionError, SolverFailedError, UnsoundSolutionError) as error:
                 if solver.name == self.job.reference:
                     raise
                 outcome.failed[solver.name] = self._reason(solver, error)
@@ -226,6 +227,8 @@ class _Part:
         """Why a solver has no result; of an exception the traceback is written."""
         if isinstance(error, NoSolutionError):
             return f"{solver.name} found no solution: {error}"
+        if error.__cause__ is None:
+            return str(error)
         (self.folder / ERRORS).mkdir(exist_ok=True)
         trace = "".join(traceback.format_exception(error.__cause__))
         write_text(self.folder / ERRORS / f"{solver.name}.txt", trace)

@@ -172,20 +172,16 @@ class MaterialOptions(Material):
     def made(self) -> Material:
         """The material."""
         given = self.model_dump(exclude_unset=True, include=set(Material.model_fields))
-        return Material(**self._usual | given).made_of(self._known.substance if self._known else None)
+        if self.material is None:
+            return Material(**given)
+        from pinnray.solvers.materials.presets import of_preset
+
+        return of_preset(self.material, **given)
 
     @property
     def _usual(self) -> dict[str, Any]:
         """The constants of the material that goes by a name."""
-        return {"young": self._known.young, "poisson": self._known.poisson} if self._known else {}
-
-    @property
-    def _known(self) -> Material | None:
-        if self.material is None:
-            return None
-        from pinnray.solvers.materials.presets import preset
-
-        return preset(self.material).material
+        return {name: getattr(self.made(), name) for name in ("young", "poisson") if self.material}
 
 
 @Parameter(name="*", group=PHYSICS, negative="")

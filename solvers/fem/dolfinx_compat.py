@@ -2,6 +2,7 @@
 
 import inspect
 import logging
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import chdir, suppress
 from dataclasses import dataclass
@@ -9,21 +10,22 @@ from pathlib import Path
 from time import time
 from typing import Any, Generic, TypeVar
 
-# Before DOLFINx, which would start PETSc with files of the working folder.
-from pinnray.solvers.petsc import PETSc
-
-# isort: split
-import dolfinx
-import dolfinx.fem.petsc
-import ffcx
 import numpy as np
-import ufl
-from mpi4py import MPI
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.solvers.elasticity import Lame
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.lagrange import LagrangeSpace
+
+# Before DOLFINx, which would start PETSc with files of the working folder.
+from pinnray.solvers.petsc import PETSc
+
+with warnings.catch_warnings():  # undoes that FFCx sends all warnings of the program into a log
+    import dolfinx
+    import dolfinx.fem.petsc
+    import ffcx
+    import ufl
+    from mpi4py import MPI
 
 # DOLFINx and FFCx read their option files once: here, from a folder without any. A file of others in the
 # working folder could choose the compiler's flags and the text that it compiles.

@@ -5,7 +5,7 @@ change its modulus by a third, so that the tensile test of a printed strip is be
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Material, Substance
@@ -67,3 +67,14 @@ def preset(name: str) -> MaterialPreset:
     if known is None:
         raise UserError(f"there is no material {name!r}; there are {', '.join(MATERIALS)}")
     return known
+
+
+def of_preset(name: str, **given: Any) -> Material:
+    """The material of a preset, of which some constants are other ones.
+
+    Raises:
+        UserError: If there is no such preset, or a constant is not admissible.
+    """
+    known = preset(name).material
+    usual = {"young": known.young, "poisson": known.poisson}
+    return Material(**usual | given).made_of(known.substance)

@@ -187,7 +187,8 @@ class StudyJob(Generic[S]):
         """The finger from which the samples differ; the solver is asked for its loads before."""
         study = self.study
         kinds = study.varied["load"].values if "load" in study.varied else None
-        for kind in kinds or (study.fixed.get("load", "mean"),):
-            check_load(study.made_solver(), physics_of({"load": kind})[1])
+        fixed = {name: value for name, value in study.fixed.items() if name in ("load", "friction")}
+        for given in [{"load": kind} for kind in kinds] if kinds else [fixed]:
+            check_load(study.made_solver(), physics_of(given)[1])
         near = self.folder / study.design
         return self.finger or load_design(near if near.suffix == ".toml" and near.is_file() else study.design)

@@ -19,7 +19,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_toml
 from pinnray.solvers.problem import Load, Material, Physics
 from pinnray.solvers.registry import make_solver
-from pinnray.solvers.solver import Solver, Traits, check_law
+from pinnray.solvers.solver import Solver, Traits, check_law, with_law
 
 PHYSICS = tuple(Physics.model_fields)
 """Parameters of material and load."""
@@ -161,6 +161,9 @@ class Study(CheckedModel):
         laws = self.varied["law"].values if "law" in self.varied else None
         for law in laws or [self.fixed[name] for name in self.fixed if name == "law"]:
             check_law([solver], physics_of({"law": law})[0])
+        if not {"law", "plane"} & self.varied.keys():  # else a sample that they do not fit is refused
+            said = {name: value for name, value in self.fixed.items() if name in ("law", "plane")}
+            with_law(physics_of(said)[0], solver)
         return self
 
     def _check_fields(self) -> None:

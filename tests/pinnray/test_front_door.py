@@ -1,5 +1,7 @@
 """The front door: names, quick import, forgiving inputs, objects that show themselves."""
 
+import dataclasses
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -95,6 +97,59 @@ def test_a_solver_that_raises_has_a_warning_a_row_and_a_traceback():
     assert 'raise ZeroDivisionError("by nothing")' in compared.tracebacks["raising"]
     with pytest.raises(pr.UserError, match="solver raising raised ZeroDivisionError"):
         compared["raising"]
+
+
+class Lost(FemSolver):
+    """A solver without a number."""
+
+    name = "lost"
+
+    def solve(self, problem, progress=None):
+        return dataclasses.replace(super().solve(problem), energy=np.nan)
+
+
+def test_a_solution_without_numbers_takes_no_other_ones_away():
+    with pytest.warns(UserWarning, match="solver lost returned an energy that is not finite"):
+        compared = pr.compare("default", ["fem", Lost()], size=2.0)
+    assert compared.table().loc["fem", "converged"]
+    assert compared.table().loc["lost", "status"] == compared.failed["lost"]
+
+
+def test_what_does_not_converge_is_said_as_on_the_command_line():
+    """By the certificate, too: these elements are too stiff, and the solver does not know it."""
+    stiff = FemSolver(degree=1)
+    with pytest.warns(UserWarning, match="fem did not converge: .* its energy is .* above that of fem"):
+        alone = pr.solve("default", stiff, size=2.0)
+    assert not alone.status.converged
+    with pytest.warns(UserWarning, match="fem did not converge: .* its energy is .* above that of fem"):
+        assert pr.compare("default", [stiff], size=2.0).unconverged
+
+
+def test_constants_of_a_named_material_can_be_other_ones():
+    """As with `--material tpu-95a --young 9`."""
+    given = pr.solve("default", "fem", material="TPU 95A", young=9.0, size=2.0).problem.material
+    assert (given.young, given.poisson, given.substance.name) == (9.0, 0.45, "tpu-95a")
+
+
+def test_the_first_call_warns_as_every_other(tmp_path: Path):
+    """FFCx, which it imports, would send all warnings into a log."""
+    code = (
+        "import pinnray as pr, warnings\n"
+        "with warnings.catch_warnings(record=True) as told:\n"
+        "    pr.solve('default', 'fem', size=2, stroke=80.0)\n"
+        "print(len(told))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert int(done.stdout) > 0
+
+
+def test_a_folder_of_temporary_files_that_cannot_be_written_ends_nothing(tmp_path: Path):
+    """MPI would abort with a page of text."""
+    code = "import pinnray as pr; pr.solve('default', 'fem', size=2)"
+    environment = os.environ | {"TMPDIR": "/proc/none"}
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, env=environment)
 
 
 def test_a_design_or_a_problem_is_solved_and_shows_itself():

@@ -89,7 +89,6 @@ def command(
     """
     from pinnray.comparison.pipeline.job import Job
     from pinnray.comparison.pipeline.pipeline import run
-    from pinnray.comparison.pipeline.shared_mesh import tolerance_reached
     from pinnray.comparison.pipeline.solving import second_process, worth_starting
     from pinnray.comparison.report.tables import body_table, marker_table
     from pinnray.options.preset_jobs import job_defaults
@@ -159,13 +158,9 @@ def command(
                 found = evaluation.identified.phrase(job.design.depth)
                 console.print(f"{evaluation.label} found: {found}", soft_wrap=True, highlight=False)
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
-    for fault in comparison.failed.values():
+    for fault in comparison.unfinished:
         say(f"error: {fault}")
-    for evaluation in comparison.unconverged:
-        told = evaluation.message in evaluation.warnings
-        say(f"error: {evaluation.solver} did not converge{'' if told else f': {evaluation.message}'}")
-    done = not (comparison.failed or comparison.unconverged) and tolerance_reached(comparison.adaptation)
-    return 0 if done else NOT_CONVERGED
+    return NOT_CONVERGED if comparison.unfinished else 0
 
 
 def _own_folder(name: str, measurements: str | None) -> Path:

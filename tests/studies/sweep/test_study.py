@@ -1,9 +1,12 @@
 """Studies that are read, and the line for each that is refused."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import pinnray as pr
+from pinnray.runtime.errors import UserError
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.study import Study, physics_of
@@ -48,3 +51,18 @@ def test_settings_of_the_solver_are_varied_like_parameters(tmp_path: Path) -> No
         (2, 3),
         (2, 4),
     ]
+
+
+@pytest.mark.parametrize(
+    ("solver", "fixed", "message"),
+    [
+        ("fem-nonlinear", {"law": "gent", "plane": "stress"}, "the gent law is given for plane strain only"),
+        ("pinn-std", {"load": "cylinder", "friction": 0.3}, "pinn-std takes a cylinder without friction"),
+    ],
+)
+def test_what_every_sample_would_be_refused_for_refuses_the_study(
+    solver: str, fixed: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    """As `pinnray solve` does, and not with a table of no results."""
+    with pytest.raises(UserError, match=message):
+        pr.sweep({"rib_count": [4]}, solver=solver, size=3, processes=1, out=tmp_path / "sweep", **fixed)
