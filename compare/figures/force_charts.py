@@ -36,6 +36,7 @@ def draw_force_displacement(
     }
     more = [f"{each.label}, {along.value:.3g} N/mm, identified" for each, along in found.values()]
     top, height, left = 0.3 + legend_height([*labels, *true_label, *more], page), 2.4, 0.75  # inches
+    apart = 0.08 / (page - left - 0.65)  # the room of a mark, as a share of the axes' width
     with figure(top + height + 0.45, page) as drawn:
         write_heading(drawn, "Force of the indenter along its travel")
         axes = axes_at(drawn, (left, top, page - left - 0.65, height))
@@ -63,7 +64,7 @@ def draw_force_displacement(
         for place, (number, label) in enumerate(zip(found, more, strict=True)):
             value, low, high = found[number][1]
             # Beside each other: the intervals of several solvers would hide each other.
-            x, apart = reach * (1 - 0.02 * (place + 1)), [[value - low], [high - value]]
+            x, interval = reach * (1 - apart * (place + 1)), [[value - low], [high - value]]
             style: dict[str, Any] = {
                 "ms": 4.5,
                 "capsize": 2.5,
@@ -71,9 +72,9 @@ def draw_force_displacement(
                 "color": solver_colour(number),
                 "zorder": 5,
             }
-            axes.errorbar([x], [value], yerr=apart, fmt="s", label=label, **style)
+            axes.errorbar([x], [value], yerr=interval, fmt="s", label=label, **style)
         every = [*curves, truth] if truth else curves
-        axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))
+        axes.set_xlim(0, (1 + apart) * max(curve.travel[-1] for curve in every))
         forces = np.concatenate(
             [curve.force for curve in every] + [np.array(along) for _, along in found.values()]
         )

@@ -16,7 +16,7 @@ from pinnray.comparison.figures.mesh_drawing import draw_mesh, mesh_numbers
 from pinnray.comparison.figures.overlay import Panels, draw_overlay
 from pinnray.comparison.figures.solver_charts import draw_losses, draw_marker_errors
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.figure import WIDTH, Figure
+from pinnray.runtime.figure import NARROW, WIDTH, Figure
 
 
 class Illustration(NamedTuple):
@@ -87,8 +87,9 @@ def _field(
         if len({evaluation.law for evaluation in comparison.shown_fields}) > 1
         else ""
     )
+    where = "Below" if page < NARROW else "Right"
     beside = (
-        f" Right: the field minus that of {reference}, point by point; each on a scale of its own, which "
+        f" {where}: the field minus that of {reference}, point by point; each on a scale of its own, which "
         f"ends at the same share of the area and is stated above the panel: compare numbers, not colours."
         if len(comparison.shown_fields) > 1
         else ""
@@ -101,10 +102,10 @@ def _field(
         quantity.title,
         f"{quantity.title}, drawn as the {QUANTITIES[0].title}."
         if quantity is not QUANTITIES[0]
-        else f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
+        else f"{quantity.title} by each solver on the undeformed body, each triangle in the colour of its "
         f"mean. One scale for all: {PERCENT:g} % of the area of {reference} lie "
         f"within it, the peaks at the corners take the end colours. At a sharp corner the field has no "
-        f"bound: the largest mean of a triangle, printed beside, grows with refinement.{beside}{mixed}",
+        f"bound: the largest mean of a triangle, printed below, grows with refinement.{beside}{mixed}",
         each_of(
             f"Mean size over the body, {quantity.unit}",
             comparison.shown_fields,

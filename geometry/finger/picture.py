@@ -67,7 +67,10 @@ def plot_finger(
         }
         for number, centre in enumerate(place(finger.markers), start=1):
             axes.add_patch(Circle(tuple(centre), finger.marker_radius, fc=MEASURED, ec="none", zorder=4))
-            axes.annotate(str(number), centre, xytext=(3, 3), **text)
+            # Not over the arrow's head: left of a marker that lies just before it.
+            before = centre[0] <= tip[0] and np.linalg.norm(tip - centre) < 0.05 * extent
+            aside, side = (-3, "right") if before else (3, "left")
+            axes.annotate(str(number), centre, xytext=(aside, 3), ha=side, **text)
     return drawn
 
 

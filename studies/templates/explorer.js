@@ -154,8 +154,8 @@
     lines(context, [start, end], at, ink("--ink"));
     context.setLineDash([]);
     seen(context, markers.map(([x, y, u, v]) => [x + u, y + v]), at);
-    const title = width > 500 ? "von Mises stress" : "stress";
-    colourBar(context, [8, height], Math.min(0.5 * width, 260), manifest.colours, ["0", `≥ ${digits(most)} MPa`, title]);
+    const title = width > 430 ? "von Mises stress" : "stress";
+    colourBar(context, [8, height], Math.min(0.75 * width, 320), manifest.colours, ["0", `≥ ${digits(most)} MPa`, title]);
     scaleBar(context, [width - 8, height], scale, 0.15 * width);
   }
 

@@ -263,6 +263,21 @@ def test_differences_are_from_the_truth_where_it_is_known(fem, pinn, evaluate, c
     assert "truth, simulated" in text.splitlines()[1:4]
 
 
+@pytest.mark.parametrize("width", [85.0, 180.0])
+def test_words_and_marks_know_how_wide_the_page_is(width, fem, pinn, evaluate, compared):
+    history = {"load_fraction": np.array([0.0, 1.0]), "reaction_x": np.zeros(2), "reaction_y": [0, -0.2]}
+    follower = replace(pinn, history=history, reaction=np.array([0.0, -0.2]))
+    truth = replace(evaluate("fem-nonlinear", 1.05), history=history, reaction=np.array([0.0, -0.2]))
+    known, page = compared(fem, follower, truth=truth), page_width(width)
+    where = "Below" if width < 90 else "Right"
+    assert f"{where}: the field minus" in draw(known, "von_mises", page=page).caption
+    chart = draw(known, "force_displacement", page=page).figure
+    chart.canvas.draw()
+    axes, half = chart.axes[0], 4.4 / 72 * chart.dpi  # pixels: half a cross with its line
+    (cross,) = (line for line in axes.lines if line.get_marker() == "x")
+    assert axes.transData.transform(cross.get_xydata())[0, 0] + half <= axes.bbox.x1
+
+
 def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, compared, evaluate):
     many = [replace(pinn, solver=f"solver-{n}", converged=n != 1) for n in range(14)]
     comparison = compared(fem, *many)

@@ -168,6 +168,24 @@ def test_the_colour_bar_ends_at_no_less_than_the_largest_stress(page):
         assert float(end.split()[1]) >= float(f"{largest:.3g}")
 
 
+@pytest.mark.parametrize("width", [320, 390, 520, 1400])
+def test_the_words_below_the_colour_bar_stay_apart(page, width):
+    """The bar is as long as its three words, each with a letter of space, need."""
+    page.set_viewport_size({"width": width, "height": 900})
+    page.evaluate(
+        """() => { window.ends = []; const old = CanvasRenderingContext2D.prototype.fillText;
+        CanvasRenderingContext2D.prototype.fillText = function (text, x, ...rest) {
+            const wide = this.measureText(text).width * { left: 0, center: 0.5, right: 1 }[this.textAlign];
+            window.ends.push([text, x - wide, x - wide + this.measureText(text).width]);
+            old.call(this, text, x, ...rest); }; }"""
+    )
+    give(page, stroke=3)
+    give(page, stroke=9)
+    _, title, end, _ = sorted(page.evaluate("window.ends.slice(-4)"), key=lambda each: each[1])
+    assert title[0].endswith("stress")
+    assert title[2] + 4 <= end[1]
+
+
 def test_the_shipped_page_has_the_scripts_of_today():
     shipped = (DOCS / "static" / "explore-default.html").read_text(encoding="utf-8")
     for name in ("explorer.js", "explorer_model.js"):
