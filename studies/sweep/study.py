@@ -161,9 +161,10 @@ class Study(CheckedModel):
         laws = self.varied["law"].values if "law" in self.varied else None
         for law in laws or [self.fixed[name] for name in self.fixed if name == "law"]:
             check_law([solver], physics_of({"law": law})[0])
-        if not {"law", "plane"} & self.varied.keys():  # else a sample that they do not fit is refused
-            said = {name: value for name, value in self.fixed.items() if name in ("law", "plane")}
-            with_law(physics_of(said)[0], solver)
+        for names in (PHYSICS, ("law", "plane")):  # where one varies, a sample that does not fit is refused
+            if not self.varied.keys() & names:
+                said = {name: value for name, value in self.fixed.items() if name in names}
+                with_law(physics_of(said)[0], solver)
         return self
 
     def _check_fields(self) -> None:

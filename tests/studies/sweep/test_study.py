@@ -57,6 +57,8 @@ def test_settings_of_the_solver_are_varied_like_parameters(tmp_path: Path) -> No
     ("solver", "fixed", "message"),
     [
         ("fem-nonlinear", {"law": "gent", "plane": "stress"}, "the gent law is given for plane strain only"),
+        ("fem", {"stroke": -5.0}, "stroke = -5 mm is outside its range"),
+        ("fem", {"radius": 5.0}, "a radius belongs to the load cylinder"),
         ("pinn-std", {"load": "cylinder", "friction": 0.3}, "pinn-std takes a cylinder without friction"),
     ],
 )
