@@ -213,9 +213,7 @@ def featured(random: np.random.Generator, kind: str, solid: Any, x: float, y: fl
         "step": lambda: solid.cut(box(0.2 * x, 3 * y, size, vector(at, -y, DEPTH - size))),
         "pocket": lambda: solid.cut(cylinder(1, size, vector(at, y - 2, DEPTH - size))),
         "hole": lambda: solid.cut(cylinder(0.7, DEPTH, vector(at, y - 1, 0))),
-        "hole across": lambda: solid.cut(
-            cylinder(size / 2, 3 * y, vector(at, -y, random.uniform(3, 9)), vector(0, 1, 0))
-        ),
+        "hole across": lambda: solid.cut(cylinder(size / 2, 3 * y, vector(at, -y, 6), vector(0, 1, 0))),
         "chamfer": lambda: solid.cut(wedge.moved(cq.Location(x, -y, DEPTH - size))),
     }.get(kind, lambda: solid)()
     return whole.Solids()[0] if len(whole.Solids()) == 1 else solid

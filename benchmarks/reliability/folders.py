@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from PIL import Image
 
 TIMES = ("second", "started", "time", "rate_hz", "pace", "live")
 """Words in the names of entries that differ from run to run."""
-PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", ".sqlite", "run.json")
-"""Ends of files of which only the presence is compared: they, or the files that they list, tell times."""
+PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", ".sqlite", ".parquet", "run.json")
+"""Ends of files of which only the presence is compared: they, or the files that they list, tell times, or a CSV has the same."""
 CUT = "cut off"
 
 
@@ -74,7 +73,6 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ".json": lambda path: _timeless(json.loads(path.read_text(encoding="utf-8"))),
     ".csv": _csv,
     ".npz": _arrays,
-    ".parquet": lambda path: _timeless(pd.read_parquet(path).to_dict("list")),
     ".png": lambda path: Image.open(path).tobytes(),
     **dict.fromkeys((".html", ".vtu", ".svg"), _ended),
 }
