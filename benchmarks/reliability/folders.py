@@ -13,7 +13,7 @@ from PIL import Image
 TIMES = ("second", "started", "time", "rate_hz", "pace", "live")
 """Words in the names of entries that differ from run to run."""
 PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", ".sqlite", ".parquet", "run.json")
-"""Ends of files of which only the presence is compared: they, or what they list, tell times or repeat a CSV."""
+"""Ends of files of which only the presence is compared: they, or what they list, tell times."""
 CUT = "cut off"
 
 
