@@ -41,7 +41,7 @@ def sample_at(study: Study, places: FloatArray) -> dict[str, Value]:
 
 def places_of(study: Study, sample: Mapping[str, Value]) -> list[float]:
     """The places of a sample: the inverse of `sample_at`."""
-    return [place_of(name, values, sample[name]) for name, values in study.varied.items()]
+    return [position_of(name, values, sample[name]) for name, values in study.varied.items()]
 
 
 def value_at(name: str, values: Range, place: float) -> Value:
@@ -52,7 +52,7 @@ def value_at(name: str, values: Range, place: float) -> Value:
     return low + place * (high - low)
 
 
-def place_of(name: str, values: Range, value: Value) -> float:
+def position_of(name: str, values: Range, value: Value) -> float:
     """The place from 0 to 1 of a value in a parameter's range: the inverse of `value_at`."""
     if (choices := _choices(name, values)) is not None:
         return (choices.index(value) + 0.5) / len(choices)

@@ -17,7 +17,7 @@ EXPOSURE = Parameter(name="*", group=Group("Exposure", sort_key=5))
 MOTION = Parameter(name="*", group=Group("Motion", sort_key=6))
 
 
-class Scene(RigSettings):
+class RigOptions(RigSettings):
     """The settings of the rig by the names of options."""
 
     frame: Annotated[str, Parameter(name="--size")] = Field(
@@ -31,7 +31,7 @@ def command(
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     solver: str | None = None,
-    scene: Annotated[Scene, SCENE] = Scene(),
+    scene: Annotated[RigOptions, SCENE] = RigOptions(),
     exposure: Annotated[Exposure, EXPOSURE] = Exposure(),
     motion: Annotated[Motion, MOTION] = Motion(),
     codec: Annotated[str, Parameter(group=OUTPUT, show_default=True)] = "ffv1",

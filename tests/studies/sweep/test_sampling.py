@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pinnray.studies.sweep.sampling import place_of, samples, value_at
+from pinnray.studies.sweep.sampling import position_of, samples, value_at
 from pinnray.studies.sweep.study import Range, Study
 
 VARIED = {
@@ -42,8 +42,8 @@ def test_the_place_of_a_value_leads_back_to_it(place: float) -> None:
     for name, entry in VARIED.items():
         values = Range(**entry)
         value = value_at(name, values, place)
-        assert value_at(name, values, place_of(name, values, value)) == value
-    assert np.isclose(place_of("height", Range(**VARIED["height"]), 95.0), 0.75)
+        assert value_at(name, values, position_of(name, values, value)) == value
+    assert np.isclose(position_of("height", Range(**VARIED["height"]), 95.0), 0.75)
 
 
 def test_values_with_a_step_are_those_of_a_printer_and_equally_frequent() -> None:
@@ -51,4 +51,4 @@ def test_values_with_a_step_are_those_of_a_printer_and_equally_frequent() -> Non
     found = [value_at("rib_thickness", values, place) for place in (np.arange(100) + 0.5) / 100]
     assert sorted(set(found)) == [0.8, 0.85, 0.9, 0.95, 1.0]
     assert {found.count(value) for value in found} == {20}
-    assert value_at("rib_thickness", values, place_of("rib_thickness", values, 0.95)) == 0.95
+    assert value_at("rib_thickness", values, position_of("rib_thickness", values, 0.95)) == 0.95
