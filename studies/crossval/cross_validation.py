@@ -28,7 +28,7 @@ from pinnray.studies.crossval.fold_runner import SolverTask, run_folds
 from pinnray.studies.crossval.folds import LOAD, Fold, LoadCase, folds_of, load_cases_of
 from pinnray.studies.crossval.report import write_results
 from pinnray.studies.crossval.result import CrossvalResult
-from pinnray.studies.crossval.scores import Sample, prediction_table
+from pinnray.studies.crossval.scores import Sample, left_out_table
 from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant, visible_markers
 from pinnray.studies.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from pinnray.studies.sweep.measurement import Measurement
@@ -217,7 +217,7 @@ def _result(
         raise UserError("; ".join(f"{name}: {message}" for name, message in failed.items()))
     return CrossvalResult(
         study,
-        prediction_table(rows),
+        left_out_table(rows),
         {truth: seeds[0][0].origin for (truth, _), seeds in observations.items()},
         {truth: next(iter(each.values()))[0] for truth, each in truths.items()},
         failed,

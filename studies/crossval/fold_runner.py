@@ -100,7 +100,7 @@ class FoldRunner:
         self._fit = None
 
     def sample(self, name: str, observations: Sequence[Observations], fold: Fold) -> Measurement:
-        """One fold, of which `observations` holds the markers at every load; see `scores.prediction_table`."""
+        """One fold, of which `observations` holds the markers at every load; see `scores.left_out_table`."""
         started = time.perf_counter()
         given, deviations = Traits.of(self._solver).assimilates, None
         if not given:

@@ -19,7 +19,7 @@ class CrossvalResult:
 
     Attributes:
         study: Its settings.
-        samples: A row for each marker of each fold, seed, solver, layout and truth; see `prediction_table`.
+        samples: A row for each marker of each fold, seed, solver, layout and truth; see `left_out_table`.
         sources: By truth one sentence on the source of the markers' displacements.
         truths: The true field of each truth at the full load; none with measurements.
         failed: Error messages of the solvers without a score, by solver (and truth and layout, if several).

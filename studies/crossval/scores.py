@@ -38,7 +38,7 @@ class Sample(NamedTuple):
     fold: Fold
 
 
-def prediction_table(samples: Iterable[tuple[Sample, bool, Measurement]]) -> pd.DataFrame:
+def left_out_table(samples: Iterable[tuple[Sample, bool, Measurement]]) -> pd.DataFrame:
     """A row for each marker of each sample, of which the flag says whether its solver takes markers.
 
     Errors are predicted minus observed displacements; deviations those that the solver states for them.

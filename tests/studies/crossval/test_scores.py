@@ -25,7 +25,7 @@ from pinnray.studies.crossval.folds import (
     load_cases_of,
 )
 from pinnray.studies.crossval.result import CrossvalResult
-from pinnray.studies.crossval.scores import Sample, bootstrap, difference_table, prediction_table, score_table
+from pinnray.studies.crossval.scores import Sample, bootstrap, difference_table, left_out_table, score_table
 from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant
 from pinnray.studies.crossval.tables import all_tables, truth_tables
 from pinnray.studies.crossval.true_fields import SampledField, TrueField
@@ -85,7 +85,7 @@ def test_scores_by_hand():
             (1, [[0.2, -0.1], [0.5, 4.0]], [[1.0, 1.0], [1.0, 1.0]], 0.3),
         )
     ]
-    found = score_table(prediction_table(samples)).loc["sliding", "joints", "gp", ONE]
+    found = score_table(left_out_table(samples)).loc["sliding", "joints", "gp", ONE]
     # Held out: u of 1 or 2 and 0.5, v of 2 and 4.
     low, high = 0.75 + 3.0, 1.25 + 3.0
     mean = (low + high) / 2
@@ -100,7 +100,7 @@ def test_scores_by_hand():
     # 1 / 2 and 2 / 2 and both 0.5 / 1 are within 1.96, 2 / 0.5 and 4 / 1 not.
     assert means["within_stated"] == 0.5
     assert "strain" not in means.index
-    one = score_table(prediction_table(samples[:2])).loc["sliding", "joints", "gp", ONE]
+    one = score_table(left_out_table(samples[:2])).loc["sliding", "joints", "gp", ONE]
     assert one["low"].isna().all()
 
 
@@ -108,14 +108,14 @@ def test_markers_are_given_held_out_or_neither():
     """All are predicted at another load, and a solver that takes none has none in sample."""
     errors = np.ones((3, 2))
     for takes, load_case, held, given in ((True, 0, 1, 2), (True, 1, 3, 0), (False, 0, 1, 0)):
-        table = prediction_table([sample("a", LOAD, (1,), errors, takes=takes, load_case=load_case)])
+        table = left_out_table([sample("a", LOAD, (1,), errors, takes=takes, load_case=load_case)])
         assert (table["held_out"].sum(), table["in_sample"].sum()) == (held, given)
 
 
 def test_a_number_that_one_fold_lacks_is_no_score():
     both = [sample("a", ONE, (0,), [[1.0, 1.0]], strain=0.1), sample("a", ONE, (1,), [[1.0, 1.0]] * 2)]
-    assert ("sliding", "joints", "a", ONE, "strain") in score_table(prediction_table(both[:1])).index
-    assert ("sliding", "joints", "a", ONE, "strain") not in score_table(prediction_table(both)).index
+    assert ("sliding", "joints", "a", ONE, "strain") in score_table(left_out_table(both[:1])).index
+    assert ("sliding", "joints", "a", ONE, "strain") not in score_table(left_out_table(both)).index
 
 
 def test_a_difference_is_paired_by_fold():
@@ -130,7 +130,7 @@ def test_a_difference_is_paired_by_fold():
 def test_differences_are_of_the_same_folds():
     own = sample("own", ONE, (0,), [[1.0, 0.0], [0.0, 0.0]])
     other = sample("fem", ONE, (0,), [[3.0, 1.0], [0.0, 0.0]])
-    found = difference_table(prediction_table([own, other])).xs("own", level="solver")
+    found = difference_table(left_out_table([own, other])).xs("own", level="solver")
     assert found["from_fem"].to_list() == [-3.0]
     assert found.index.get_level_values("score").to_list() == ["held_out_mae_sum_mm"]
 
@@ -143,7 +143,7 @@ def test_a_force_that_is_too_small_is_as_wrong_as_one_that_is_too_large():
         for seed in (0, 1)
     ]
     samples += [sample(solver, ONE, (0,), [[1.0, 1.0]]) for solver in ("low", "fem")]
-    row = difference_table(prediction_table(samples)).loc["sliding", "joints", "low", ALL, "force_error"]
+    row = difference_table(left_out_table(samples)).loc["sliding", "joints", "low", ALL, "force_error"]
     assert (row["from_fem"], row["against_fem"]) == (pytest.approx(0.4), "worse")
 
 
@@ -174,7 +174,7 @@ def result(
     none = np.zeros((0, 2))
     true = TrueField(SampledField(none, none, np.zeros((0, 2, 2))), 1.0, 35.0)
     truths = {truth: true for truth, _ in cases}
-    return CrossvalResult(study, prediction_table(samples), dict.fromkeys(truths, "a test"), truths, {})
+    return CrossvalResult(study, left_out_table(samples), dict.fromkeys(truths, "a test"), truths, {})
 
 
 def test_tables_fit_a_terminal():
