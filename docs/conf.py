@@ -7,11 +7,14 @@ import tomllib
 from importlib.util import find_spec
 from pathlib import Path
 
+from docutils import nodes
+from latex2mathml.converter import convert
 from pydantic import BaseModel
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 from sphinx.directives.code import CodeBlock
 from sphinx.ext.napoleon.docstring import GoogleDocstring
+from sphinx.writers.html5 import HTML5Translator
 
 project = "pinn-ray"
 version = release = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text("utf-8"))[
@@ -36,6 +39,7 @@ exclude_patterns = ["examples"]
 suppress_warnings = ["config.cache"]
 
 myst_enable_extensions = ["colon_fence"]
+myst_fence_as_directive = ["math"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_timeout = 600
@@ -64,6 +68,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"pinnray\.solvers\.fem\.adaptive_refinement\..*"),
 ]
 
+html_math_renderer = "mathml"  # which browsers draw without a script
 html_theme = "pydata_sphinx_theme"
 html_title = f"pinn-ray {version}"
 html_logo = html_favicon = "static/logo.svg"
@@ -159,11 +164,20 @@ def offer_notebook(app: Sphinx, page: str, _template: str, context: dict[str, st
     context["body"] = context["body"].replace("</h1>", f"</h1>{link}", 1)
 
 
+def formula(translator: HTML5Translator, node: nodes.math | nodes.math_block) -> None:
+    """Write a formula as MathML."""
+    display = "block" if isinstance(node, nodes.math_block) else "inline"
+    mathml = convert(node.astext(), display=display)
+    translator.body.append(f'<div class="formula">{mathml}</div>' if display == "block" else mathml)
+    raise nodes.SkipNode
+
+
 def setup(app: Sphinx) -> None:
     """Show the code of notebooks where the packages that run them are missing."""
     if not NOTEBOOKS_RUN:
         app.add_directive("code-cell", CodeBlock)
     app.add_lexer("csv", TextLexer)
+    app.add_html_math_renderer("mathml", (formula, None), (formula, None))
     app.connect("autodoc-process-signature", shorten)
     app.connect("autodoc-skip-member", is_hidden)
     app.connect("html-page-context", offer_notebook)
