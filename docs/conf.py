@@ -11,10 +11,13 @@ from docutils import nodes
 from latex2mathml.converter import convert
 from pydantic import BaseModel
 from pygments.lexers.special import TextLexer
+from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.directives.code import CodeBlock
 from sphinx.ext.napoleon.docstring import GoogleDocstring
 from sphinx.writers.html5 import HTML5Translator
+
+import pinnray as pr
 
 project = "pinn-ray"
 version = release = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text("utf-8"))[
@@ -30,7 +33,6 @@ NOTEBOOKS_RUN = find_spec("myst_nb") is not None and os.environ.get("NOTEBOOKS")
 extensions = [
     "myst_nb" if NOTEBOOKS_RUN else "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "cyclopts.sphinx_ext",
 ]
@@ -44,6 +46,7 @@ nb_execution_mode = "force"
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 
+default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 autodoc_typehints_format = "short"
@@ -118,6 +121,14 @@ def is_hidden(_app: Sphinx, _what: str, name: str, _value: object, skipped: bool
     return skipped or name.isupper()
 
 
+def name_public(_app: Sphinx, doctree: nodes.document) -> None:
+    """Write `pr.` before the names that `import pinnray as pr` has."""
+    public = {f"{value.__module__}.{name}" for name in pr.__all__ if callable(value := getattr(pr, name))}
+    for signature in doctree.findall(addnodes.desc_signature):
+        if public & set(signature["ids"]):
+            signature.insert(0, addnodes.desc_addname("pr.", "pr."))
+
+
 NOT_IN_NOTEBOOKS = r"^:::.*\n?|^\[?!\[.*\n?|\[(.*?)\]\([^)]*\)"
 """What the text of a notebook goes without: boxes and pictures of the site, and addresses of links."""
 
@@ -180,6 +191,7 @@ def setup(app: Sphinx) -> None:
     app.add_html_math_renderer("mathml", (formula, None), (formula, None))
     app.connect("autodoc-process-signature", shorten)
     app.connect("autodoc-skip-member", is_hidden)
+    app.connect("doctree-read", name_public)
     app.connect("html-page-context", offer_notebook)
     # The sentence below a constant may have a colon; what stands before it is no type.
     GoogleDocstring._parse_attribute_docstring = GoogleDocstring._consume_to_end
