@@ -1,17 +1,22 @@
 """A film of the virtual rig: the displacements that are filmed, and the files of the film."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 from pinnray.comparison.evaluation.truths import SLIDING, experiment_source, simulate
 from pinnray.film.filmed_force import LONGEST_STEP, filmed_course, true_forces
 from pinnray.film.rig_settings import RigSettings
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import machine, package_versions
-from pinnray.runtime.output_folder import replaced_folder, write_run
+from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import write_csv
-from pinnray.solvers.problem import Problem
+from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Solver, check_law, solved, with_law
 from pinnray.vision.rig.bench import Bench
@@ -19,7 +24,7 @@ from pinnray.vision.rig.boards import board_poses, board_scene
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
 from pinnray.vision.rig.recording import Recording
-from pinnray.vision.rig.recording_files import photograph, record
+from pinnray.vision.rig.recording_files import check_codec, photograph, record
 
 
 def filmed_solution(problem: Problem, solver: Solver | None, stages: Stages) -> tuple[Solution, str]:
@@ -53,44 +58,53 @@ def filmed_solution(problem: Problem, solver: Solver | None, stages: Stages) -> 
 
 
 def film_finger(
-    problem: Problem,
+    finger: Finger,
     solver: Solver | None,
     out: Path,
     stages: Stages,
     *,
+    mesh: MeshSettings | None,
+    material: Material,
+    load: Load,
     rig: RigSettings,
     exposure: Exposure,
     motion: Motion,
-    codec: str = "ffv1",
-    seed: int = 0,
+    codec: str,
+    seed: int,
+    options: Mapping[str, object] = MappingProxyType({}),
 ) -> None:
     """Render a film of a pressed finger into a folder, with its truth and photographs of a board.
 
     Args:
-        problem: The finger with mesh, material and load.
+        finger: The finger.
         solver: See `filmed_solution`.
         out: The folder, which is replaced.
         stages: Shows the progress.
+        mesh: Element sizes.
+        material: Elastic constants.
+        load: Motion of the indenter.
         rig: Camera, markers and board.
         exposure: Light, lens and sensor.
         motion: Numbers of frames at rest, moving and held.
         codec: Of the video.
         seed: Of the noise.
+        options: Of the command line, for `run.json`.
 
     Raises:
         UserError: If the finger cannot be filmed so.
     """
-    finger, mesh = problem.finger, problem.mesh
-    if finger is None:
-        raise UserError("a film is of a finger")
+    check_output(out)
+    check_codec(codec)
     workspace, camera, pose = rig.view(finger)
     board = rig.sheet()
-    bench = Bench(mesh, finger, workspace, rig.paint, rig.irregular)
-    solution, source = filmed_solution(problem, solver, stages)
+    with stages.stage("mesh"):
+        body = finger_mesh(finger, settings=mesh)
+    bench = Bench(body, finger, workspace, rig.paint, rig.irregular)
+    solution, source = filmed_solution(Problem(body, material, load, finger=finger), solver, stages)
     course = filmed_course(solution)
     recording = Recording(
         bench=bench,
-        displacement=solution.displacement(mesh.at_nodes()),
+        displacement=solution.displacement(body.at_nodes()),
         camera=camera,
         pose=pose,
         exposure=exposure,
@@ -107,4 +121,5 @@ def film_finger(
                 poses = board_poses(board, camera, rig.boards, seed=seed)
                 photograph(board_scene(board), poses, recording, folder / "boards", progress=progress)
         made = {"versions": package_versions(), "machine": machine()}
-        write_run(folder, {"source": source, "rig": rig.model_dump(mode="json"), **made})
+        settings = {"options": dict(options), "rig": rig.model_dump(mode="json")}
+        write_run(folder, {"source": source, **settings, **made})

@@ -189,30 +189,25 @@ def rig(
         UserError: If the finger cannot be filmed so.
     """
     from pinnray.film.virtual_film import film_finger
-    from pinnray.geometry.cache import finger_mesh
-    from pinnray.runtime.output_folder import check_output
     from pinnray.runtime.stages import shown_stages
-    from pinnray.solvers.problem import Problem
     from pinnray.vision.rig.exposure import Exposure
     from pinnray.vision.rig.motion import Motion
-    from pinnray.vision.rig.recording_files import FILES, check_codec
+    from pinnray.vision.rig.recording_files import FILES
 
     folder = as_path(out, "out")
-    check_output(folder)
-    check_codec(codec)
     settings = RigSettings(**taken(given, RigSettings))
     words = ("size", "material", "load", *RigSettings.model_fields)
     finger, elastic, moved = read_job(design, material, load, given, besides=words)
-    settings.view(finger), settings.sheet()  # or says what is wrong, before the mesh is made
     chosen = None if solver is None else read_solver(solver)
     with shown_stages(progress) as stages:
-        with stages.stage("mesh"):
-            mesh = finger_mesh(finger, settings=mesh_settings(size))
         film_finger(
-            Problem(mesh, elastic, moved, finger=finger),
+            finger,
             chosen,
             folder,
             stages,
+            mesh=mesh_settings(size),
+            material=elastic,
+            load=moved,
             rig=settings,
             exposure=exposure or Exposure(),
             motion=motion or Motion(),
