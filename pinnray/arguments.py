@@ -74,7 +74,7 @@ def read_job(
     if not isinstance(load, Load):
         if not isinstance(load, str | None):
             raise UserError(f"load must be a Load or one of {', '.join(get_args(LoadKind))}, not {load!r}")
-        load = Load(load or "mean", **words)
+        load = Physics(load=load or "mean", **words).parts[1]
     return read_finger(design, shape), material or Material(**constants), load
 
 
