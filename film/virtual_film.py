@@ -8,15 +8,12 @@ from types import MappingProxyType
 from pinnray.comparison.evaluation.truths import SLIDING, experiment_source, simulate
 from pinnray.film.filmed_force import LONGEST_STEP, filmed_course, true_forces
 from pinnray.film.rig_settings import RigSettings
-from pinnray.geometry.cache import finger_mesh
-from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import machine, package_versions
-from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
+from pinnray.runtime.output_folder import replaced_folder, write_run
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import write_csv
-from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Solver, check_law, solved, with_law
 from pinnray.vision.rig.bench import Bench
@@ -24,7 +21,7 @@ from pinnray.vision.rig.boards import board_poses, board_scene
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
 from pinnray.vision.rig.recording import Recording
-from pinnray.vision.rig.recording_files import check_codec, photograph, record
+from pinnray.vision.rig.recording_files import photograph, record
 
 
 def filmed_solution(problem: Problem, solver: Solver | None, stages: Stages) -> tuple[Solution, str]:
@@ -58,31 +55,25 @@ def filmed_solution(problem: Problem, solver: Solver | None, stages: Stages) -> 
 
 
 def film_finger(
-    finger: Finger,
+    problem: Problem,
     solver: Solver | None,
     out: Path,
     stages: Stages,
     *,
-    mesh: MeshSettings | None,
-    material: Material,
-    load: Load,
     rig: RigSettings,
     exposure: Exposure,
     motion: Motion,
-    codec: str,
-    seed: int,
+    codec: str = "ffv1",
+    seed: int = 0,
     options: Mapping[str, object] = MappingProxyType({}),
 ) -> None:
     """Render a film of a pressed finger into a folder, with its truth and photographs of a board.
 
     Args:
-        finger: The finger.
+        problem: The finger with mesh, material and load.
         solver: See `filmed_solution`.
         out: The folder, which is replaced.
         stages: Shows the progress.
-        mesh: Element sizes.
-        material: Elastic constants.
-        load: Motion of the indenter.
         rig: Camera, markers and board.
         exposure: Light, lens and sensor.
         motion: Numbers of frames at rest, moving and held.
@@ -93,18 +84,17 @@ def film_finger(
     Raises:
         UserError: If the finger cannot be filmed so.
     """
-    check_output(out)
-    check_codec(codec)
+    finger, mesh = problem.finger, problem.mesh
+    if finger is None:
+        raise UserError("a film is of a finger")
     workspace, camera, pose = rig.view(finger)
     board = rig.sheet()
-    with stages.stage("mesh"):
-        body = finger_mesh(finger, settings=mesh)
-    bench = Bench(body, finger, workspace, rig.paint, rig.irregular)
-    solution, source = filmed_solution(Problem(body, material, load, finger=finger), solver, stages)
+    bench = Bench(mesh, finger, workspace, rig.paint, rig.irregular)
+    solution, source = filmed_solution(problem, solver, stages)
     course = filmed_course(solution)
     recording = Recording(
         bench=bench,
-        displacement=solution.displacement(body.at_nodes()),
+        displacement=solution.displacement(mesh.at_nodes()),
         camera=camera,
         pose=pose,
         exposure=exposure,
@@ -120,6 +110,6 @@ def film_finger(
             with stages.stage("boards") as progress:
                 poses = board_poses(board, camera, rig.boards, seed=seed)
                 photograph(board_scene(board), poses, recording, folder / "boards", progress=progress)
-        made = {"versions": package_versions(), "machine": machine()}
-        settings = {"options": dict(options), "rig": rig.model_dump(mode="json")}
-        write_run(folder, {"source": source, **settings, **made})
+        made: dict[str, object] = {"versions": package_versions(), "machine": machine()}
+        made |= {"options": dict(options), "rig": rig.model_dump(mode="json")}
+        write_run(folder, {"source": source, **made})

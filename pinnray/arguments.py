@@ -111,9 +111,9 @@ def read_solvers(given: object, preset: str | None = None) -> list[Solver]:
     Raises:
         UserError: If there is no such solver, or none that is named has the preset.
     """
-    several: list[Any] = (
-        list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
-    )
+    if isinstance(given, str):
+        given = [name.strip() for name in given.split(",")]
+    several: list[Any] = list(given) if isinstance(given, Sequence) else [given]
     for each in several:
         if not isinstance(each, str) and (isinstance(each, type) or not isinstance(each, Solver)):
             raise UserError(

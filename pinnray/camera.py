@@ -1,9 +1,10 @@
 """Functions of the front door for experimenters: calibrate, track, force from a film, and the virtual rig."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from pinnray.arguments import MATERIAL, mesh_settings, read_finger, read_job, read_solver, taken
@@ -162,6 +163,7 @@ def rig(
     material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     progress: bool | None = None,
+    options: Mapping[str, object] = MappingProxyType({}),
     **given: Any,
 ) -> Path:
     """Film a pressed finger with a virtual camera, and write the true markers and forces beside the film.
@@ -178,6 +180,7 @@ def rig(
         material: The elastic constants, or the name of a material.
         load: Motion of the indenter, or its kind alone.
         progress: Whether to show the stages; if None in a notebook only.
+        options: Of the command line, for `run.json`.
         given: Camera, markers and calibration boards by the words of
             `pinnray.film.rig_settings.RigSettings`, such as `frame`, `tilt`, `paint`, `boards`; parameters of
             finger, material and load, as for `solve`.
@@ -189,30 +192,36 @@ def rig(
         UserError: If the finger cannot be filmed so.
     """
     from pinnray.film.virtual_film import film_finger
+    from pinnray.geometry.cache import finger_mesh
+    from pinnray.runtime.output_folder import check_output
     from pinnray.runtime.stages import shown_stages
+    from pinnray.solvers.problem import Problem
     from pinnray.vision.rig.exposure import Exposure
     from pinnray.vision.rig.motion import Motion
-    from pinnray.vision.rig.recording_files import FILES
+    from pinnray.vision.rig.recording_files import FILES, check_codec
 
     folder = as_path(out, "out")
+    check_output(folder)
+    check_codec(codec)
     settings = RigSettings(**taken(given, RigSettings))
     words = ("size", "material", "load", *RigSettings.model_fields)
     finger, elastic, moved = read_job(design, material, load, given, besides=words)
+    settings.view(finger), settings.sheet()  # or says what is wrong, before the mesh is made
     chosen = None if solver is None else read_solver(solver)
     with shown_stages(progress) as stages:
+        with stages.stage("mesh"):
+            mesh = finger_mesh(finger, settings=mesh_settings(size))
         film_finger(
-            finger,
+            Problem(mesh, elastic, moved, finger=finger),
             chosen,
             folder,
             stages,
-            mesh=mesh_settings(size),
-            material=elastic,
-            load=moved,
             rig=settings,
             exposure=exposure or Exposure(),
             motion=motion or Motion(),
             codec=codec,
             seed=seed,
+            options=options,
         )
     return folder / FILES[codec]
 

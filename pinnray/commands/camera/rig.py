@@ -5,7 +5,6 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 from pydantic import Field
-from rich.console import Console
 
 from pinnray.film.rig_settings import RigSettings
 from pinnray.options.file import given_options, usual_options
@@ -54,9 +53,8 @@ def command(
         codec: ffv1 or png (lossless), mjpg or mp4v.
         out: Output folder; default out/rig, unless that holds the finished run of another job.
     """
-    from pinnray.film.virtual_film import film_finger
+    from pinnray.camera import rig
     from pinnray.runtime.output_folder import check_same_job
-    from pinnray.runtime.stages import Stages
 
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
@@ -68,22 +66,21 @@ def command(
     given = given_options(*groups, solver=solver, codec=codec)
     if out is None:
         check_same_job(folder, given, usual_options(*groups))
-    with Stages(Console(stderr=True)) as stages:
-        film_finger(
-            design,
-            solvers[0] if solvers else None,
-            folder,
-            stages,
-            mesh=mesh,
-            material=material,
-            load=load,
-            rig=scene,
-            exposure=exposure,
-            motion=motion,
-            codec=codec,
-            seed=options.seed,
-            options=given,
-        )
+    rig(
+        design,
+        solvers[0] if solvers else None,
+        out=folder,
+        exposure=exposure,
+        motion=motion,
+        codec=codec,
+        seed=options.seed,
+        size=mesh,
+        material=material,
+        load=load,
+        progress=True,
+        options=given,
+        **dict(scene),
+    )
     for path in sorted(folder.iterdir()):
         print(path)
     return 0
