@@ -162,9 +162,8 @@ def clicked_points(
     here, there, given = scales[0] * here, scales[1] * there, scales[1] * given
     motion: Homography = nearest_similarity(here, own, rigid=True)
     here, there, given = motion.moved(here), motion.moved(there), motion.moved(given)
-    if (found.order != np.arange(len(here))).any():
+    if (mixed := found.order != np.arange(len(here))).any():
         text = order_text(found.order, names)
-        mixed = found.order != np.arange(len(here))
         far, least = (
             float(np.linalg.norm((each - here)[mixed], axis=1).max()) for each in (given, given[found.order])
         )
