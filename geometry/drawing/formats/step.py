@@ -150,12 +150,12 @@ def _across(solid: cq.Solid) -> tuple[cq.Shape, Cut]:
         low, high = _extent(turned)
         layer = max(_layers(turned, frame), key=lambda layer: layer.volume)
         cut = layer._replace(depth=high - low)
-        for offset in (low, high):  # a cap has the edges of the file
+        apart, shown = _apart(turned, cut), abs(layer.volume / solid.Volume() - 1)
+        for offset in (low, high) if apart <= SAME else ():  # a cap has the edges of the file
             cap = [face for face in turned.Faces() if np.abs(np.subtract(_extent(face), offset)).max() < 1e-6]
             if abs(sum(face.Area() for face in cap) - cut.area) < 1e-7 * cut.area:
                 cut = cut._replace(faces=cap, offset=offset)
                 break
-        apart, shown = _apart(turned, cut), abs(layer.volume / solid.Volume() - 1)
         found.append((round(apart, 7) if apart <= SAME else 1 + round(shown, 1), turned, cut))
     if not found:
         raise UserError('the solid has no flat face; give depth, and the plane, such as plane = "z = 6"')

@@ -205,7 +205,7 @@ def stepped(kind: str) -> cq.Shape:
             "foot",
             "z = 0 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm, and .* 19520 mm3; .* depth = 20",
         ),
-        ("foot flush", "z = -10 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm"),
+        ("foot flush", "z = 0 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm"),
         ("thin foot", "656 mm2 over 10 mm, 560 mm2 over 20 mm, and .* 12160 mm3; .* depth = 20"),
         ("boss", "720 mm2 over 20 mm, 80 mm2 over 25 mm"),
         ("step", "720 mm2 over 15 mm, 570 mm2 over 20 mm"),
