@@ -111,7 +111,7 @@ class FingerFigures:
         That is warned of; the `stops` of a solver are fractions of the stroke at which it is computed.
 
         Raises:
-            UserError: If the stroke is longer than the load's, or the way to the end is not known.
+            UserError: If the travel is longer than the load's, or the way to the end is not known.
         """
         travels, forces = np.array(self.curve).T
         if not 0 <= stroke <= travels[-1] * (1 + 1e-9):
