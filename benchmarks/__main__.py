@@ -58,7 +58,7 @@ def main() -> int:
     for name in arguments.names:
         if name in SETTLED:
             parser.error(
-                f"{name} is settled: docs/evidence/settled.md has its figures and the commit that ran it"
+                f"{name} is settled: docs/evidence/tried.md has the answer and the commit that ran it"
             )
         if name not in BENCHMARKS:
             parser.error(f"no benchmark {name!r}; there are {', '.join(BENCHMARKS)}")

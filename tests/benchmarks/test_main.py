@@ -14,7 +14,7 @@ def test_every_name_is_a_function(name: str) -> None:
     assert callable(getattr(importlib.import_module(f"benchmarks.{module}"), function))
 
 
-@pytest.mark.parametrize(("name", "said"), [(next(iter(SETTLED)), "settled.md"), ("fme", "'fme'; there are")])
+@pytest.mark.parametrize(("name", "said"), [(next(iter(SETTLED)), "tried.md"), ("fme", "'fme'; there are")])
 def test_settled_and_unknown_names_are_refused_in_one_line(name, said, monkeypatch, capsys) -> None:
     monkeypatch.setattr(sys, "argv", ["benchmarks", name])
     with pytest.raises(SystemExit, match="2"):
