@@ -12,7 +12,6 @@ import yaml  # type: ignore[import-untyped]
 
 from benchmarks.results.default_run import PAGES, TABLES, Figures, kept_figures
 from benchmarks.tables import table_of
-from pinnray.options.preset_jobs import job_defaults
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -25,14 +24,6 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 )
 def test_the_page_has_the_table_of_the_default_run(page, name):
     assert table_of(page, name) == TABLES[name](kept_figures())
-
-
-@pytest.mark.parametrize("page", ["README.md", "docs/tutorial.md", "docs/results.md", "docs/report.md"])
-def test_a_page_counts_the_solvers_of_the_default_run(page):
-    words = ("seven", "eight", "nine", "ten", "eleven")
-    text = " ".join((ROOT / page).read_text(encoding="utf-8").lower().split())
-    counted = set(re.findall(rf"\b({'|'.join(words)}) solvers", text))
-    assert counted == {words[len(job_defaults(None).solvers.split(",")) - 7]}
 
 
 @pytest.mark.slow
