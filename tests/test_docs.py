@@ -1,6 +1,8 @@
 """The documentation against the program: examples, code blocks, command lines, tables, links, names."""
 
+import ast
 import csv
+import inspect
 import json
 import pkgutil
 import re
@@ -15,6 +17,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
+import pinnray as pr
 from pinnray.cli import QUIET, compare_main, main
 from pinnray.commands.app import pinnray
 from pinnray.geometry.cache import CAD_FORMATS, finger_mesh
@@ -378,6 +381,18 @@ def test_the_docs_have_every_setting_of_the_other_presets_as_it_is():
             rows = table(SOLVERS if preset == "local" else TRAIN, f"setting of `{preset}`")
             documented = {name: row[1] for name, row in zip(names(rows), rows, strict=True)}
             assert documented == settings_of([make_solver(name, preset=preset)])
+
+
+def test_every_public_name_has_an_example_with_arguments_that_it_takes():
+    rows = table(REFERENCE / "python" / "pinnray.md", "name")
+    documented = [re.findall(r"`pr\.(\w+)", row[0])[0] for row in rows]
+    assert sorted(documented) == sorted(pr.__all__)
+    for row in rows:
+        for call in ast.walk(ast.parse(row[2].strip("`"))):
+            match call:
+                case ast.Call(func=ast.Attribute(value=ast.Name("pr"), attr=name)) if name[0].islower():
+                    keywords = {each.arg: None for each in call.keywords if each.arg}
+                    inspect.signature(getattr(pr, name)).bind(*call.args, **keywords)
 
 
 def test_the_docs_have_the_limits_of_the_certificate():

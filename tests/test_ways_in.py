@@ -77,6 +77,9 @@ def test_the_version_is_the_same_everywhere():
     assert citation["license"] == PROJECT["license"]
     dockerfile = (ROOT / "Dockerfile").read_text(encoding="utf-8")
     assert re.findall(r"^ARG VERSION=(.+)$", dockerfile, re.MULTILINE) == [PROJECT["version"]]
+    cited = (ROOT / "docs" / "cite.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"\d+\.\d+\.\d+", cited)) == {PROJECT["version"]}
+    assert f"year = {{{citation['date-released'].year}}}" in cited
     released = re.findall(
         r"^## \[([\d.]+)\] - (.+)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE
     )
