@@ -68,7 +68,6 @@ class ForceScore(Numbers):
     shares: Mapping[str, Number] = {}  #: Of the variance of `along`, by what they come from.
     advice: str = ""  #: A sentence on the largest share, and on what would narrow the interval.
 
-
 class FigureScores(Numbers):
     """What the finger does: figures by their names with units, and drawn points of the largest, mm."""
 
