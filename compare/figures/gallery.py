@@ -110,9 +110,9 @@ def _force_displacement(comparison: Results, page: float) -> Illustration | None
         "Points: equilibria that a solver found as the load grew. Dashed: straight by the linear law."
         f"{cross}{squares}",
         each_of(
-            f"Force at the end of the travel, N per mm, after {curves[0].travel[-1]:g} mm",
+            f"Force at the end of the stroke of {curves[0].stroke[-1]:g} mm, N per mm",
             [curve.evaluation for curve in curves],
-            lambda each: float(np.linalg.norm(each.reaction)),
+            lambda each: ForceCurve.of(each, comparison.load).force[-1],
         ),
     )
 

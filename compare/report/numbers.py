@@ -6,22 +6,17 @@ Stresses, displacements and forces have the three digits of `number(value, 3)`.
 from math import isfinite, isnan
 
 from pinnray.comparison.evaluation.scores import SolverScores
-from pinnray.runtime.tables import NONE, number, percent
-
-LARGEST = 10.0
-"""Relative differences from this on are told as a multiple."""
+from pinnray.runtime.tables import NONE, percent
 
 
 def share(value: float) -> str:
-    """A relative difference: in per cent with two digits, or as `22 times`."""
-    return percent(value, 2) if not abs(value) >= LARGEST else f"{number(value, 2)} times"
+    """A relative difference, with two digits."""
+    return percent(value, 2)
 
 
 def error(value: float) -> str:
-    """A relative error with its sign; one of ten times or more as the multiple of what is right."""
-    if abs(value) >= LARGEST:
-        return share(1 + value)
-    return f"{'+' if value > 0 else ''}{share(value)}"
+    """A relative error with its sign, with two digits."""
+    return percent(value, 2, plus=True)
 
 
 def at_markers(value: float) -> str:

@@ -177,7 +177,7 @@ def body_table(comparison: Results) -> Table:
     lines.append("above fem: energy of the displacement on fem's elements above the least there.")
     if truth is not None:
         lines.append("truth: relative L² difference from the simulated finger of finite strain;")
-        lines.append("force: error of the size of the indenter's force.")
+        lines.append("force: signed error of the force along the stroke.")
     rows = []
     for name, own in scores.solvers.items():
         away = own.to_reference.rel_l2_displacement

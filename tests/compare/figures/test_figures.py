@@ -128,7 +128,7 @@ def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
 def test_pictures_for_a_journal_have_its_width_and_type_that_fits(comparison, failed, pinn, width, compared):
     """Nine solvers of long names, most of them not converged, on a column of a journal and on its page."""
     record = {"epoch": np.arange(1.0, 4.0), "PDE": np.ones(3), "BC": np.ones(3), "ASM": np.ones(3)}
-    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(36.0, 35.0, 37.5))
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(0, 0, 0.1), Estimated(36.0, 35.0, 37.5))
     told = replace(failed, in_sample=True, left_out=failed.marker_displacement, identified=force)
     more = [replace(told, solver=f"pinn-id-long-{n}", history=record) for n in range(3)]
     more += [replace(pinn, solver=f"pinn-long-{n}") for n in range(3)]
@@ -290,7 +290,7 @@ def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, c
 
 
 def test_one_of_two_near_fields_is_drawn_and_both_that_found_the_load(fem, pinn, evaluate, compared):
-    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), None)
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(0.0, -0.1, 0.1), None)
     near = evaluate("pinn-near", 1.001)
     found = [replace(pinn, solver=name, in_sample=True, identified=force) for name in ("fem-id", "pinn-id")]
     comparison = compared(fem, near, pinn, *found)

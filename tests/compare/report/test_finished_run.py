@@ -23,8 +23,8 @@ def folder(compared, estimated, evaluate, finished, tmp_path) -> Path:
     given = evaluate("fem-asm", 1.02)
     force = IdentifiedForce(
         Estimated(0.5, 0.4, 0.8),
+        Estimated(0.1, 0.0, 0.2),
         Estimated(36.0, 35.0, 37.5),
-        Estimated(0.45, 0.35, 0.7),
         {"markers": 0.8, "contact": 0.2},
         "80% of the variance of the force comes from the errors of the markers.",
     )

@@ -85,7 +85,7 @@ def test_the_first_answer_is_by_the_solver_nearest_to_the_truth_of_those_that_fo
 ):
     """`fem` is 1 / 1.5 of the truth; one that was given the markers carries their forces too."""
     figures = FingerFigures(force=4.0, tip_u=0.3, tip_v=0.4, principal_strain=0.05, mass=12.3)
-    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), None, Estimated(0.45, 0.35, 0.7))
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(0.0, -0.1, 0.1), None)
     plain, near = replace(fem, figures=figures), replace(evaluate("fem-id", 1.45), figures=figures)
     fitted, found = replace(near, in_sample=True), replace(near, in_sample=True, identified=force)
     truth, name = evaluate("fem-nonlinear", 1.5), "What does the finger do?"

@@ -28,7 +28,7 @@ def nine(estimated, evaluate, compared, observations) -> Results:
         made.append(replace(given, in_sample=True, left_out=left_out))
         if name.endswith("-id"):
             force = Estimated(0.4567, 0.4123, 0.5012)
-            found = IdentifiedForce(force, Estimated(33.59, 32.52, 34.66), force)
+            found = IdentifiedForce(force, Estimated(0.0021, -0.0123, 0.0104), Estimated(33.59, 32.52, 34.66))
             made[-1] = replace(made[-1], identified=found)
     made = [
         replace(
