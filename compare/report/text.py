@@ -6,6 +6,7 @@ from markupsafe import Markup
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.report.numbers import share
 from pinnray.geometry.finger.finger import Finger
 from pinnray.runtime.tables import number, percent
 from pinnray.solvers.problem import Load
@@ -134,22 +135,15 @@ def solve_numbers(stats: Mapping[str, object]) -> tuple[list[tuple[str, list[str
     return found, [(name.replace("_", " "), told(name)) for name in stats if name not in known]
 
 
+def ending(message: str, stats: Mapping[str, object]) -> str:
+    """A solver's message without the numbers that `solve_numbers` tells with their intervals."""
+    parts = [part for part in message.split("; ") if f"{part.split(' ')[0]}_low" not in stats]
+    return sentence("; ".join(parts)) if parts else ""
+
+
 def sentence(text: str) -> str:
     """The text with a capital at its start and one full stop at its end."""
     return text[:1].upper() + text[1:].rstrip(". ") + "."
-
-
-def beside(value: float, own: float | None) -> Markup:
-    """A difference from a reference and, if there is one, the reference's own error, as HTML.
-
-    A difference that is smaller than that error is set in grey.
-    """
-    if own is None:
-        return Markup("{}").format(number(value, 3))
-    kind = "within" if abs(value) < abs(own) else "beyond"
-    return Markup('<span class="{}">{}</span><br><span class="unit">±&nbsp;{}</span>').format(
-        kind, number(value, 3), number(abs(own), 2)
-    )
 
 
 def missed_energy(evaluation: Evaluation) -> str:
@@ -157,7 +151,7 @@ def missed_energy(evaluation: Evaluation) -> str:
     certificate = evaluation.certificate
     if certificate is None or not certificate.misses_energy:
         return ""
-    missed = percent(certificate.missed / certificate.fem_energy)
+    missed = share(certificate.missed / certificate.fem_energy)
     return (
         f"{evaluation.label} reports {missed} less energy than the least that is possible: its quadrature "
         "misses it."
