@@ -386,7 +386,7 @@ def test_the_docs_have_every_setting_of_the_other_presets_as_it_is():
 def test_every_public_name_has_an_example_with_arguments_that_it_takes():
     rows = table(REFERENCE / "python" / "pinnray.md", "name")
     documented = [re.findall(r"`pr\.(\w+)", row[0])[0] for row in rows]
-    assert sorted(documented) == sorted(pr.__all__)
+    assert sorted(documented) == sorted(dir(pr))
     for row in rows:
         for call in ast.walk(ast.parse(row[2].strip("`"))):
             match call:
@@ -426,16 +426,6 @@ def test_every_solver_has_a_page_that_says_when_to_use_it_its_cost_and_its_limit
             "loads": ", ".join(f"`{load}`" for load in solver.loads),
             "is given the markers": "yes" if traits.assimilates else "no",
         }, name
-    listed = (DOCS / "solvers" / "index.md").read_text(encoding="utf-8").splitlines()
-    assert [name for name in BUILT_IN if name not in listed] == []
-
-
-def test_the_page_of_the_python_interface_has_every_name():
-    import pinnray as pr
-
-    text = (REFERENCE / "python" / "pinnray.md").read_text(encoding="utf-8")
-    summary = text.split("## Summary")[0]
-    assert [name for name in dir(pr) if f"`{name}`" not in summary] == []
 
 
 def test_the_docs_have_every_column_of_measurements():
