@@ -12,7 +12,6 @@ import numpy as np
 from jinja2 import Template
 
 from pinnray.comparison.evaluation.comparison import TRUTH, Results
-from pinnray.comparison.evaluation.differences import Differences
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.figures.fields import (
@@ -24,7 +23,7 @@ from pinnray.comparison.figures.fields import (
 )
 from pinnray.comparison.figures.overlay import contact_motion
 from pinnray.comparison.report import text
-from pinnray.comparison.report.numbers import at_markers, seconds, share
+from pinnray.comparison.report.numbers import seconds, share
 from pinnray.comparison.report.page_body import packed_body
 from pinnray.comparison.report.summary import answers
 from pinnray.comparison.report.tables import printed_rows, table_one
@@ -32,7 +31,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_text
 from pinnray.runtime.html import Packed, picture_urls, template_environment
 from pinnray.runtime.machine import program_version
-from pinnray.runtime.tables import NONE, distance, number
+from pinnray.runtime.tables import distance, number
 
 BUDGET = 6_000_000
 """Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""
@@ -189,35 +188,7 @@ def _entry(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
         "evaluation": evaluation,
         "own": own,
         "seconds": seconds(own),
-        "differences": _differences(evaluation.solver, comparison),
     }
-
-
-def _differences(solver: str, comparison: Results) -> list[tuple[str, str]]:
-    """Differences from the reference, whether each is `within` its error; for the reference that error."""
-    to = comparison.scores[solver].to_reference
-    known = to.reference_uncertainty
-    if solver == comparison.reference.solver:
-        return [("beyond", f"± {cell}") for cell in _cells(known)] if known else 5 * [("beyond", NONE)]
-    limits = _sizes(known) if known else 5 * (0.0,)
-    kinds = ["within" if size < limit else "beyond" for size, limit in zip(_sizes(to), limits, strict=True)]
-    return list(zip(kinds, _cells(to), strict=True))
-
-
-def _sizes(to: Differences) -> tuple[float, ...]:
-    stress = to.von_mises
-    return to.displacement.rel_l2, stress.rel_l2, stress.mean, stress.p95, to.mae_markers
-
-
-def _cells(to: Differences) -> list[str]:
-    displacement, stress, mean, largest, markers = _sizes(to)
-    return [
-        share(displacement),
-        share(stress),
-        number(mean, 3),
-        number(largest, 3),
-        at_markers(markers),
-    ]
 
 
 def _distant(evaluation: Evaluation) -> bool:

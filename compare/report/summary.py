@@ -282,7 +282,7 @@ def _held_out(own: SolverScores) -> float:
 
 
 def _loads_found(scores: Scores) -> list[str]:
-    """Place, truth and advice of the forces that solvers found from the markers."""
+    """Places of the forces that solvers found from the markers, and what would narrow their intervals."""
     found = {scores.label(name): own for name, own in scores.solvers.items() if own.identified}
     places = []
     for name, own in found.items():
@@ -290,16 +290,6 @@ def _loads_found(scores: Scores) -> list[str]:
             middle, low, high = (number(each, 3) for each in (place.value, place.low, place.high))
             places.append(f"{middle} mm ({low} to {high} mm) by {name}")
     said = [f"The force acts at x = {_listed(places)}."] if places else []
-    right: dict[bool, list[str]] = {True: [], False: []}
-    for name, own in found.items():
-        if own.identified and isfinite(own.force_to_truth_rel):
-            force = own.identified.force
-            true = force.value / (1 + own.force_to_truth_rel)
-            right[force.low <= true <= force.high].append(name)
-    for inside, names in right.items():
-        if names:
-            where = "inside" if inside else "outside"
-            said.append(f"The true force is {where} the 95 % interval of {_listed(names)}.")
     advice = [own.identified.advice for own in found.values() if own.identified and own.identified.advice]
     return said + list(dict.fromkeys(advice))
 
