@@ -84,8 +84,10 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution], page: f
         if each
     ]
     extent = Extent.around(*(mesh.points for mesh in meshes.values()), *moved.values(), *halves, margin=1)
-    columns, label = 1 if page < NARROW else 2, 0.42
+    columns = 1 if page < NARROW else 2
     width = (page - 0.3) / columns - 0.1
+    titles = {run: wrapped(f"{optimum.place(run)}:  {_said(optimum, run)}", width) for run in meshes}
+    label = 0.27 + 0.15 * (1 + max(text.count("\n") for text in titles.values()))
     height = width * extent.height / extent.width
     with figure(0.55 + -(-len(meshes) // columns) * (height + label), page) as drawn:
         write_heading(
@@ -103,9 +105,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution], page: f
             body.draw_outline(axes, paths, moved[run], width=0.8)
             if circle := ends[run]:
                 axes.add_patch(circle)
-            values = optimum.measurements[run].values
-            text = ", ".join(f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.names[:3])
-            axes.set_title(f"{optimum.place(run)}:  {text}", size=SMALL, loc="left")
+            axes.set_title(titles[run], size=SMALL, loc="left")
     return drawn
 
 
@@ -116,6 +116,13 @@ def cylinder_at_end(problem: Problem) -> Circle | None:
     middle = front_points(problem.mesh, np.array([np.mean(contact_ends(problem))]))[0]
     centre = middle + problem.load.values + np.array([0.0, problem.load.radius])
     return Circle((centre[0], centre[1]), problem.load.radius, fill=False, color=CONTACT, lw=0.8)
+
+
+def _said(optimum: Optimum, run: int) -> str:
+    """The first quantities of the question, of a run."""
+    values = optimum.measurements[run].values
+    names = optimum.study.names[:3]
+    return ", ".join(f"{name.replace('_', ' ')} {values[name]:.3g} {_unit(name)}" for name in names)
 
 
 def _place(run: Measurement, first: str, second: str) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from pinnray.comparison.figures.layout import HALO, axes_at, write_heading
 from pinnray.comparison.figures.solver_colours import solver_look
 from pinnray.runtime.figure import INK, NARROW, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
-from pinnray.studies.sweep.study import Value, title, unit_of
+from pinnray.studies.sweep.study import Value, unit_of
 from pinnray.studies.sweep.sweep import Sweep
 
 SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
@@ -58,12 +58,10 @@ def draw_pairs(sweep: Sweep, page: float = WIDTH) -> Figure:
             low, high = (0.0, len(choices) - 1.0) if choices else map(float, ends)
             room_beside = 0.06 * (high - low or 1.0)
             axes.set_xlim(low - room_beside, high + room_beside)  # both ends have their numbers
-            unit = unit_of(parameter).replace("deg", "°")
             labels = axes.set_xticks([low, high], ends, rotation=90 if upright else 0)
             labels[0].label1.set_horizontalalignment("left")
             labels[-1].label1.set_horizontalalignment("right")
-            between, after = (" ", ", ") if upright else ("\n", "\n")
-            words = parameter.replace("_", between) + (f"{after}{unit}" if unit else "")
+            words = _words(parameter) if upright else _words(parameter, "\n", "\n")
             axes.set_xlabel(words, rotation=90 if upright else 0, labelpad=2)
     return drawn
 
@@ -99,9 +97,9 @@ def draw_maps(sweep: Sweep, names: Sequence[str], page: float = WIDTH) -> Figure
             axes.set_yticks(range(len(y)), [] if column else [_short(value) for value in y])
             axes.tick_params(length=0)
             axes.set_title(name.replace("_", " "), fontsize=8.5)
-            axes.set_xlabel(title(first))
+            axes.set_xlabel(_words(first))
             if not column:
-                axes.set_ylabel(title(second).replace("_", "\n"))
+                axes.set_ylabel(_words(second, "\n"))
     return drawn
 
 
@@ -115,6 +113,12 @@ def _varies(sweep: Sweep, name: str) -> bool:
 def _label(name: str) -> str:
     unit = QUANTITIES[name].unit.replace("deg", "°")
     return name.replace("_", "\n") + (f"\n{unit}" if unit else "")
+
+
+def _words(parameter: str, between: str = " ", after: str = ", ") -> str:
+    """The words of a parameter and its unit, with texts between the words and after them."""
+    unit = unit_of(parameter).replace("deg", "°")
+    return parameter.replace("_", between) + (f"{after}{unit}" if unit else "")
 
 
 def _ends(sweep: Sweep, parameter: str) -> tuple[str, str]:

@@ -29,12 +29,15 @@ RANGES = {
         **WALLS,
     }.items()
 }
+LIMITS = {"von_mises": {"at_most": 2.0}}
 CHOICES = {"young": Range(values=(1.0, 3.8)), "rib_count": Range(values=(3, 4, 5))}
 
 
 def searched(**ranges: Range) -> Optimum:
     """A search with made-up numbers."""
-    question = Question(name="q", objectives={"wrap": "largest", "force": "largest"}, varied=ranges)
+    question = Question(
+        name="q", objectives={"wrap": "largest", "force": "largest"}, varied=ranges, constraints=LIMITS
+    )
     drawn = samples(question)
     found = [Measurement(n, "done", "", 0.1, dict.fromkeys(QUANTITIES, 20.0 + n)) for n in range(len(drawn))]
     return Optimum(question, drawn, found, list(range(10, 20)))
