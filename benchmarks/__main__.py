@@ -10,7 +10,6 @@ from pinnray.runtime.errors import UserError
 
 BENCHMARKS = {
     "results": "results.default_run:main",
-    "pictures": "results.pictures:main",
     "default": "results.default_time:main",
     "fields": "results.fields:loads",
     "friction": "results.fields:friction",
