@@ -23,8 +23,8 @@ def folder(compared, estimated, evaluate, finished, tmp_path) -> Path:
     given = evaluate("fem-asm", 1.02)
     force = IdentifiedForce(
         Estimated(0.5, 0.4, 0.8),
+        Estimated(0.1, 0.0, 0.2),
         Estimated(36.0, 35.0, 37.5),
-        Estimated(0.45, 0.35, 0.7),
         {"markers": 0.8, "contact": 0.2},
         "80% of the variance of the force comes from the errors of the markers.",
     )
@@ -47,7 +47,9 @@ def test_a_run_gives_its_answers(folder: Path, capsys: pytest.CaptureFixture[str
     said = capsys.readouterr().out
     assert "May the network be trusted here?\n  Yes, as a solver" in said
     assert "gp was left out: too slow." in said
-    assert re.search(r"finds a force of 0\.5.* 80% of the variance of the force comes from the errors", said)
+    assert "The force acts at x = 36.0 mm (35.0 to 37.5 mm) by fem-asm." in said
+    assert "80% of the variance of the force comes from the errors" in said
+    assert re.search(r"fem-asm +0\.700 +7\.3.% ", said)  # the table of the markers
     assert said.endswith(f"report: {folder / 'report.html'}\n")
     assert [path.name for path in folder.iterdir()] == ["metrics.json"]
 
