@@ -4,7 +4,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pinnray.runtime.tables import Cell
-from pinnray.solvers.solution import Solution
+from pinnray.solvers.solution import Solution, stroke_axes
 from pinnray.vision.rig.motion import Course
 from pinnray.vision.rig.recording import Recording
 
@@ -22,7 +22,7 @@ def filmed_course(solution: Solution) -> Course:
 
 
 def true_forces(solution: Solution, recording: Recording, depth: float) -> list[dict[str, Cell]]:
-    """A row for every frame: the force of the indenter and where it acts.
+    """A row for every frame: the force of the indenter along and across its stroke, and where it acts.
 
     Args:
         solution: Behind the recording's course.
@@ -35,23 +35,20 @@ def true_forces(solution: Solution, recording: Recording, depth: float) -> list[
         forces = np.column_stack([history["reaction_x"], history["reaction_y"]])
     else:
         shares, forces = np.array([0.0, 1.0]), np.array([np.zeros(2), solution.reaction])
-    force = CubicSpline(shares, forces)
+    components = CubicSpline(shares, depth * forces @ stroke_axes(solution.problem.load).T)
     places = history.get("force_abscissa_mm")
     place = None if places is None else CubicSpline(shares, places)
     rows: list[dict[str, Cell]] = []
     for number in range(len(recording.motion)):
         load = recording.load(number)
-        x, y = force(load).tolist()
-        size = float(np.hypot(x, y))
+        force, across = components(load).tolist()
         rows.append(
             {
                 "frame": number,
                 "time_s": number / recording.motion.rate,
                 "load": load,
-                "force_x_N_per_mm": x,
-                "force_y_N_per_mm": y,
-                "N_per_mm": size,
-                "force_N": size * depth,
+                "force_N": force,
+                "tangential_force_N": across,
                 "position_mm": "" if place is None else float(place(load)),
             }
         )

@@ -18,6 +18,7 @@ from pinnray.solvers.identification.tracker import ForceReading, ForceTracker
 from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
 from pinnray.solvers.problem import Material, Problem
 from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Estimated
 from pinnray.solvers.solver import Progress, check_law
 from pinnray.vision.tracking.trajectories import Tracking
 
@@ -84,18 +85,19 @@ def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> 
             deviations[seen] = np.sqrt(np.diag(covariance)).reshape(-1, 2)
         reading = tracker.update(np.where(seen[:, None], at - rest, 0.0), deviations, seen)
         found.append(FrameForce(number, when, reading, reading.seconds))
-        progress((number + 1) / len(places), f"frame {number + 1}, {reading.size:.3g} N/mm")
+        progress((number + 1) / len(places), f"frame {number + 1}, {reading.force.value:.3g} N/mm")
     return found
 
 
 def force_line(force: FrameForce, depth: float) -> str:
     """A force in words: N and place with their intervals, and the delay."""
     reading = force.reading
-    if not np.isfinite(reading.size):
+    if not np.isfinite(reading.force.value):
         return f"no force: {reading.status}"
+    newtons, (place, start, end) = _newtons(reading.force, depth), reading.position
     return (
-        f"force {reading.size * depth:.2f} N ({reading.low * depth:.2f} to {reading.high * depth:.2f}) at "
-        f"x = {reading.position:.1f} mm ({reading.position_low:.1f} to {reading.position_high:.1f}), "
+        f"force {newtons[0]:.2f} N ({newtons[1]:.2f} to {newtons[2]:.2f}) at "
+        f"x = {place:.1f} mm ({start:.1f} to {end:.1f}), "
         f"{1000 * force.delay:.0f} ms after {force.time:.2f} s"
     )
 
@@ -103,21 +105,16 @@ def force_line(force: FrameForce, depth: float) -> str:
 def force_row(force: FrameForce, depth: float) -> dict[str, Cell | None]:
     """The force in a frame by the columns of `force.csv`; None where there is no estimate or no bound."""
     reading = force.reading
-    x, y = reading.force
     numbers = {
-        "force_N": reading.size * depth,
-        "force_low_N": reading.low * depth,
-        "force_high_N": reading.high * depth,
-        "N_per_mm": reading.size,
-        "N_per_mm_low": reading.low,
-        "N_per_mm_high": reading.high,
-        "force_x_N_per_mm": x,
-        "force_y_N_per_mm": y,
-        "position_mm": reading.position,
-        "position_low_mm": reading.position_low,
-        "position_high_mm": reading.position_high,
-        "inflation": reading.inflation,
+        f"{name}{end}_{unit}": value
+        for name, unit, values in (
+            ("force", "N", _newtons(reading.force, depth)),
+            ("tangential_force", "N", _newtons(reading.tangential_force, depth)),
+            ("position", "mm", reading.position),
+        )
+        for end, value in zip(("", "_low", "_high"), values, strict=True)
     }
+    numbers["inflation"] = reading.inflation
     row: dict[str, Cell | None] = {"frame": force.frame, "time_s": force.time}
     row |= {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
     row |= {"equilibria": reading.evaluations, "seconds": reading.seconds, "delay_s": force.delay}
@@ -129,11 +126,9 @@ def write_forces(folder: Path, forces: Sequence[FrameForce], depth: float) -> No
     write_csv(folder / "force.csv", [force_row(force, depth) for force in forces])
     readings = [force.reading for force in forces]
     times = np.array([force.time for force in forces])
-    sizes, places = (
-        np.array([[getattr(reading, name) for name in names] for reading in readings])
-        for names in (("size", "low", "high"), ("position", "position_low", "position_high"))
-    )
-    draw_force_track(times, sizes * depth, places, depth=depth).save(folder / "force.png")
+    newtons = np.array([_newtons(reading.force, depth) for reading in readings])
+    places = np.array([reading.position for reading in readings])
+    draw_force_track(times, newtons, places, depth=depth).save(folder / "force.png")
 
 
 def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int | None = None) -> Table:
@@ -144,10 +139,10 @@ def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int | N
         depth: Of the finger, mm.
         passed_over: Number of frames without a force, as an earlier one was sought; None if not live.
     """
-    known = [force for force in forces if np.isfinite(force.reading.size)]
+    known = [force for force in forces if np.isfinite(force.reading.force.value)]
     rows = []
     if known:
-        largest = max(known, key=lambda force: force.reading.size)
+        largest = max(known, key=lambda force: force.reading.force.value)
         rows = [_row("largest", largest, depth), _row("last", known[-1], depth)]
     delays = 1000 * np.array([force.delay for force in forces])
     unexplained = sum(force.reading.inflation > 1 for force in known)
@@ -159,17 +154,23 @@ def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int | N
     )
     if passed_over is not None:
         caption += f"; {passed_over} frames were passed over"
-    headings = ("", "time, s", "force, N", "N/mm", "contact, x in mm")
+    headings = ("", "time, s", "force, N", "tangential force, N", "contact, x in mm")
     title = f"Force of the indenter on a finger {depth:g} mm deep"
     return terminal_table(title, headings, rows, caption=caption)
 
 
 def _row(name: str, force: FrameForce, depth: float) -> list[str]:
     reading = force.reading
+    newtons = (_newtons(each, depth) for each in (reading.force, reading.tangential_force))
+    place, start, end = reading.position
     return [
         name,
         f"{force.time:.2f}",
-        f"{reading.size * depth:.2f} ({reading.low * depth:.2f} to {reading.high * depth:.2f})",
-        f"{reading.size:.4f}",
-        f"{reading.position:.1f} ({reading.position_low:.1f} to {reading.position_high:.1f})",
+        *(f"{value:.2f} ({low:.2f} to {high:.2f})" for value, low, high in newtons),
+        f"{place:.1f} ({start:.1f} to {end:.1f})",
     ]
+
+
+def _newtons(force: Estimated, depth: float) -> Estimated:
+    """A force per depth, N/mm, for a depth, mm: in N."""
+    return Estimated(*(depth * value for value in force))

@@ -32,7 +32,7 @@ class ScoredPress:
 
     @property
     def force_error(self) -> float:
-        """Force along the travel over the finite elements', less one."""
+        """Force along the stroke over the finite elements', less one."""
         return float(self.found.force[1] / self.load.force[1] - 1)
 
     def row(self) -> dict[str, Cell]:
@@ -46,8 +46,8 @@ class ScoredPress:
             "fem_force_N": float(-fem_y),
             "force_N": float(-y),
             "force_error_percent": 100 * self.force_error,
-            "fem_force_along_N": float(fem_x),
-            "force_along_N": float(x),
+            "fem_tangential_force_N": float(fem_x),
+            "tangential_force_N": float(x),
             "steady": self.found.steady,
         }
 

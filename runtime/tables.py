@@ -34,6 +34,8 @@ MOST_TITLES = 12
 Cell = str | int | float | bool
 NONE = "–"
 """Stands where there is no number."""
+MANY_TIMES = 10.0
+"""A share of which the size is larger is told as so many times: "24 times" and not "2400 %"."""
 LEAST_PERCENT, LEAST_DISTANCE = 0.001, 0.0001
 """Smaller shares, %, and lengths, mm, are printed as less than this: they are as good as zero."""
 
@@ -295,19 +297,22 @@ def number(value: float, digits: int = 4) -> str:
     return text.rstrip(".").replace("-", "−")
 
 
-def percent(share: float, digits: int = 3, *, sign: bool = True) -> str:
-    """A share in per cent: so many significant digits, at least all before the point.
+def percent(share: float, digits: int = 3, *, sign: bool = True, plus: bool = False) -> str:
+    """A share in per cent, beyond `MANY_TIMES` in times: significant digits, at least all before the point.
 
     A dash for a share that is not finite.
 
     Args:
-        share: 0.123 is 12.3 %.
+        share: 0.123 is 12.3 %, and 24 is 24 times.
         digits: How many significant digits.
         sign: Whether the per cent sign follows, after a no-break space.
+        plus: Whether a positive share has a plus: an error with a direction.
     """
     if not isfinite(share):
         return NONE
-    value = 100 * share
+    value, ahead = 100 * share, "+" * (plus and share > 0)
+    if abs(share) > MANY_TIMES:
+        return f"{ahead}{share:.0f}\N{NO-BREAK SPACE}times".replace("-", "−")
     if value == 0:
         text = "0"
     elif abs(value) < LEAST_PERCENT:
@@ -316,7 +321,7 @@ def percent(share: float, digits: int = 3, *, sign: bool = True) -> str:
         )
     else:
         text = f"{value:.0f}".replace("-", "−") if abs(value) >= 10**digits else number(value, digits)
-    return f"{text}\N{NO-BREAK SPACE}%" if sign else text
+    return f"{ahead}{text}\N{NO-BREAK SPACE}%" if sign else f"{ahead}{text}"
 
 
 def distance(value: float) -> str:

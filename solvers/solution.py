@@ -94,27 +94,48 @@ class Estimated(NamedTuple):
 
 
 class IdentifiedForce(NamedTuple):
-    """The indenter's force, identified from markers."""
+    """The indenter's force, identified from markers; `stroke_axes` has the directions of the components."""
 
-    size: Estimated  #: N/mm
+    force: Estimated  #: N/mm
+    tangential_force: Estimated  #: N/mm
     position: Estimated | None  #: Contact's abscissa on the drawn front, mm; None where it was no unknown
-    along: Estimated | None = None  #: Its component along the travel, N/mm
-    #: Shares of the variance of `along` by what they come from, the largest first
+    #: Shares of the variance of `force` by what they come from, the largest first
     shares: Mapping[str, float] = {}
     advice: str = ""  #: A sentence on the largest share, and on what would narrow the interval
 
     def phrase(self, depth: float | None = None) -> str:
-        """Force and place with their intervals in words; in N as well for a finger of a depth, mm."""
-        said = f"force {_interval(*self.size)} N/mm"
-        if depth is not None:
-            said += f", {_interval(*(depth * value for value in self.size))} N over {depth:g} mm"
+        """Forces and place with their intervals in words: in N for a finger of a depth, mm, else in N/mm."""
+        unit, factor = ("N/mm", 1.0) if depth is None else ("N", depth)
+        force, across = (
+            f"{_interval(*(factor * value for value in each))} {unit}"
+            for each in (self.force, self.tangential_force)
+        )
+        said = f"force {force}, tangential force {across}"
         return said if self.position is None else f"{said}, at x = {_interval(*self.position)} mm"
 
 
-def along_travel(load: Load) -> FloatArray:
-    """Unit vector along the travel of the indenter, shape (2,); zero if it has none."""
-    travel = np.array([value or 0.0 for value in load.displacement])
-    return np.asarray(travel / (np.linalg.norm(travel) or 1.0))
+def stroke_axes(load: Load) -> FloatArray:
+    """Unit vectors along the indenter's stroke and across it, rows of shape (2, 2).
+
+    The component of the indenter's force along the first is the *force*, positive where it presses. The
+    second is the first turned by 90 degrees counter-clockwise: the component along it, the *tangential
+    force*, is positive toward the tip if the stroke goes straight into the finger. A stroke of zero has no
+    direction, and no force either: both are NaN.
+    """
+    stroke = np.array([value or 0.0 for value in load.displacement])
+    u, v = stroke / (np.linalg.norm(stroke) or np.nan)
+    return np.array([[u, v], [-v, u]])
+
+
+def indenter_forces(load: Load, reaction: FloatArray, identified: IdentifiedForce | None) -> FloatArray:
+    """Force and tangential force of the indenter, N/mm: as identified from markers, else the reaction's.
+
+    What rounding leaves of one, 1e-9 of the other or less, is zero.
+    """
+    if identified is not None:
+        return np.array([identified.force.value, identified.tangential_force.value])
+    forces = stroke_axes(load) @ reaction
+    return np.where(np.abs(forces) <= 1e-9 * np.abs(forces).max(), 0.0, forces)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,8 +229,13 @@ class Solution:
 
     @property
     def force(self) -> float:
-        """Force of the indenter along its travel, N, over the whole depth; `reaction` is per mm of depth."""
-        return self.depth * float(self.reaction @ along_travel(self.problem.load))
+        """Force of the indenter along its stroke, N, over the whole depth; `reaction` is per mm of depth."""
+        return self.depth * float(indenter_forces(self.problem.load, self.reaction, self.identified)[0])
+
+    @property
+    def tangential_force(self) -> float:
+        """Force of the indenter across its stroke, N, over the whole depth; see `stroke_axes`."""
+        return self.depth * float(indenter_forces(self.problem.load, self.reaction, self.identified)[1])
 
     @property
     def depth(self) -> float:
@@ -251,7 +277,8 @@ class Solution:
             "status": f"{outcome}: {self.status.message}",
             "energy": f"{self.energy:.5g} N mm per mm of depth",
             "reaction": f"({u:.4g}, {v:.4g}) N per mm of depth",
-            "force along the travel": f"{self.force:.4g} N over a depth of {self.depth:g} mm",
+            "force": f"{self.force:.4g} N over a depth of {self.depth:g} mm",
+            "tangential force": f"{self.tangential_force:.4g} N",
             "unknowns": self.stats.get("unknowns", "–"),
             "time": f"{float(self.stats.get('seconds', np.nan)):.3g} s",
         }

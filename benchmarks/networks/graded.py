@@ -145,7 +145,7 @@ class Compared:
         to = own.differences_from(self.reference)
         estimated = solution.history.get("estimated_error", [np.nan])[-1]
         energy = own.energy / self.reference.energy - 1
-        shares = (force_error(own, self.reference), energy, float(estimated))
+        shares = (force_error(own, self.reference, self.problem.load), energy, float(estimated))
         return (
             *(float(solution.stats["seconds"]), 100 * to.displacement.rel_l2, 100 * to.von_mises.rel_l2),
             *(to.mae_markers, *(100 * share for share in shares)),

@@ -13,7 +13,7 @@ from rich.table import Table
 from benchmarks.tables import DOCS, fill, keep_rows, kept_rows, markdown
 from pinnray.cli import compare_main
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.tables import terminal_table
+from pinnray.runtime.tables import percent, terminal_table
 
 ROOT = DOCS.parent
 RUN = ROOT / "out" / "default" / "metrics.json"
@@ -85,7 +85,7 @@ def short_table(rows: Sequence[Figures]) -> str:
     """The table of the README and the paper."""
     header = ("solver", "what it is", "markers, mm", "displacement", "stress", "force")
     chosen = [each for each in rows if each.solver in SHORT]
-    cells = [(*_names(each), _mm(each.held_out_sum), *map(_percent, each[8:11])) for each in chosen]
+    cells = [(*_names(each), _mm(each.held_out_sum), *_to_truth(each)) for each in chosen]
     return markdown(header, cells, left=2)
 
 
@@ -98,7 +98,9 @@ def marker_table(rows: Sequence[Figures]) -> str:
 def body_table(rows: Sequence[Figures]) -> str:
     """Errors over the body, for the page of results."""
     header = ("solver", "from `fem`", "energy above `fem`", "displacement", "stress", "force", "time, s")
-    cells = [(_names(each)[0], *map(_percent, each[6:11]), f"{each.seconds:.1f}") for each in rows]
+    cells = [
+        (_names(each)[0], *map(_percent, each[6:8]), *_to_truth(each), f"{each.seconds:.1f}") for each in rows
+    ]
     return markdown(header, cells)
 
 
@@ -136,10 +138,12 @@ def _mm(value: float | None) -> str:
     return "" if value is None else f"{value:.3f}"
 
 
-def _percent(value: float | None) -> str:
+def _to_truth(row: Figures) -> tuple[str, str, str]:
+    return _percent(row.displacement), _percent(row.von_mises), _percent(row.force, plus=True)
+
+
+def _percent(value: float | None, *, plus: bool = False) -> str:
     """Two digits and the unit; rounding errors are zero."""
     if value is None:
         return ""
-    if abs(value) < 1e-12:
-        return "0 %"
-    return f"{float(f'{100 * value:.2g}'):g} %".replace("-", "−")
+    return percent(value if abs(value) > 1e-12 else 0.0, 2, plus=plus).replace("\N{NO-BREAK SPACE}", " ")

@@ -13,7 +13,8 @@ from rich.table import Table
 
 from benchmarks.tables import DOCS
 from pinnray.runtime.arrays import FloatArray
-from pinnray.studies.fields.emulator import FieldEmulator, grip_force
+from pinnray.solvers.solution import stroke_axes
+from pinnray.studies.fields.emulator import FieldEmulator
 from pinnray.studies.fields.reader import FIGURES
 from pinnray.studies.fields.snapshots import KnownSamples, Snapshots
 from pinnray.studies.fields.store import fields_of
@@ -59,7 +60,7 @@ def _compared(emulator: FieldEmulator, true: Snapshots) -> tuple[FloatArray, Flo
             stress = emulator.reader.stress(points, nodal, emulator.law, lame)
             counted = emulator.reader.counted(points, position)
             read = emulator.reader.figures(points, nodal, stress, position)
-            force = grip_force(np.array([force_u, force_v]), load) * found.mesh.depth
+            force = float(stroke_axes(load)[0] @ (force_u, force_v)) * found.mesh.depth
             wanted = dict(zip(FIGURES, (force, *read, float(width)), strict=True))
             off = [_relative(found.nodal, nodal), _relative(found.von_mises[counted], stress[counted])]
             held = [float(off[0] <= found.error), np.nan]

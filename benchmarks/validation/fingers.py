@@ -90,8 +90,8 @@ def of_fingers() -> tuple[dict[str, str], dict[str, Figure]]:
         for name, each in solutions.items():
             if (force := each.identified) is not None:
                 ended = "converged" if each.status.converged else "not converged"
-                size = ", ".join(f"{value:.2f}" for value in force.size[1:])
-                forces.append((finger.name, name, f"{force.size.value:.2f}", size, ended))
+                value, *ends = (f"{each:.2f}" for each in force.force)
+                forces.append((finger.name, name, value, ", ".join(ends), ended))
         forces.append(
             (finger.name, "`fem-nonlinear`, friction 0.9", f"{-rough.reaction[1]:.2f}", "", "forward")
         )

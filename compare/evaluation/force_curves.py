@@ -1,4 +1,4 @@
-"""Forces of the indenter along its travel, of every solver that follows the load."""
+"""Forces of the indenter along and across its stroke, of every solver that follows the load."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import Cell, write_csv
 from pinnray.solvers.problem import Load
+from pinnray.solvers.solution import stroke_axes
 
 REACTIONS = ("reaction_x", "reaction_y")
 """Columns of a record along the load, N/mm; its first column is `load_fraction`."""
@@ -21,9 +22,9 @@ class ForceCurve:
 
     evaluation: Evaluation  #: The solver's result at the end of the curve.
     fraction: FloatArray  #: Of the load, shape (k,).
-    travel: FloatArray  #: Distance that the indenter has moved, shape (k,), mm.
-    reaction: FloatArray  #: Force of the indenter on the finger, shape (k, 2), N/mm.
-    force: FloatArray  #: Its component along the travel, shape (k,), N/mm, which does the work.
+    stroke: FloatArray  #: Distance that the indenter has moved, shape (k,), mm.
+    force: FloatArray  #: Force of the indenter along its stroke, shape (k,), N/mm, which does the work.
+    tangential_force: FloatArray  #: The same across it, see `stroke_axes`.
 
     @classmethod
     def of(cls, evaluation: Evaluation, load: Load) -> "ForceCurve":
@@ -34,9 +35,8 @@ class ForceCurve:
         else:
             fraction = np.array([0.0, 1.0] if evaluation.law == "linear" else [1.0])
             reaction = np.outer(fraction, evaluation.reaction) + 0.0  # no -0
-        displacement = np.array([value or 0.0 for value in load.displacement])
-        length = float(np.linalg.norm(displacement))
-        return cls(evaluation, fraction, fraction * length, reaction, reaction @ displacement / length)
+        length = float(np.linalg.norm(load.values))
+        return cls(evaluation, fraction, fraction * length, *(stroke_axes(load) @ reaction.T))
 
 
 def follows_load(evaluation: Evaluation) -> bool:
@@ -54,18 +54,15 @@ def force_curves(evaluations: Sequence[Evaluation], load: Load) -> list[ForceCur
     return [ForceCurve.of(evaluation, load) for evaluation in evaluations if not evaluation.in_sample]
 
 
-def write_force_displacement(path: Path, curves: Sequence[ForceCurve], load: Load, *, depth: float) -> None:
-    """Write a row an equilibrium: prescribed displacement and force, per mm of depth and for `depth`, mm."""
+def write_force_displacement(path: Path, curves: Sequence[ForceCurve], *, depth: float) -> None:
+    """Write a row an equilibrium: stroke and forces along and across it, in N for a depth, mm."""
     rows: list[dict[str, Cell]] = []
     for curve in curves:
-        for fraction, travel, reaction, force in zip(
-            curve.fraction, curve.travel, curve.reaction, curve.force, strict=True
+        for fraction, stroke, force, across in zip(
+            curve.fraction, curve.stroke, curve.force, curve.tangential_force, strict=True
         ):
-            moved = ["" if value is None else float(fraction * value + 0.0) for value in load.displacement]
             row: dict[str, Cell] = {"solver": curve.evaluation.solver, "law": curve.evaluation.law}
             row |= {"converged": int(curve.evaluation.converged), "load_fraction_1": float(fraction)}
-            row |= {"indenter_u_mm": moved[0], "indenter_v_mm": moved[1], "travel_mm": float(travel)}
-            row |= {"reaction_u_N_per_mm": float(reaction[0]), "reaction_v_N_per_mm": float(reaction[1])}
-            row |= {"force_along_travel_N_per_mm": float(force)}
-            rows.append(row | {"force_along_travel_of_the_depth_N": float(force * depth)})
+            row |= {"stroke_mm": float(stroke), "force_N": float(force * depth)}
+            rows.append(row | {"tangential_force_N": float(across * depth)})
     write_csv(path, rows)

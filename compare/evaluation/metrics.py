@@ -19,7 +19,8 @@ from pinnray.comparison.evaluation.scores import (
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.finger_figures import FingerFigures
+from pinnray.solvers.problem import Load
+from pinnray.solvers.solution import indenter_forces
 
 
 def solver_scores(
@@ -27,16 +28,16 @@ def solver_scores(
     observations: Observations,
     reference: Evaluation,
     truth: Evaluation | None,
-    travel: FloatArray,
+    load: Load,
 ) -> SolverScores:
-    """Compute every number of a solver; the indenter has a travel, shape (2,), mm."""
+    """Compute every number of a solver."""
     plain = ("family", "twin", "law", "message", "energy", "reaction", "stats", "certificate")
     markers = marker_errors(evaluation.shown_displacement, observations)
     numbers: dict[str, Any] = {name: getattr(evaluation, name) for name in plain} | {
         "status": "converged" if evaluation.converged else "not converged",
         "seconds": evaluation.stats.get("seconds"),
-        "force": evaluation.identified,
-        "figures": evaluation.figures and _figures(evaluation.figures),
+        "identified": evaluation.identified,
+        "figures": figure_scores(evaluation),
         "markers": dict(markers) | {"in_sample": evaluation.in_sample},
         "held_out": _held_out(evaluation, observations),
         "rigid_motion_off": _without_rigid_motion(evaluation, observations),
@@ -44,10 +45,7 @@ def solver_scores(
         "to_reference": dict(evaluation.differences_from(reference))
         | {"reference_uncertainty": reference.uncertainty},
         "to_truth": None if truth is None else truth_differences(evaluation, truth),
-        "force_to_truth_rel": None if truth is None else force_error(evaluation, truth),
-        "grip_to_truth_rel": None
-        if truth is None
-        else float(evaluation.reaction @ travel / (truth.reaction @ travel)) - 1,
+        "force_to_truth_rel": None if truth is None else force_error(evaluation, truth, load),
     }
     return SolverScores.model_validate(numbers)
 
@@ -100,13 +98,18 @@ def truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDiffere
     return TruthDifferences(**{name: differ(name) for name in TruthDifferences.model_fields})
 
 
-def force_error(evaluation: Evaluation, truth: Evaluation) -> float:
-    """Relative error of the size of the indenter's force; positive where it is too large."""
-    size, true = (float(np.linalg.norm(each.reaction)) for each in (evaluation, truth))
-    return size / true - 1
+def force_error(evaluation: Evaluation, truth: Evaluation, load: Load) -> float:
+    """Relative error of the indenter's force along its stroke; positive where it is too large."""
+    force, true = (
+        float(indenter_forces(load, each.reaction, each.identified)[0]) for each in (evaluation, truth)
+    )
+    return force / true - 1
 
 
-def _figures(figures: FingerFigures) -> FigureScores:
+def figure_scores(evaluation: Evaluation | None) -> FigureScores | None:
+    """What the finger does, if it is known."""
+    if evaluation is None or (figures := evaluation.figures) is None:
+        return None
     return FigureScores(values=figures.columns(), places=figures.places)
 
 

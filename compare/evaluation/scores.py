@@ -62,10 +62,10 @@ class Interval(Numbers):
 class ForceScore(Numbers):
     """Force of the indenter that was found from the markers."""
 
-    size: Interval  #: N/mm.
+    force: Interval  #: Along the stroke, N/mm.
+    tangential_force: Interval  #: Across it, N/mm.
     position: Interval | None  #: Abscissa where it acts, mm; None where it was no unknown.
-    along: Interval | None = None  #: Its component along the travel, N/mm.
-    shares: Mapping[str, Number] = {}  #: Of the variance of `along`, by what they come from.
+    shares: Mapping[str, Number] = {}  #: Of the variance of `force`, by what they come from.
     advice: str = ""  #: A sentence on the largest share, and on what would narrow the interval.
 
 
@@ -137,7 +137,7 @@ class SolverScores(Numbers):
     energy: Number
     reaction: Vector
     stats: Mapping[str, int | str | Number]
-    force: ForceScore | None
+    identified: ForceScore | None
     figures: FigureScores | None
     certificate: CertificateScore | None
     markers: AllMarkers
@@ -148,9 +148,7 @@ class SolverScores(Numbers):
     uncertainty: UncertaintyScores | None
     to_reference: ReferenceDifferences
     to_truth: TruthDifferences | None  #: None where the markers were measured: nobody knows a real field.
-    force_to_truth_rel: Number  #: Relative error of the size of the indenter's force; NaN likewise.
-
-    grip_to_truth_rel: Number = nan  #: The same of its component along the travel, which a gripper feels.
+    force_to_truth_rel: Number  #: Signed relative error of the force along the stroke; NaN likewise.
 
     @property
     def converged(self) -> bool:
@@ -179,7 +177,7 @@ class Measurements(Numbers):
 class Scores(Numbers):
     """Every number of a run; `metrics.json` is its file."""
 
-    version: Literal[1, 2] = Field(alias="schema")
+    version: Literal[2] = Field(alias="schema")
     design: Mapping[str, Any]
     material: Mapping[str, Any]
     load: Mapping[str, Any]
@@ -188,6 +186,7 @@ class Scores(Numbers):
     left_out: Mapping[str, str] = {}  #: Reasons why solvers do not support the problem, by their names.
     failed: Mapping[str, str] = {}  #: Messages of solvers that failed, by their names.
     reference: str
+    truth: FigureScores | None  #: What the simulated finger does; None where the markers were measured.
     solvers: Mapping[str, SolverScores]
 
     @classmethod

@@ -12,7 +12,7 @@ from math import isfinite, radians, tan
 
 import numpy as np
 
-from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
@@ -324,7 +324,7 @@ def _true_fields(problem: Problem, progress: Progress, truth: Truth) -> Evaluati
     if (kept := Evaluation.load(entry, key)) is not None:
         progress(1.0, "from the cache")
         return kept
-    evaluation = Evaluation.of(_solved(solver, richer, progress), problem.mesh)
+    evaluation = evaluated(_solved(solver, richer, progress), problem.mesh)
     with kept_if_possible(entry.parent, "the virtual experiment"):
         evaluation.save(entry, key)
     return evaluation
@@ -375,4 +375,5 @@ def _richer(problem: Problem, truth: Truth, **settings: object) -> tuple[Solver,
         solver = make_solver(truth.solver, **settings)
     except MissingLibraryError as error:
         raise UserError(f"the virtual experiment: {error}") from None
-    return solver, Problem(problem.mesh, truth.material(problem.material), truth.load(-normal))
+    material, load = truth.material(problem.material), truth.load(-normal)
+    return solver, Problem(problem.mesh, material, load, finger=problem.finger)

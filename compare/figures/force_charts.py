@@ -1,4 +1,4 @@
-"""Charts of the indenter's force: over its travel by every solver, over time by the markers."""
+"""Charts of the indenter's force: over its stroke by every solver, over time by the markers."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,27 +25,27 @@ def draw_force_displacement(
 
     A solver has its mark at each of its equilibria, a linear one a dashed line. The
     simulated finger's curve ends in a cross. A force that was identified from the markers, by the number of
-    its solver in the run, is a square with its interval of 95 % at the end of the travel.
+    its solver in the run, is a square with its interval of 95 % at the end of the stroke.
     """
     labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
     true_label = [_end_label(truth, "truth, simulated")] if truth else []
     found = {
-        number: (each, each.identified.along or each.identified.size)
+        number: (each, each.identified.force)
         for number, each in (identified or {}).items()
         if each.identified is not None
     }
-    more = [f"{each.label}, {along.value:.3g} N/mm, identified" for each, along in found.values()]
+    more = [f"{each.label}, {force.value:.3g} N/mm, identified" for each, force in found.values()]
     top, height, left = 0.3 + legend_height([*labels, *true_label, *more], page), 2.4, 0.75  # inches
     apart = 0.08 / (page - left - 0.65)  # the room of a mark, as a share of the axes' width
     with figure(top + height + 0.45, page) as drawn:
-        write_heading(drawn, "Force of the indenter along its travel")
+        write_heading(drawn, "Force of the indenter along its stroke")
         axes = axes_at(drawn, (left, top, page - left - 0.65, height))
         straight = sum(not follows_load(curve.evaluation) for curve in curves)
         for curve, label in zip(curves, labels, strict=True):
             followed = follows_load(curve.evaluation)
             straight -= not followed
             axes.plot(
-                curve.travel,
+                curve.stroke,
                 curve.force,
                 color=(look := solver_look(curve.evaluation.solver)).colour,
                 linestyle="-" if followed else (0, (3, 2)),
@@ -57,10 +57,10 @@ def draw_force_displacement(
                 zorder=3 if followed else 2,
             )
         if truth:
-            end = truth.travel[-1:], truth.force[-1:]
+            end = truth.stroke[-1:], truth.force[-1:]
             axes.plot(*end, "x", ms=7, mew=1.8, color=MEASURED, label=true_label[0], zorder=4)
-            axes.plot(truth.travel, truth.force, color=MEASURED, lw=1.3, zorder=3)
-        reach = (truth or curves[0]).travel[-1]
+            axes.plot(truth.stroke, truth.force, color=MEASURED, lw=1.3, zorder=3)
+        reach = (truth or curves[0]).stroke[-1]
         for place, (number, label) in enumerate(zip(found, more, strict=True)):
             value, low, high = found[number][1]
             # Beside each other: the intervals of several solvers would hide each other.
@@ -74,12 +74,12 @@ def draw_force_displacement(
             }
             axes.errorbar([x], [value], yerr=interval, fmt="s", label=label, **style)
         every = [*curves, truth] if truth else curves
-        axes.set_xlim(0, (1 + apart) * max(curve.travel[-1] for curve in every))
+        axes.set_xlim(0, (1 + apart) * max(curve.stroke[-1] for curve in every))
         forces = np.concatenate(
-            [curve.force for curve in every] + [np.array(along) for _, along in found.values()]
+            [curve.force for curve in every] + [np.array(force) for _, force in found.values()]
         )
         axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
-        axes.set_xlabel("travel of the indenter, mm")
+        axes.set_xlabel("stroke of the indenter, mm")
         axes.set_ylabel("force, N per mm of depth")
         axes.grid()
         whole = axes.secondary_yaxis(
@@ -122,7 +122,7 @@ def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, 
             axes.grid()
             axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-3))
             if row == 0:
-                axes.set_ylim(0, 1.05 * top)
+                axes.set_ylim(1.05 * min(forces[known, 1].min(initial=0.0), 0.0), 1.05 * top)
                 axes.tick_params(labelbottom=False)
         axes.set_xlabel("time, s")
     return drawn

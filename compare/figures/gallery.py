@@ -127,14 +127,14 @@ def _force_displacement(comparison: Results, page: float) -> Illustration | None
     return Illustration(
         draw_force_displacement(curves, depth=depth, truth=truth, identified=found, page=page),
         "Force over displacement",
-        f"Force of the indenter along its travel: per mm of depth (left), and for the finger’s "
+        f"Force of the indenter along its stroke: per mm of depth (left), and for the finger’s "
         f"{depth:g} mm (right). A point is an equilibrium that a solver found as the load "
         f"grew; a linear solver’s line (dashed) is straight by its law. Other solvers that were given "
         f"the markers are left out: the markers pull too.{cross}{squares}",
         each_of(
-            f"Force at the end of the travel, N per mm, after {curves[0].travel[-1]:g} mm",
+            f"Force at the end of the stroke of {curves[0].stroke[-1]:g} mm, N per mm",
             [curve.evaluation for curve in curves],
-            lambda each: float(np.linalg.norm(each.reaction)),
+            lambda each: ForceCurve.of(each, comparison.load).force[-1],
         ),
     )
 

@@ -179,9 +179,7 @@ def _write(
         write_table_one(folder / "table1.csv", comparison)
         write_summary(folder / "summary.csv", comparison)
         if curves := force_curves(comparison.evaluations, job.load):
-            write_force_displacement(
-                folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
-            )
+            write_force_displacement(folder / "force_displacement.csv", curves, depth=job.design.depth)
     with stages.stage("pictures") as progress:
         figures = folder / "figures"
         pictures = draw_all(figures, comparison, progress, job.picture_formats, job.picture_width)

@@ -32,6 +32,7 @@ from pinnray.runtime.atomic import write_text
 from pinnray.runtime.html import Packed, picture_urls, template_environment
 from pinnray.runtime.machine import program_version
 from pinnray.runtime.tables import distance, number, percent
+from pinnray.solvers.solution import indenter_forces
 
 BUDGET = 6_000_000
 """Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""
@@ -186,7 +187,7 @@ def _entry(evaluation: Evaluation, comparison: Results) -> dict[str, object]:
         "is_reference": evaluation.solver == comparison.scores.reference,
         "evaluation": evaluation,
         "own": own,
-        "reaction": text.without_rounding(own.reaction),
+        "forces": indenter_forces(comparison.load, evaluation.reaction, evaluation.identified),
         "seconds": seconds(own),
         "certificate": evaluation.certificate,
     }

@@ -38,7 +38,8 @@ def _warnings(scores: Scores) -> RunAnswer | None:
 
 
 FIGURES = (
-    ("force_N", "grip force", "N"),
+    ("force_N", "force", "N"),
+    ("tangential_force_N", "tangential force, positive toward the tip", "N"),
     ("force_50_N", "force at half of the stroke", "N"),
     ("tip_u_mm", "tip, along the finger", "mm"),
     ("tip_v_mm", "tip, toward the indenter", "mm"),
@@ -68,26 +69,29 @@ def _figures(scores: Scores) -> RunAnswer | None:
     if not known:
         return None
     name = _best(known, scores)
-    values, error = known[name].values, scores[name].grip_to_truth_rel
+    values, error = known[name].values, scores[name].force_to_truth_rel
     low, high = (values.get(f"force_{end}_N") for end in ("low", "high"))
     beside = []
     if low is not None and high is not None:
         beside.append(f"95 % interval {number(low, 3)} to {number(high, 3)} N")
     if isfinite(error):
-        beside.append(f"{_signed(error, True)} off the simulated finger’s")
+        beside.append(f"{percent(error, 2, plus=True)} off the simulated finger’s")
     interval = f" ({'; '.join(beside)})" if beside else ""
     force, strain = values["force_N"], values["principal_strain"]
     moved = hypot(values["tip_u_mm"], values["tip_v_mm"])
     parts = {
-        f"it grips with {number(force, 3)} N{interval}": force,
+        f"the force is {number(force, 3)} N{interval}": force,
         f"its tip moves by {number(moved, 3)} mm": moved,
         f"the largest strain away from corners is {percent(strain, 2)}": strain,
     }
     said = _listed([words for words, value in parts.items() if isfinite(value)])
     breaks = break_answer(*(values.get(key, nan) for key in ("strain_over_break", "peak_radius_mm")))
+    columns = {scores.label(each): figures for each, figures in known.items()}
+    if scores.truth:
+        columns["simulated finger"] = scores.truth
     rows = []
     for key, words, unit in FIGURES:
-        cells = [_figure(each, key) for each in known.values()]
+        cells = [_figure(each, key) for each in columns.values()]
         if any(cell != NONE for cell in cells):
             rows.append([f"{words}, {unit}" if unit else words, *cells])
     caption = (
@@ -98,7 +102,7 @@ def _figures(scores: Scores) -> RunAnswer | None:
         "What does the finger do?",
         f"By {scores.label(name)} {said}." if said != NONE else f"{scores.label(name)} does not tell.",
         [breaks],
-        TextTable("", ["", *map(scores.label, known)], rows, caption, left=[""]),
+        TextTable("", ["", *columns], rows, caption, left=[""]),
     )
 
 
@@ -107,7 +111,7 @@ def _best(known: Collection[str], scores: Scores) -> str:
     away = {name: own.to_truth.displacement.rel_l2 for name in known if (own := scores[name]).to_truth}
     if away and all(map(isfinite, away.values())):
         return min(away, key=lambda name: (not scores[name].converged, away[name]))
-    found = [name for name in known if scores[name].force]
+    found = [name for name in known if scores[name].identified]
     return next(iter([*found, *(each for each in known if each == scores.reference), *known]))
 
 
@@ -193,7 +197,7 @@ def _markers(scores: Scores) -> RunAnswer | None:
     for place, field in enumerate(TRUTH_FIELDS if plain.to_truth else ()):
         found = {name: _to_truth(own)[place] for name, own in listed.items()}
         heads.append(field)
-        columns.append([_signed(share, field == "force") for share in found.values()])
+        columns.append([percent(share, 2, plus=field == "force") for share in found.values()])
         better = [name for name in given if abs(found[name]) < abs(found[reference])]
         if any(isfinite(found[name] + found[reference]) for name in given):
             inside.append(f"in {field} {_those(better, given)}")
@@ -234,24 +238,26 @@ def _held_out_cells(own: SolverScores) -> list[str]:
 
 def _force_interval(name: str, own: SolverScores, scores: Scores) -> str:
     """The force that a solver found, with its 95 % interval, beside the true one where that is known."""
-    if not own.force or not isfinite(own.force.size.value):
+    if not own.identified or not own.figures:
         return ""
-    size, low, high = own.force.size.value, own.force.size.low, own.force.size.high
-    source, depth = scores.measurements.source, scores.design.get("depth")
-    interval = f"95 % interval {number(low, 3)} to {number(high, 3)}"
-    said = f"{name} finds a force of {number(size, 3)} N/mm ({interval})"
-    if depth:
-        said += f", {number(size * depth, 3)} N over the depth of {depth:g} mm,"
-    if place := own.force.position:
+    values = own.figures.values
+    force, low, high, across = (
+        values.get(f"{key}_N", nan) for key in ("force", "force_low", "force_high", "tangential_force")
+    )
+    if not isfinite(force):
+        return ""
+    source = scores.measurements.source
+    said = f"{name} finds a force of {number(force, 3)} N (95 % interval {number(low, 3)} to "
+    said += f"{number(high, 3)}) and a tangential force of {number(across, 2)} N"
+    if place := own.identified.position:
         middle, start, end = (number(each, 3) for each in (place.value, place.low, place.high))
         said += f" at x = {middle} mm ({start} to {end} mm)"
     said += f" from the {source} markers"
-    true = hypot(*own.reaction) / (1 + own.force_to_truth_rel)
-    if isfinite(true):
+    if scores.truth and isfinite(true := scores.truth.values["force_N"]):
         where = "inside" if low <= true <= high else "outside"
         placed = f", {where} it" if isfinite(low + high) else ""
-        said += f"; that of the simulated finger is {number(true, 3)}{placed}"
-    return f"{said}. {own.force.advice}".rstrip()
+        said += f"; the force on the simulated finger is {number(true, 3)} N{placed}"
+    return f"{said}. {own.identified.advice}".rstrip()
 
 
 def _convergence(scores: Scores) -> RunAnswer:
@@ -290,12 +296,11 @@ def _to_truth(own: SolverScores) -> tuple[float, float, float]:
 
 def _truth_numbers(own: SolverScores) -> str:
     return _listed(
-        [_signed(share, field == "force") for share, field in zip(_to_truth(own), TRUTH_FIELDS, strict=True)]
+        [
+            percent(share, 2, plus=field == "force")
+            for share, field in zip(_to_truth(own), TRUTH_FIELDS, strict=True)
+        ]
     )
-
-
-def _signed(share: float, sign: bool) -> str:
-    return f"{'+' if sign and share > 0 else ''}{percent(share, 2)}"
 
 
 def _plus_minus(share: float, own: float) -> str:

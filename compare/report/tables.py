@@ -180,13 +180,14 @@ def body_table(comparison: Results) -> Table:
     lines.append("above fem: energy of the displacement on fem's elements above the least there.")
     if truth is not None:
         lines.append("truth: relative L² difference from the simulated finger of finite strain;")
-        lines.append("force: error of the size of the indenter's force.")
+        lines.append("force: signed error of the force along the stroke.")
     rows = []
     for name, own in scores.solvers.items():
         cells = [NONE if name == scores.reference else _from_reference(own), _above_fem(own)]
         if own.to_truth:
-            shares = own.to_truth.displacement.rel_l2, own.to_truth.von_mises.rel_l2, own.force_to_truth_rel
+            shares = own.to_truth.displacement.rel_l2, own.to_truth.von_mises.rel_l2
             cells += [percent(share, 2, sign=False) for share in shares]
+            cells.append(percent(own.force_to_truth_rel, 2, sign=False, plus=True))
         rows.append((scores.label(name), own.converged, [*cells, seconds(own)]))
     headings = ["truth\ndispl.", "\nv. Mises", "\nforce, %"] if truth else []
     headings = ["from ref.\n%", "above fem\n%", *headings, "time\ns"]

@@ -1,6 +1,6 @@
 """Words, numbers and sentences of the report."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from markupsafe import Markup
 
@@ -137,13 +137,6 @@ def solve_numbers(stats: Mapping[str, object]) -> tuple[list[tuple[str, list[str
 def sentence(text: str) -> str:
     """The text with a capital at its start and one full stop at its end."""
     return text[:1].upper() + text[1:].rstrip(". ") + "."
-
-
-def without_rounding(force: Sequence[float]) -> tuple[float, float]:
-    """A force without the component that rounding left, 1e-9 of the other or less."""
-    size = max(map(abs, force))
-    u, v = (component if abs(component) > 1e-9 * size else 0.0 for component in force)
-    return u, v
 
 
 def beside(value: float, own: float | None) -> Markup:

@@ -59,17 +59,16 @@ class FingerFigures:
     Attributes:
         intervals: 95 % intervals by the names of the figures, where the solver knows them.
         places: Drawn points of the largest stress and strains, mm, by the names of these figures.
-        curve: Travel of the indenter, mm, and its force along it, N, from rest on; one pair where the way to
-            the end is not known.
-        straight: Whether the force is in proportion to the travel.
+        curve: Stroke of the indenter, mm, and its force, N, from rest on; one pair where the way to the
+            end is not known.
+        straight: Whether the force is in proportion to the stroke.
     """
 
-    force: float = _figure(
-        "N", "force of the indenter at the end of its travel, along it, for the whole depth"
-    )
-    force_25: float = _figure("N", "the same at 25 % of the stroke", always=False)
-    force_50: float = _figure("N", "the same at 50 % of the stroke", always=False)
-    force_75: float = _figure("N", "the same at 75 % of the stroke", always=False)
+    force: float = _figure("N", "force of the indenter along its stroke, at its end, for the whole depth")
+    tangential_force: float = _figure("N", "the same across the stroke, positive toward the tip")
+    force_25: float = _figure("N", "force at 25 % of the stroke", always=False)
+    force_50: float = _figure("N", "force at 50 % of the stroke", always=False)
+    force_75: float = _figure("N", "force at 75 % of the stroke", always=False)
     lift: float = _figure(
         "kg",
         "mass that two such fingers hold by friction, 2 µ force / g; µ is the load's, else 0.5",
@@ -107,12 +106,12 @@ class FingerFigures:
     straight: bool = False
 
     def force_at(self, stroke: float) -> float:
-        """Force of the indenter, N, after a travel, mm; between computed equilibria it is interpolated.
+        """Force of the indenter, N, after a stroke, mm; between computed equilibria it is interpolated.
 
         That is warned of; the `stops` of a solver are fractions of the stroke at which it is computed.
 
         Raises:
-            UserError: If the travel is longer than the load's, or the way to the end is not known.
+            UserError: If the stroke is longer than the load's, or the way to the end is not known.
         """
         travels, forces = np.array(self.curve).T
         if not 0 <= stroke <= travels[-1] * (1 + 1e-9):
@@ -217,6 +216,7 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
     angle, touching = contact_arc(solution)
     return FingerFigures(
         force=force,
+        tangential_force=solution.tangential_force,
         **ways,
         lift=_lift(problem.load, force),
         contact_angle=angle,
@@ -303,9 +303,12 @@ def _lift(load: Load, force: float) -> float:
 def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, Interval]:
     """The 95 % intervals of force and stress that a solver knows."""
     found: dict[str, Interval] = {}
-    if solution.identified is not None and (along := solution.identified.along) is not None:
-        low, high, load = depth * along.low, depth * along.high, solution.problem.load
-        found |= {"force": (low, high), "lift": (_lift(load, low), _lift(load, high))}
+    if (identified := solution.identified) is not None:
+        for name in ("force", "tangential_force"):
+            _, low, high = getattr(identified, name)
+            found[name] = depth * low, depth * high
+        low, high = (_lift(solution.problem.load, end) for end in found["force"])
+        found["lift"] = low, high
     known = solution.uncertainty
     if known is not None and known.von_mises is not None and np.isfinite(stress.value):
         half = NORMAL * float(known.von_mises(solution.problem.mesh.locate(stress.place[None]))[0])

@@ -13,7 +13,7 @@ from pinnray.geometry.section.thickness import cavity_widths, wall_thickness
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.elasticity import strain_of
 from pinnray.solvers.problem import Problem, contact_ends, contact_nodes, front_points
-from pinnray.solvers.solution import SmoothField, SolidField, Solution, State
+from pinnray.solvers.solution import SmoothField, SolidField, Solution, State, stroke_axes
 
 RAY_SPACING = 0.5
 """Distance of the points from which wall thickness and gaps are measured, mm."""
@@ -31,21 +31,20 @@ class Extreme(NamedTuple):
 
 
 def force_curve(solution: Solution, depth: float) -> FloatArray:
-    """Travel of the indenter, mm, and its force along it for the whole depth, N, from rest on: shape (k, 2).
+    """Stroke of the indenter, mm, and its force for the whole depth, N, from rest on: shape (k, 2).
 
     The linear law has a straight line, and a solver that follows the load a point for each equilibrium. Of
     any other only the end is known, and nothing of its way: that is the one row.
     """
     load = solution.problem.load
-    travel = np.array([value or 0.0 for value in load.displacement])
-    length = float(np.linalg.norm(travel))
-    ahead = depth * travel / length
-    last, history = float(solution.reaction @ ahead), solution.history
+    length, ahead = float(np.linalg.norm(load.values)), depth * stroke_axes(load)[0]
+    history = solution.history
     if {"load_fraction", "reaction_x", "reaction_y"} <= history.keys():
         path = np.stack([history["reaction_x"], history["reaction_y"]], axis=1) @ ahead
         return np.array([(0.0, 0.0), *zip(length * history["load_fraction"], path, strict=True)])
     straight = solution.problem.material.law == "linear" and solution.problem.observations is None
-    return np.array([(0.0, 0.0), (length, last)] if straight else [(length, last)])
+    end = length, solution.force
+    return np.array([(0.0, 0.0), end] if straight else [end])
 
 
 def wrap_angle(solution: Solution) -> float:

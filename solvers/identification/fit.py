@@ -75,11 +75,6 @@ class Fit(NamedTuple):
         return np.asarray(wider * found.slopes[:, None] * np.linalg.cholesky(found.covariance))
 
     @property
-    def force(self) -> tuple[float, float]:
-        """Size of the indenter's force and its standard deviation, N/mm."""
-        return size_of(self.model.unknowns, self.response.values, self.standard_errors)
-
-    @property
     def place(self) -> tuple[float, float] | None:
         """Abscissa on the drawn front at which the force acts, and its standard deviation, mm; if unknown."""
         unknowns = self.model.unknowns
@@ -111,17 +106,13 @@ class Fit(NamedTuple):
         return parts
 
 
-def size_of(unknowns: Unknowns, values: FloatArray, errors: FloatArray) -> tuple[float, float]:
-    """Size of the force for values, (p,), with independent errors, (p, k), and its deviation, N/mm."""
-    force = unknowns.hypothesis(values).force
-    size = float(np.linalg.norm(force))
-    return component_of(unknowns, values, errors, force / size if size else unknowns.directions[0])
-
-
 def component_of(
     unknowns: Unknowns, values: FloatArray, errors: FloatArray, direction: FloatArray
 ) -> tuple[float, float]:
-    """As `size_of`, the component in a direction, shape (2,)."""
+    """Component of the force in a direction, (2,), and its standard deviation, N/mm.
+
+    It is for values, shape (p,), with independent errors, shape (p, k).
+    """
     component = float(unknowns.hypothesis(values).force @ direction)
     slopes = unknowns.slopes(values).force @ direction
     doubt = doubt_of_the_plane(unknowns.problem) * component
@@ -129,7 +120,7 @@ def component_of(
 
 
 def place_of(unknowns: Unknowns, values: FloatArray, errors: FloatArray) -> tuple[float, float]:
-    """As `size_of`, the abscissa on the drawn front at which the force acts, mm."""
+    """As `component_of`, the abscissa on the drawn front at which the force acts, mm."""
     along = np.isin(unknowns.names, ("position", "eccentricity")).astype(np.float64)
     # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
     couple = 0.25 * mean_thickness(unknowns.problem.mesh)

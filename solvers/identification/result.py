@@ -18,7 +18,7 @@ from pinnray.solvers.solution import (
     Solution,
     Status,
     Uncertainty,
-    along_travel,
+    stroke_axes,
     unstable_phrase,
 )
 
@@ -64,20 +64,19 @@ class Identified:
 
     def force(self) -> IdentifiedForce:
         """The force and its place: the mean over the laws, with an interval that holds their scatter."""
-        size = self._mean([fit.force for fit in self.fits])
         places = [place for fit in self.fits if (place := fit.place)]
-        travel = along_travel(self.best.model.unknowns.problem.load)
-        components = [fit.component(travel) for fit in self.fits]
-        along = self._mean(components)
-        found = np.array([value for value, _ in components]) - along.value
-        parts = self.best.variances(travel) | {"law": float(self.probabilities @ found**2)}
+        stroke, across = stroke_axes(self.best.model.unknowns.problem.load)
+        components = [fit.component(stroke) for fit in self.fits]
+        force = self._mean(components)
+        found = np.array([value for value, _ in components]) - force.value
+        parts = self.best.variances(stroke) | {"law": float(self.probabilities @ found**2)}
         whole = sum(parts.values()) or 1.0
         shares = {name: parts[name] / whole for name in sorted(parts, key=parts.__getitem__, reverse=True)}
         first, share = next(iter(shares.items()))
         return IdentifiedForce(
-            size._replace(low=max(size.low, 0.0)),
+            force,
+            self._mean([fit.component(across) for fit in self.fits]),
             self._mean(places) if places else None,
-            along,
             shares,
             f"{share:.0%} of the variance of the force comes from {SOURCES[first]}.",
         )
@@ -209,10 +208,10 @@ class Identified:
                 f"{parameter.name}_high": float(high),
                 f"{parameter.name}_resolution": float(resolution),
             }
-        size, low, high = self.force().size
+        force, low, high = self.force().force
         numbers |= {
             "law": self.best.law,
-            "force": size,
+            "force": force,
             "force_low": low,
             "force_high": high,
         }
@@ -236,8 +235,8 @@ class Identified:
                 "the equilibrium was not found to the last digit, or not by the finest discretisation: the "
                 "field is that of the search; take another mesh or fewer parameters"
             )
-        size, low, high = self.force().size
-        parts.append(f"force {size:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
+        force, low, high = self.force().force
+        parts.append(f"force {force:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
         columns = zip(found.parameters, found.values, found.intervals, strict=True)
         parts.append(
             ", ".join(

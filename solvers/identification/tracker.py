@@ -18,21 +18,20 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear
-from scipy.special import chdtri
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import (
-    LEVEL,
     degrees_of_freedom,
     inflation_of,
     quantile_of,
     values_of,
 )
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
-from pinnray.solvers.identification.fit import NORMAL, place_of, size_of
+from pinnray.solvers.identification.fit import NORMAL, component_of, place_of
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
 from pinnray.solvers.identification.unknowns import CONTACT, SHARE
+from pinnray.solvers.solution import Estimated, stroke_axes
 
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
@@ -50,13 +49,11 @@ FEWEST = 3
 class ForceReading:
     """The force in a frame, with intervals of `LEVEL`."""
 
-    force: FloatArray  # Of the indenter on the finger per depth, shape (2,), N/mm; nan without an estimate
-    size: float  # Norm of the force
-    low: float  # Interval of the size: zero where the force may be none
-    high: float  # Infinite without an estimate
-    position: float  # Abscissa on the drawn front at which the force acts, eccentricity included, mm
-    position_low: float  # Interval of the position; without an estimate the whole front
-    position_high: float
+    force: Estimated  # Of the indenter along its stroke, N/mm; without an estimate NaN, -inf and inf
+    tangential_force: Estimated  # The same across it, see `stroke_axes`
+    # Abscissa on the drawn front at which the force acts, eccentricity included, mm; without an estimate NaN
+    # and the whole front
+    position: Estimated
     inflation: float  # φ; above one, neither the finger nor noise explains the markers
     evaluations: int  # Equilibria that were computed
     seconds: float
@@ -217,28 +214,30 @@ class ForceTracker:
     def _reading(self, found: _Posterior, status: str) -> ForceReading:
         values, derivatives = values_of(self._parameters, found.z)
         errors = found.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(found.covariance)
-        force = self._unknowns.hypothesis(values).force
-        size, deviation = size_of(self._unknowns, values, errors)
-        by_errors = self._unknowns.slopes(values).force.T @ errors
-        may_be_none = force @ np.linalg.solve(by_errors @ by_errors.T, force) < chdtri(len(force), 1 - LEVEL)
+        force, across = (
+            _estimated(*component_of(self._unknowns, values, errors, axis))
+            for axis in stroke_axes(self._unknowns.problem.load)
+        )
         place, around = place_of(self._unknowns, values, errors)
         ends = np.clip(place + NORMAL * around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
         return replace(
             self._unknown(status),
             force=force,
-            size=size,
-            low=0.0 if may_be_none else max(size - NORMAL * deviation, 0.0),
-            high=size + NORMAL * deviation,
-            position=place,
-            position_low=float(ends[0]),
-            position_high=float(ends[1]),
+            tangential_force=across,
+            position=Estimated(place, float(ends[0]), float(ends[1])),
             inflation=found.inflation,
         )
 
     def _unknown(self, status: str) -> ForceReading:
         """A reading without an estimate."""
-        none, ends = np.nan, self._unknowns.traction.ends
-        return ForceReading(np.full(2, none), none, 0.0, np.inf, none, *ends, none, 0, 0.0, status)
+        none, force = np.nan, Estimated(np.nan, -np.inf, np.inf)
+        place = Estimated(none, *self._unknowns.traction.ends)
+        return ForceReading(force, force, place, none, 0, 0.0, status)
+
+
+def _estimated(value: float, deviation: float) -> Estimated:
+    half = NORMAL * deviation
+    return Estimated(value, value - half, value + half)
 
 
 def _motion(displacements: FloatArray, visible: BoolArray) -> float:

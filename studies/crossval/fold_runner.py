@@ -13,7 +13,7 @@ from pinnray.comparison.evaluation.truths import SLIDING, Truth
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.solution import Solution
+from pinnray.solvers.solution import Solution, indenter_forces
 from pinnray.solvers.solver import (
     Solver,
     Traits,
@@ -140,9 +140,10 @@ class FoldRunner:
         truth, identified = self._truths[0], solution.identified
         found: dict[str, Any] = {}
         if np.isfinite(solution.reaction).all():
-            found["force_error"] = float(np.linalg.norm(solution.reaction)) / truth.force - 1
+            force, _ = indenter_forces(self.problem.load, solution.reaction, identified)
+            found["force_error"] = float(force / truth.force - 1)
         if identified:
-            found["force_within_stated"] = identified.size.low <= truth.force <= identified.size.high
+            found["force_within_stated"] = identified.force.low <= truth.force <= identified.force.high
             if place := identified.position:
                 found["position_error_mm"] = place.value - truth.position
                 found["position_within_stated"] = place.low <= truth.position <= place.high

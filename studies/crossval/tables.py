@@ -96,7 +96,7 @@ def truth_tables(result: CrossvalResult) -> list[TextTable]:
             f"Held-out error in {result.main_scheme}, mm; stress and force with every marker given, %",
             *_grid(result, [ALL], TRUTHS, held_out=result.main_scheme),
             f"Truths are solutions of {', '.join(simulations)}. von Mises: relative L2 distance over the "
-            "body, at points that move with the walls. Force: the reaction's size against the truth's. "
+            "body, at points that move with the walls. Force: along the stroke, against the truth's. "
             f"Within: how often the truth lies in the interval of {LEVEL:.0%} that the solver states.",
         ),
     ]

@@ -20,7 +20,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within
 from pinnray.solvers.problem import Load, Problem
-from pinnray.solvers.solution import SolidField, Solution, State
+from pinnray.solvers.solution import SolidField, Solution, State, stroke_axes
 from pinnray.studies.crossval.folds import LoadCase
 from pinnray.studies.crossval.study import SIZES, CrossvalStudy
 
@@ -143,7 +143,7 @@ class TrueField:
     """A true field at the points of the shared mesh, moved with the walls, and the force on the finger."""
 
     sampled: SampledField
-    force: float  # magnitude, N/mm
+    force: float  # along the stroke, N/mm
     position: float  # abscissa where it acts, before the load, mm
 
 
@@ -193,7 +193,7 @@ def simulate_truth(task: TruthTask, _: object = None) -> dict[str, TrueField]:
         if found.contact is None:  # the cylinder has slipped off
             raise UserError(f"the virtual experiment: {found.status.message}")
         field = sampler.of_solution(found, shared, truth.changes(drawn))
-        return TrueField(field, float(np.linalg.norm(found.reaction)), found.contact[0])
+        return TrueField(field, float(stroke_axes(study.load)[0] @ found.reaction), found.contact[0])
 
     return {
         layout: cached(

@@ -138,7 +138,7 @@ class BeamResponse:
     """What n frames of Young's modulus and depth one do.
 
     Attributes:
-        force: Of the indenter along its travel, shape (n,), mm^2.
+        force: Of the indenter along its stroke, shape (n,), mm^2.
         compliance: Displacement of the contact per force, along and across, shape (n, 2).
         contact: Displacement of the contact, shape (n, 2), mm.
         tip: Displacement of the apex, shape (n, 2), mm.

@@ -7,7 +7,6 @@ are as accurate as large ones. Between two strokes is a cubic spline, which is l
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import hypot
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -16,10 +15,10 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.elasticity import LawName
-from pinnray.solvers.load import Load
 from pinnray.solvers.material import Material
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import stroke_axes
 from pinnray.solvers.solver import with_law
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.fields.gaussian_processes import Block
@@ -131,7 +130,7 @@ class FieldEmulator:
             gradients = self.reader.gradients(problem.mesh.points, nodal[None])[0]
         stress = stress_at(gradients, self.law, problem.material.lame)
         read = self.reader.figures(problem.mesh.points, nodal, stress, float(problem.load.position or 0))
-        values = (grip_force(reaction, problem.load) * problem.mesh.depth, *read, max(width, 0.0))
+        values = (float(stroke_axes(problem.load)[0] @ reaction) * problem.mesh.depth, *read, max(width, 0.0))
         indicator = self.indicator(self.field.deviations(at), weights)
         scales, calibration = (_between(each, self.shares, share) for each in (self.scales, self.calibration))
         halves = indicator * scales * calibration
@@ -227,12 +226,6 @@ def places(inputs: Inputs, fingers: Sequence[Mapping[str, Value]]) -> FloatArray
     return inputs.columns(moved)
 
 
-def grip_force(reaction: FloatArray, load: Load) -> float:
-    """Force along the indenter's travel, N/mm."""
-    u, v = (value or 0.0 for value in load.displacement)
-    return float((reaction[..., 0] * u + reaction[..., 1] * v) / hypot(u, v))
-
-
 def fitted_fields(shots: Snapshots, stages: Stages | None = None) -> FieldEmulator:
     """The emulator of fields, with intervals from samples that are each predicted from all others."""
     with (stages or Stages(quiet=True)).stage("emulator") as progress:
@@ -314,7 +307,7 @@ def _calibrated(made: FieldEmulator, shots: Snapshots, paths: FloatArray) -> Fie
             for kind, nodal, numbers in ((0, true, scaled), (1, guess, missed)):
                 stress = reader.stress(points, nodal, made.law, _unit(material, made.young).lame)
                 figures = reader.figures(points, nodal, stress, position)
-                values[kind, sample, stroke, 1:] = (grip_force(numbers[:2], load), *figures, numbers[4])
+                values[kind, sample, stroke, 1:] = (stroke_axes(load)[0] @ numbers[:2], *figures, numbers[4])
             values[0, sample, stroke, 0] = np.sqrt(np.mean(true**2))
             values[1, sample, stroke, 0] = values[0, sample, stroke, 0] + np.sqrt(
                 np.mean((guess - true) ** 2)

@@ -30,7 +30,7 @@ LARGEST = 0.75
 """Least stress of the last colour over the root mean square of the samples' largest one."""
 
 TITLES = {
-    "force": "Grip force",
+    "force": "Force",
     "tip_u": "Tip along the finger",
     "tip_v": "Tip across it",
     "wrap": "Wrap",

@@ -269,7 +269,7 @@ const pinnrayModel = (() => {
     }, 0));
   }
 
-  // Force along the travel, N, with half of its interval, at a share of the full stroke.
+  // Force along the stroke, N, with half of its interval, at a share of the full stroke.
   function force(known, share) {
     const { values, numbers, strength } = known;
     const chosen = weights(share);

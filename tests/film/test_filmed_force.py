@@ -50,8 +50,8 @@ def test_a_frame_on_the_way_is_an_equilibrium_with_the_force_that_is_written(coa
     there = FemNonlinearSolver(degree=1).solve(Problem(coarse_mesh, Material(law="neo-hookean"), load))
     exact = there.displacement(coarse_mesh.at_nodes())
     np.testing.assert_allclose(recording.displaced(share), exact, atol=0.002)  # of 8 mm, as in `LONGEST_STEP`
-    assert row["N_per_mm"] == pytest.approx(np.linalg.norm(there.reaction), rel=1e-4)
-    assert row["force_N"] == 25.0 * row["N_per_mm"]
+    assert row["force_N"] == pytest.approx(-25.0 * there.reaction[1], rel=1e-4)
+    assert row["tangential_force_N"] == pytest.approx(25.0 * there.reaction[0], abs=1e-9)
     assert row["position_mm"] == pytest.approx(there.stats["force_abscissa_mm"], abs=0.01)
 
 
@@ -60,7 +60,7 @@ def test_a_linear_solver_goes_straight(coarse_mesh, finger):
     recording = filmed(finger, solution)
     rows = true_forces(solution, recording, 25.0)
     np.testing.assert_allclose(recording.displaced(0.5), 0.5 * recording.displacement, atol=1e-12)
-    forces = np.array([row["N_per_mm"] for row in rows])
+    forces = np.array([row["force_N"] for row in rows])
     np.testing.assert_allclose(forces, [row["load"] * forces[-1] for row in rows], atol=1e-12)
     assert rows[0]["position_mm"] == ""
 
@@ -72,6 +72,6 @@ def test_the_rig_writes_the_force_beside_the_film(tmp_path):
     with (tmp_path / "film" / "truth_force.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 6
-    forces = [float(row["N_per_mm"]) for row in rows]
+    forces = [float(row["force_N"]) for row in rows]
     assert forces[0] == 0 < forces[2] < forces[3] < forces[4] == forces[5]
     assert float(rows[5]["position_mm"]) == pytest.approx(33.6, abs=0.2)  # 1.4 mm from the patch's middle

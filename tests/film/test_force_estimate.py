@@ -18,6 +18,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.identification.tracker import ForceReading
 from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import Estimated
 from pinnray.vision.frames.frame import Frame
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.tracking.frame_tracker import FrameDetections
@@ -27,19 +28,16 @@ pytestmark = pytest.mark.usefixtures("few_elements_throughout", "discs_fitted_on
 
 DEPTH = 20.0
 SCALE = 8.0  # pixels per mm
+UNKNOWN = Estimated(np.nan, -np.inf, np.inf)
 REST = np.array([[10.0, -1.0], [50.0, -1.0], [80.0, -3.0]])
 
 
-def reading(size=0.1, status="", high=None):
-    known = np.isfinite(size)
+def reading(force=0.1, status=""):
+    known = np.isfinite(force)
     return ForceReading(
-        force=np.array([0.0, -size]),
-        size=size,
-        low=0.9 * size if known else 0.0,
-        high=1.1 * size if known else np.inf,
-        position=34.0 if known else np.nan,
-        position_low=33.0,
-        position_high=35.0,
+        force=Estimated(force, 0.9 * force, 1.1 * force) if known else UNKNOWN,
+        tangential_force=Estimated(0.02, 0.01, 0.03) if known else UNKNOWN,
+        position=Estimated(34.0 if known else np.nan, 33.0, 35.0),
         inflation=1.0 if known else np.nan,
         evaluations=1,
         seconds=0.05,
@@ -56,10 +54,11 @@ FORCES = [
 def test_a_row_has_forces_for_the_depth_and_nothing_where_nothing_is_known():
     first, second = (force_row(force, DEPTH) for force in FORCES)
     assert first["force_N"] == pytest.approx(2.0)
-    assert first["N_per_mm_high"] == pytest.approx(0.11)
+    assert first["force_high_N"] == pytest.approx(2.2)
+    assert first["tangential_force_N"] == pytest.approx(0.4)
     assert (first["position_mm"], first["delay_s"]) == (34.0, 0.06)
     assert second["force_N"] is second["force_high_N"] is second["position_mm"] is None
-    assert second["force_low_N"] == 0
+    assert second["force_low_N"] is None
     assert second["remark"].startswith("2 of 9 markers")
     assert first.keys() == second.keys()
 
@@ -72,7 +71,7 @@ def test_the_interval_counts_that_a_finger_is_not_plane():
     tracker = force_tracker(mesh, finger, Material(), finger.markers)
     seen, deviations = np.ones(len(moved), dtype=bool), np.full_like(moved, 0.005)
     found = tracker.update(moved, deviations, seen)
-    assert found.high - found.size > 1.95 * 0.5 * 0.4**2 * found.size
+    assert found.force.high - found.force.value > 1.95 * 0.5 * 0.4**2 * found.force.value
 
 
 class Recorder:
@@ -188,8 +187,8 @@ def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(caps
     assert second["markers_mm"] == [[10.0, -2.0], None, [80.0, -4.0]]
     assert second["moved_mm"] == [[0.0, -1.0], None, [0.0, -1.0]]
     assert second["status"] == "hidden: marker 2"
-    assert second["force"]["N_per_mm"] == 0.1
-    assert second["force"]["N_per_mm_high"] == pytest.approx(0.11)
+    assert second["force"]["force_N"] == 2.0
+    assert second["force"]["force_high_N"] == pytest.approx(2.2)
 
 
 @pytest.fixture(scope="module")
@@ -252,7 +251,7 @@ def test_the_same_film_through_a_pipe_live(film, tmp_path, monkeypatch, capsys):
     published = {line["force"]["frame"]: line["force"] for line in lines if line["force"]}
     for row in rows_of(out / "force.csv"):
         if row["frame"] in map(str, published):  # the last one comes after the last line
-            assert published[int(row["frame"])]["N_per_mm"] == pytest.approx(float(row["N_per_mm"]), rel=1e-9)
+            assert published[int(row["frame"])]["force_N"] == pytest.approx(float(row["force_N"]), rel=1e-9)
     error, place, _ = judged(film, out)
     # Frames come as fast as they are read: some are passed over, and the last one is not.
     assert error < 0.03

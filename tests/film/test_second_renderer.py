@@ -48,7 +48,7 @@ def test_a_sheet_that_was_printed_at_99_percent(tmp_path):
     assert any("larger in the film than in the drawing" in said for said in tracking.warnings)
     found = identified(observed)
     assert found.status.converged
-    size, place = found.identified.size, found.identified.position
-    assert size.value == pytest.approx(FORCE, rel=0.05)
-    assert size.low < FORCE < size.high
+    force, place = found.identified.force, found.identified.position
+    assert force.value == pytest.approx(FORCE, rel=0.05)
+    assert force.low < FORCE < force.high
     assert place.low < PLACE < place.high

@@ -27,7 +27,11 @@ def test_numbers_have_their_significant_digits(value, digits, expected):
 
 
 def test_shares_and_distances_that_are_as_good_as_zero_are_bounds():
-    assert [percent(value) for value in (-0.0123, 0, 29.4714)] == ["−1.23\xa0%", "0\xa0%", "2947\xa0%"]
+    assert [percent(value) for value in (-0.0123, 0, 9.4714)] == ["−1.23\xa0%", "0\xa0%", "947\xa0%"]
+    assert [percent(value) for value in (23.94, -136)] == ["24\xa0times", "−136\xa0times"]
+    assert [percent(value, 2, plus=True) for value in (36.5, 0.65, 0, -0.14)] == [
+        *("+36\xa0times", "+65\xa0%", "0\xa0%", "−14\xa0%")
+    ]
     assert [percent(value) for value in (6.1e-26, -6.1e-26)] == ["<\xa00.001\xa0%", ">\xa0−0.001\xa0%"]
     assert [percent(value, 2, sign=False) for value in (1.234, 0.05, nan)] == ["123", "5.0", "–"]
     assert [distance(value) for value in (nan, 3e-15, 9.44e-7, 0.21)] == ["–", "0", "<\xa00.0001", "0.21"]

@@ -103,26 +103,25 @@ def command(
             certified = with_certificates([evaluated(solution, triangles)], problem)
             (evaluation,), remarks = with_body_checks(certified, triangles)
         figures = evaluation.figures
-        grip = [(stroke, _force(figures, stroke)) for stroke in at_strokes] if figures else []
+        forces = [(stroke, _force(figures, stroke)) for stroke in at_strokes] if figures else []
         write_vtu(out, triangles, evaluation)
         written = [out]
         if curves := force_curves([evaluation], load):
             written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
-            write_force_displacement(written[1], curves, load, depth=chosen.depth)
+            write_force_displacement(written[1], curves, depth=chosen.depth)
             draw_force_displacement(curves, depth=chosen.depth).save(written[2])
     for remark in [*evaluation.warnings, *remarks]:
         say(f"warning: {remark}")
     print(f"{evaluation.label}: {evaluation.message}")
-    u, v = solution.reaction
-    print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
+    print(f"energy {solution.energy:.6g} N mm/mm")
     if figures:
-        print("\n".join(figures_lines(figures, grip)))
+        print("\n".join(figures_lines(figures, forces)))
         print(break_answer(figures.strain_over_break, figures.peak_radius))
     if solution.identified:
         print(solution.identified.advice)
     for path in written:
         print(path)
-    whole = all(isfinite(force) for _, force in grip)
+    whole = all(isfinite(force) for _, force in forces)
     return 0 if evaluation.converged and whole and tolerance_reached(adaptation) else NOT_CONVERGED
 
 

@@ -25,15 +25,16 @@ def followed(evaluate: Callable[..., Evaluation]) -> Evaluation:
     return replace(evaluate("fem-nonlinear", history=record), law="neo-hookean")
 
 
-def test_force_is_the_component_along_the_travel(followed):
+def test_force_is_the_component_along_the_stroke(followed):
     oblique = ForceCurve.of(followed, Load(displacement=(6.0, -8.0)))
-    np.testing.assert_allclose(oblique.travel, 10.0 * STEPS)
+    np.testing.assert_allclose(oblique.stroke, 10.0 * STEPS)
     np.testing.assert_allclose(oblique.force, 0.6 * 0.2 * STEPS + 0.8 * 3.0 * STEPS**2)
+    np.testing.assert_allclose(oblique.tangential_force, 0.8 * 0.2 * STEPS - 0.6 * 3.0 * STEPS**2)
 
 
-def test_a_free_component_does_not_travel(followed):
+def test_a_free_component_has_no_stroke(followed):
     sliding = ForceCurve.of(followed, Load(kind="patch", displacement=(None, -4.0)))
-    np.testing.assert_allclose(sliding.travel, 4.0 * STEPS)
+    np.testing.assert_allclose(sliding.stroke, 4.0 * STEPS)
     np.testing.assert_allclose(sliding.force, 3.0 * STEPS**2)
 
 
@@ -41,8 +42,8 @@ def test_linear_solvers_are_straight_lines_beside_one_that_follows_the_load(foll
     end_only = replace(evaluate("pinn-std"), law="neo-hookean")
     curves = force_curves([fem, followed, end_only], Load())
     assert [curve.evaluation.solver for curve in curves] == ["fem", "fem-nonlinear", "pinn-std"]
-    np.testing.assert_allclose([curves[0].travel, curves[0].force], [[0, 10], [0, 0.5]])
-    np.testing.assert_allclose([curves[2].travel, curves[2].force], [[10], [0.5]])
+    np.testing.assert_allclose([curves[0].stroke, curves[0].force], [[0, 10], [0, 0.5]])
+    np.testing.assert_allclose([curves[2].stroke, curves[2].force], [[10], [0.5]])
 
 
 def test_without_a_solver_that_follows_the_load_there_is_no_curve(fem, pinn):
@@ -54,14 +55,12 @@ def test_a_solver_that_was_given_markers_has_no_curve(followed, fem):
     assert [curve.evaluation.solver for curve in curves] == ["fem-nonlinear"]
 
 
-def test_file_has_the_force_per_depth_and_for_the_depth(followed, tmp_path):
+def test_file_has_the_forces_for_the_depth(followed, tmp_path):
     load = Load(kind="patch", displacement=(None, -4.0))
     path = tmp_path / "force_displacement.csv"
-    write_force_displacement(path, force_curves([followed], load), load, depth=20.0)
+    write_force_displacement(path, force_curves([followed], load), depth=20.0)
     rows = rows_of(path)
-    assert list(rows[-1].values()) == [
-        *("fem-nonlinear", "neo-hookean", "1", "1.0", "", "-4.0", "4.0", "0.2", "-3.0", "3.0", "60.0")
-    ]
+    assert list(rows[-1].values()) == ["fem-nonlinear", "neo-hookean", "1", "1.0", "4.0", "60.0", "4.0"]
     assert all(name.split("_")[-1] in ("solver", "law", "converged", "1", "mm", "N") for name in rows[0])
 
 
@@ -85,7 +84,7 @@ def test_the_force_on_the_simulated_finger_is_a_cross(followed, fem):
 
 
 def test_the_whole_curve_of_the_simulated_finger_and_an_identified_force_are_drawn(followed, fem):
-    force = IdentifiedForce(Estimated(0.7, 0.6, 0.9), None, Estimated(0.6, 0.5, 0.8))
+    force = IdentifiedForce(Estimated(0.6, 0.5, 0.8), Estimated(0.3, 0.2, 0.4), None)
     found = replace(fem, solver="fem-id", in_sample=True, identified=force)
     truth = replace(followed, solver="truth")
     curves = force_curves([fem, followed], Load())

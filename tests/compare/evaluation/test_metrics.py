@@ -7,6 +7,7 @@ from pinnray.comparison.evaluation.comparison import pick_reference
 from pinnray.comparison.evaluation.differences import FieldDifference, weighted_percentile
 from pinnray.comparison.evaluation.metrics import force_error, marker_errors, truth_differences
 from pinnray.comparison.evaluation.scores import MEANS, Scores
+from pinnray.solvers.problem import Load
 
 
 @pytest.mark.parametrize(
@@ -112,9 +113,13 @@ def test_differences_from_the_truth_are_those_of_whole_tensors(fem):
     assert differences.von_mises.rel_l2 == 0
 
 
-@pytest.mark.parametrize(("factor", "expected"), [(1.5, 0.5), (-0.75, -0.25)], ids=["too large", "too small"])
-def test_the_error_of_the_force_is_that_of_its_size(fem, factor, expected):
-    assert force_error(replace(fem, reaction=factor * fem.reaction), fem) == pytest.approx(expected)
+@pytest.mark.parametrize(("factor", "expected"), [(1.5, 0.5), (0.75, -0.25), (-1, -2)], ids=str)
+def test_the_error_of_the_force_is_that_of_its_component_along_the_stroke(fem, factor, expected):
+    """A force across the stroke, which is twenty times as large, is none of it."""
+    pressed = replace(fem, reaction=np.array([0.0, -0.5]))
+    other = replace(fem, reaction=np.array([10.0, -0.5 * factor]))
+    assert force_error(other, pressed, Load()) == pytest.approx(expected)
+    assert force_error(other, pressed, Load(displacement=(None, -10.0))) == pytest.approx(expected)
 
 
 def test_the_95th_percentile_of_a_difference_is_below_a_twentieth_of_the_area():

@@ -127,7 +127,7 @@ def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
 def test_pictures_for_a_journal_have_its_width_and_type_that_fits(comparison, failed, pinn, width, compared):
     """Nine solvers of long names, most of them not converged, on a column of a journal and on its page."""
     record = {"epoch": np.arange(1.0, 4.0), "PDE": np.ones(3), "BC": np.ones(3), "ASM": np.ones(3)}
-    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(36.0, 35.0, 37.5))
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(0, 0, 0.1), Estimated(36.0, 35.0, 37.5))
     told = replace(failed, in_sample=True, left_out=failed.marker_displacement, identified=force)
     more = [replace(told, solver=f"pinn-id-long-{n}", history=record) for n in range(3)]
     more += [replace(pinn, solver=f"pinn-long-{n}") for n in range(3)]

@@ -23,8 +23,8 @@ def folder(compared, estimated, evaluate, finished, tmp_path) -> Path:
     given = evaluate("fem-asm", 1.02)
     force = IdentifiedForce(
         Estimated(0.5, 0.4, 0.8),
+        Estimated(0.1, 0.0, 0.2),
         Estimated(36.0, 35.0, 37.5),
-        Estimated(0.45, 0.35, 0.7),
         {"markers": 0.8, "contact": 0.2},
         "80% of the variance of the force comes from the errors of the markers.",
     )
@@ -47,7 +47,8 @@ def test_a_run_gives_its_answers(folder: Path, capsys: pytest.CaptureFixture[str
     said = capsys.readouterr().out
     assert "May the network be trusted here?\n  Yes, as a solver" in said
     assert "gp was left out: too slow." in said
-    assert re.search(r"finds a force of 0\.5.* 80% of the variance of the force comes from the errors", said)
+    found = r"finds a force of 4\.\d+ N \(95 % interval 4\.00 to 5\.00\).* 80% of the variance of the force"
+    assert re.search(found, said)
     assert said.endswith(f"report: {folder / 'report.html'}\n")
     assert [path.name for path in folder.iterdir()] == ["metrics.json"]
 

@@ -79,9 +79,9 @@ def test_the_first_answer_is_by_the_solver_nearest_to_the_truth_and_says_how_far
     truth = evaluate("fem-nonlinear", 1.5)
     said = asked(compared(plain, near, truth=truth))["What does the finger do?"].verdict
     assert said.replace("\N{NO-BREAK SPACE}", " ").startswith(
-        "By fem-id it grips with 4.00 N (−3.3 % off the simulated finger’s), its tip moves by 0.500 mm"
+        "By fem-id the force is 4.00 N (−3.3 % off the simulated finger’s), its tip moves by 0.500 mm"
     )
     said = asked(compared(plain, truth=truth))["What does the finger do?"].verdict
-    assert "By fem it grips with 4.00 N (−33 % off" in said.replace("\N{NO-BREAK SPACE}", " ")
+    assert "By fem the force is 4.00 N (−33 % off" in said.replace("\N{NO-BREAK SPACE}", " ")
     off = asked(compared(plain, replace(near, converged=False), truth=truth))
     assert off["What does the finger do?"].verdict.startswith("By fem ")

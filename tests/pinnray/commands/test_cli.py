@@ -82,7 +82,7 @@ def test_markers_that_no_finger_explains_are_said_first(folder, capsys, without_
     told = json.loads(Path("here/metrics.json").read_text())
     assert told["solvers"]["fem-id"]["status"] == "not converged"
     assert "NO FINGER OF THIS DRAWING EXPLAINS THE MARKERS" in told["warnings"][0]
-    assert told["solvers"]["fem-id"]["force"]["size"]["value"] > 0
+    assert told["solvers"]["fem-id"]["identified"]["force"]["value"] > 0
     errors = capsys.readouterr().err
     assert errors.index(told["warnings"][0]) < errors.index("error: fem-id did not converge")
     assert "NO FINGER OF THIS DRAWING" in Path("here/report.html").read_text()

@@ -100,17 +100,18 @@ def test_the_quantities_of_the_default_finger() -> None:
     assert found["mass"] == pytest.approx(found["area"] * 20 * 1.2e-3)
 
 
-def test_force_acts_along_the_travel() -> None:
+def test_force_acts_along_the_stroke() -> None:
     oblique = replace(PROBLEM, load=Load(displacement=(3.0, -4.0)))
-    (travel, force) = force_curve(affine([[0, 0], [0, 0]], oblique), 20.0)[-1]
-    assert (travel, force) == pytest.approx((5.0, 20 * (0.18 + 1.6)))
+    (stroke, force) = force_curve(affine([[0, 0], [0, 0]], oblique), FINGER.depth)[-1]
+    assert (stroke, force) == pytest.approx((5.0, 20 * (0.18 + 1.6)))
 
 
-def test_the_force_has_the_interval_of_its_own_component() -> None:
-    """Not that of the size of a force that is partly tangential."""
-    found = IdentifiedForce(Estimated(0.5, 0.4, 0.6), None, Estimated(0.3, 0.25, 0.35))
+def test_an_identified_force_is_the_force_with_its_interval() -> None:
+    found = IdentifiedForce(Estimated(0.3, 0.25, 0.35), Estimated(-0.5, -0.6, -0.4), None)
     figures = figures_of(replace(affine([[0, 0], [0, 0]]), identified=found), rest={})
-    assert figures.intervals["force"] == pytest.approx((0.25 * FINGER.depth, 0.35 * FINGER.depth))
+    for name, value, *ends in (("force", 0.3, 0.25, 0.35), ("tangential_force", -0.5, -0.6, -0.4)):
+        assert figures.values()[name] == pytest.approx(value * FINGER.depth)
+        assert figures.intervals[name] == pytest.approx([end * FINGER.depth for end in ends])
 
 
 def test_a_recorded_path_gives_the_force_on_the_way() -> None:

@@ -60,26 +60,31 @@ def column(found, name):
     return np.array([getattr(reading, name) for reading in found])
 
 
+def pressing(forces):
+    return -np.asarray(forces)[..., 1]
+
+
 def test_the_force_is_within_three_percent_on_the_way_up_and_down(drawn_path, tracker_of):
     places, forces = drawn_path
     found = readings(tracker_of(), places)
-    true = np.linalg.norm(forces, axis=1)
+    true = pressing(forces)
     # The walls' priors and the noise leave 2.5 % of the full force in every single frame.
-    error = np.sqrt(np.mean((column(found, "size") - true) ** 2))
+    error = np.sqrt(np.mean((column(found, "force")[:, 0] - true) ** 2))
     assert error < 0.03 * true.max()
     large = true > 0.2 * true.max()
-    np.testing.assert_allclose(column(found, "position")[large], POSITION, atol=1.0)
+    np.testing.assert_allclose(column(found, "position")[large, 0], POSITION, atol=1.0)
 
 
 @pytest.mark.slow
 def test_intervals_hold_for_walls_that_are_not_those_drawn(printed_path, tracker_of):
     places, forces = printed_path
     found = readings(tracker_of(), places)
-    true = np.linalg.norm(forces, axis=1)
-    inside = (column(found, "low") <= true) & (true <= column(found, "high"))
+    true = pressing(forces)
+    _, low, high = column(found, "force").T
+    inside = (low <= true) & (true <= high)
     assert inside.mean() > 0.9  # of 95 %
     # The finger is known from its largest load on: the way down has narrower intervals at the same force.
-    widths = column(found, "high") - column(found, "low")
+    widths = high - low
     up, down = (np.flatnonzero(np.isclose(SHARES, 0.5))[end] for end in (0, -1))
     assert widths[down] < widths[up]
 
@@ -87,9 +92,9 @@ def test_intervals_hold_for_walls_that_are_not_those_drawn(printed_path, tracker
 def test_an_unloaded_finger_may_have_no_force(drawn_path, tracker_of):
     places, _ = drawn_path
     for reading in readings(tracker_of(), places[:3]):
-        assert reading.low == 0
-        assert reading.size < 0.002
-        assert reading.position_low < POSITION < reading.position_high
+        assert reading.force.low < 0 < reading.force.high < 0.002
+        assert reading.tangential_force.low < 0 < reading.tangential_force.high
+        assert reading.position.low < POSITION < reading.position.high
 
 
 def test_frames_that_barely_move_cost_no_equilibrium(drawn_path, tracker_of):
@@ -106,7 +111,7 @@ def test_a_jump_to_the_full_load_is_followed(drawn_path, tracker_of):
     tracker = tracker_of()
     readings(tracker, places[:1])
     (found,) = readings(tracker, places[[15]])
-    assert found.size == pytest.approx(np.linalg.norm(forces[15]), rel=0.03)
+    assert found.force.value == pytest.approx(pressing(forces[15]), rel=0.03)
     assert found.evaluations > 2
 
 
@@ -117,8 +122,8 @@ def test_hidden_markers_widen_the_interval_and_are_named(drawn_path, tracker_of)
     visible[:, [2, 5, 7]] = False
     whole, partial = (readings(tracker_of(), places, visible=seen)[15] for seen in (None, visible))
     assert partial.status.startswith("hidden: marker 3, 6, 8")
-    assert partial.high - partial.low > whole.high - whole.low
-    assert partial.low < np.linalg.norm(forces[15]) < partial.high
+    assert np.ptp(partial.force) > np.ptp(whole.force)
+    assert partial.force.low < pressing(forces[15]) < partial.force.high
 
 
 def test_too_few_markers_leave_the_interval_open_and_the_next_frame_goes_on(drawn_path, tracker_of):
@@ -127,9 +132,9 @@ def test_too_few_markers_leave_the_interval_open_and_the_next_frame_goes_on(draw
     visible[15, 2:] = False
     found = readings(tracker_of(), places[:17], visible=visible)
     assert found[15].status == "2 of 9 markers are seen, too few for a force"
-    assert (found[15].low, found[15].high) == (0, np.inf)
-    assert np.isnan(found[15].size)
-    assert found[16].size == pytest.approx(np.linalg.norm(forces[16]), rel=0.03)
+    assert found[15].force[1:] == (-np.inf, np.inf)
+    assert np.isnan(found[15].force.value)
+    assert found[16].force.value == pytest.approx(pressing(forces[16]), rel=0.03)
 
 
 def test_markers_that_no_force_explains_are_told(drawn_path, tracker_of):
@@ -139,4 +144,4 @@ def test_markers_that_no_force_explains_are_told(drawn_path, tracker_of):
     found, plain = (readings(tracker_of(), given)[-1] for given in (off, places[:16]))
     assert found.inflation > 5
     assert "times as far off as noise explains" in found.status
-    assert found.high - found.low > 3 * (plain.high - plain.low)
+    assert np.ptp(found.force) > 3 * np.ptp(plain.force)
