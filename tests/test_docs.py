@@ -237,7 +237,8 @@ def test_no_command_has_a_placeholder_that_a_shell_takes_for_a_file():
 def test_relative_links_lead_somewhere(page):
     text = without_blocks(page.read_text(encoding="utf-8"))
     broken = []
-    for target in re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'(?:src|href)="([^"]+)"', text):
+    links = re.findall(r'\]\(([^)\s]+)(?:\s+"[^"]*")?\)', text)
+    for target in links + re.findall(r'(?:src|href)="([^"]+)"', text):
         if re.match(r"[a-z]+:", target):
             continue
         path, _, anchor = target.partition("#")
