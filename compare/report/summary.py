@@ -4,6 +4,7 @@ A question that they cannot answer is not asked.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from math import hypot, isfinite, nan
 from typing import NamedTuple
 
@@ -155,18 +156,19 @@ def _trust(scores: Scores) -> RunAnswer | None:
     judged = [name for name in networks if name in plain]
     reference = scores.label(scores.reference)
     listed = {scores.reference: scores[scores.reference], **plain}
+    heads = ["Solver", f"{reference}:\ndisplacement", f"{reference}:\nvon Mises"]
     table = TextTable(
-        f"Relative L² distance over the body, from {reference}"
-        + (" and from the truth, with the error of the force" if scores[scores.reference].to_truth else ""),
-        ["Solver", "displacement", "von Mises", *TRUTH_HEADS][
-            : 3 + 3 * bool(scores[scores.reference].to_truth)
-        ],
+        f"Relative L² distance over the body from {reference}",
+        heads,
         [
             [scores.label(name), *_from_reference(name, scores), *_to_truth(own)]
             for name, own in listed.items()
         ],
         f"±: error of {reference}, as it estimates it." if scores[scores.reference].uncertainty else "",
     )
+    if scores[scores.reference].to_truth:
+        title = f"{table.title} and from the truth, and error of the force"
+        table = replace(table, title=title, headings=[*heads, *TRUTH_HEADS])
     return RunAnswer(
         "May the network be trusted here?",
         " ".join(_verdict(name, scores) for name in judged),
