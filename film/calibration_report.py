@@ -11,11 +11,11 @@ from rich.table import Table
 
 from pinnray.comparison.figures.layout import axes_at, write_heading
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
+from pinnray.runtime.figure import COLUMN, INK, MEASURED, Figure, figure
 from pinnray.vision.calibration.camera import INTRINSICS
 from pinnray.vision.calibration.camera_calibration import Calibration
 
-MARGIN, HEAD = 0.12, 0.56
+MARGIN, HEAD = 0.12, 0.76
 LONGEST = 0.05
 """Drawn length of the 95th percentile of the residuals, in image widths."""
 COVERED = "#56b4e9"
@@ -40,17 +40,17 @@ def calibration_table(calibration: Calibration) -> Table:
 def draw_calibration(calibration: Calibration) -> Figure:
     """Draw the residuals of all photographs, and the part of the image that they cover."""
     camera = calibration.camera
-    wide = WIDTH - 2 * MARGIN
+    wide = COLUMN - 2 * MARGIN
     high = wide * camera.height / camera.width
     longest = np.nanquantile(np.linalg.norm(_all(calibration.residuals.values()), axis=1), 0.95)
     factor = _round(LONGEST * camera.width / max(longest, 1e-9))
-    with figure(HEAD + high + MARGIN) as drawn:
+    with figure(HEAD + high + MARGIN, COLUMN) as drawn:
         write_heading(
             drawn,
             f"Calibration from {len(calibration.views)} photographs",
-            f"Lines: reprojection errors of the corners, {factor:g} times as long; rms "
-            f"{calibration.rms:.3f} px, held out {calibration.held_out_rms:.3f} px.\n"
-            f"Blue: inside a board at least once, {100 * calibration.coverage:.0f} % of the image.",
+            f"Lines: reprojection errors of the corners, × {factor:g};\n"
+            f"rms {calibration.rms:.3f} px, held out {calibration.held_out_rms:.3f} px.\n"
+            f"Blue: inside a board, {100 * calibration.coverage:.0f} % of the image.",
         )
         axes = axes_at(drawn, (MARGIN, HEAD, wide, high))
         axes.set(xlim=(-0.5, camera.width - 0.5), ylim=(camera.height - 0.5, -0.5), xticks=[], yticks=[])

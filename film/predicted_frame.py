@@ -17,11 +17,11 @@ from pinnray.comparison.figures.layout import axes_at, legend_below_heading, wri
 from pinnray.comparison.figures.overlay import errors_note
 from pinnray.geometry.picture_frame import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.figure import COLUMN, INK, MEASURED, PAGE, SMALL, Figure, figure
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.tracking.trajectories import Tracking
 
-HEAD, TITLE, GAP = 0.55, 0.2, 0.12
+HEAD, TITLE, GAP = 0.75, 0.36, 0.12
 """Heights in inches: heading and legend, the name above a panel; the gap around panels."""
 MARGIN = 0.05
 """Part of the frame around the finger, over the finger's length in it."""
@@ -64,9 +64,10 @@ def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> F
     (left, top), (right, bottom) = _window(np.concatenate([plane.pixels(nodes), *shown]), image)
     columns = 1 if len(bodies) == 1 else 2
     rows = -(-len(bodies) // columns)
-    width = (WIDTH - GAP * (columns + 1)) / columns
+    page = COLUMN if len(bodies) == 1 else PAGE
+    width = (page - GAP * (columns + 1)) / columns
     height = width * (bottom - top) / (right - left)
-    with figure(HEAD + rows * (TITLE + height + GAP)) as drawn:
+    with figure(HEAD + rows * (TITLE + height + GAP), page) as drawn:
         write_heading(drawn, "Predicted finger in the last frame")
         for number, (body, evaluation) in enumerate(zip(bodies, comparison.evaluations, strict=True)):
             row, column = divmod(number, columns)
@@ -126,6 +127,4 @@ def _markers(axes: Axes, tracking: Tracking, computed: FloatArray) -> None:
 
 def _name(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
     note = errors_note(comparison.scores[evaluation.solver])
-    title = axes.set_title(f"{evaluation.label_at_markers}: {note}", size=SMALL)
-    longer = title.get_window_extent().width / axes.get_window_extent().width
-    title.set_fontsize(SMALL / max(longer, 1.0))
+    axes.set_title(f"{evaluation.label_at_markers}\n{note}", size=SMALL)

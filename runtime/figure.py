@@ -21,13 +21,16 @@ if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
 WIDTH = 5.5
-"""Width of a figure that is asked for none, inches."""
+"""Width of a figure for the screen, inches."""
+
+COLUMN, PAGE = 85 / 25.4, 180 / 25.4
+"""Widths of a journal's column and page, inches: type of `SMALL` is as large there."""
 
 NARROW = 4.5
-"""Width below which a figure has one column of panels, inches: a journal's column has 85 mm."""
+"""Width below which a figure has one column of panels, inches."""
 
 SMALL = 8.1
-"""Smallest type, points: 5 points in a journal's column of 3.4 inches, the least that journals print."""
+"""Smallest type, points; journals print 7 at least."""
 
 DPI = 300
 NOTEBOOK_DPI = 150
@@ -122,7 +125,7 @@ def figure(height: float, width: float = WIDTH) -> Iterator[Figure]:
 
 @contextmanager
 def body_figure(
-    points: FloatArray, title: str, *, foot: float = 0.0, page: float = WIDTH
+    points: FloatArray, title: str, *, foot: float = 0.0, page: float = COLUMN
 ) -> Iterator[tuple[Figure, Axes]]:
     """A figure with axes in mm, of equal scale, around points of shape (n, 2), mm.
 
@@ -136,7 +139,7 @@ def body_figure(
     (left, bottom), (right, top) = points.min(axis=0) - margin, points.max(axis=0) + margin
     width = page - LEFT - RIGHT
     height = width * (top - bottom) / (right - left)
-    lines = wrap(title, int(11 * width))
+    lines = wrap(title, int(12.5 * width))
     total = TITLE + 0.15 * (len(lines) - 1) + height + BELOW + foot
     with figure(total, page) as drawn:
         axes = drawn.add_axes((LEFT / page, (BELOW + foot) / total, width / page, height / total))

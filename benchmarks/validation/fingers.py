@@ -12,7 +12,7 @@ from benchmarks.validation.printed_finger import FINGERS, FRICTION, RADIUS, Prin
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
+from pinnray.runtime.figure import BODY, INK, MEASURED, MUTED, PAGE, Figure, body_figure
 from pinnray.solvers.problem import Load
 from pinnray.solvers.solution import Solution
 from pinnray.vision.clicked_points import clicked_points, read_clicks
@@ -118,7 +118,7 @@ def picture(experiment: Experiment, forward: Solution, fitted: Solution) -> Figu
     centre = np.array([finger.height, RADIUS - finger.travel])
     visible = np.array([(-4.0, -46.0), (76.0, 12.0)])
     title = f"Printed finger {finger.name}: predicted with friction {FRICTION:g}, and measured"
-    with body_figure(visible, title, foot=0.62) as (drawn, axes):
+    with body_figure(visible, title, foot=0.62, page=PAGE) as (drawn, axes):
         for ring in (finger.body.exterior, *finger.body.interiors):
             axes.plot(*np.array(ring.coords).T, color=MUTED, lw=0.6, ls=(0, (3, 2)), zorder=1)
         for part in shapely.get_parts(body):

@@ -6,7 +6,7 @@ from benchmarks.validation.half_beam import HEIGHT, LENGTH, Deformation
 from benchmarks.validation.markers import LOADS, NAMES, NOMINAL, marker_places
 from benchmarks.validation.study import Outcome
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import BODY, INK, MEASURED, MUTED, Figure, body_figure
+from pinnray.runtime.figure import BODY, INK, MEASURED, MUTED, PAGE, Figure, body_figure
 
 SHADES = {"gravity": "#8fc3e3", "load52": "#3f8fc9", "load101": "#08519c"}
 """Outlines, darker with the load."""
@@ -18,7 +18,7 @@ def side_view(outcome: Outcome) -> Figure:
     """Side view of a prediction."""
     visible = np.array([(-LENGTH - 4, -25), (7, 38)], dtype=float)
     title = "Silicone beam under its own weight and two tip loads"
-    with body_figure(visible, title, foot=0.62) as (drawn, axes):
+    with body_figure(visible, title, foot=0.62, page=PAGE) as (drawn, axes):
         axes.set_ylabel("z, mm")
         rest = np.array([(-LENGTH, 0), (0, 0), (0, HEIGHT), (-LENGTH, HEIGHT)])
         axes.fill(*rest.T, facecolor=BODY, edgecolor=MUTED, lw=0.6, ls=(0, (3, 2)), zorder=1)

@@ -22,20 +22,22 @@ def check_formats(formats: Collection[str]) -> None:
         raise UserError(f"there are no pictures as {unknown[0]}; besides PNG there are {', '.join(FORMATS)}")
 
 
-def page_width(width: float | None) -> float:
-    """A picture's width in inches from one in mm; the usual one if None.
+def page_width(width: float | None, formats: Collection[str] = ()) -> float:
+    """A picture's width in inches from one in mm; None: that of a screen, or for print of a journal's page.
 
     Raises:
         UserError: If type of the usual size has no room, or no page is so wide.
     """
-    from pinnray.runtime.figure import WIDTH
+    from pinnray.runtime.figure import PAGE, WIDTH
 
     if width is not None and not 80 <= width <= 200:
         raise UserError(
             f"a picture's width of {width:g} mm is not within 80 to 200 mm; a journal's column has 85 mm, "
             "its page 180 mm"
         )
-    return WIDTH if width is None else width / 25.4
+    if width is None:
+        return PAGE if formats else WIDTH
+    return width / 25.4
 
 
 @dataclass(frozen=True)
@@ -57,12 +59,12 @@ def draw_all(
 ) -> list[Picture]:
     """Write every picture of a comparison as PNG, and in other `FORMATS`, in the order of a report.
 
-    Pictures have the usual width, or one in mm.
+    Pictures have the width of `page_width`, or one in mm.
     `progress` is called before every picture with the share done, from 0 to 1, and what comes next.
     """
     from pinnray.comparison.figures.gallery import GALLERY
 
-    pictures, page = [], page_width(width)
+    pictures, page = [], page_width(width, formats)
     # Figures have so many objects that a tenth of the time went into collecting garbage among older ones.
     gc.freeze()
     try:

@@ -231,6 +231,6 @@ def colour_bar(axes: Axes, scale: ColourScale, title: str, *, extend: str = "nei
     bar.outline.set_linewidth(0.4)
     bar.ax.tick_params(length=2, width=0.5, pad=1.5, labelsize=SMALL, colors=INK)
     bar.ax.locator_params(nbins=5)
-    bar.ax.ticklabel_format(scilimits=(-2, 3), useMathText=True)
+    bar.ax.ticklabel_format(scilimits=(-2, 3))
     bar.ax.xaxis.get_offset_text().set(size=SMALL, color=MUTED)
     bar.set_label(title, size=SMALL, labelpad=2)

@@ -30,7 +30,6 @@ class FieldQuantity(NamedTuple):
 
     name: str  # file name without suffix
     title: str
-    symbol: str  # for the colour bar, in mathematical notation without the dollar signs
     unit: str  # `MPa` or `%`
     signed: bool  # whether its scale is symmetric about zero; else it starts there
     values: Callable[[Evaluation], FloatArray]  # the field at the quadrature points, shape (q,)
@@ -44,19 +43,15 @@ def max_principal(strain: FloatArray) -> FloatArray:
 
 def _strain_component(component: str) -> FieldQuantity:
     row, column = COMPONENTS[component]
-    title, symbol = f"Strain component {component}", rf"\varepsilon_{{{component}}}"
-    name = f"strain_{component}"
-    return FieldQuantity(name, title, symbol, "%", True, lambda each: 100 * each.strain[:, row, column])
+    name, title = f"strain_{component}", f"Strain component {component}"
+    return FieldQuantity(name, title, "%", True, lambda each: 100 * each.strain[:, row, column])
 
 
 QUANTITIES = (
-    FieldQuantity(
-        "von_mises", "Von Mises stress", r"\sigma_\mathrm{vM}", "MPa", False, lambda each: each.von_mises
-    ),
+    FieldQuantity("von_mises", "Von Mises stress", "MPa", False, lambda each: each.von_mises),
     FieldQuantity(
         "strain_principal",
         "Largest in-plane principal strain",
-        r"\varepsilon_1",
         "%",
         False,
         lambda each: 100 * max_principal(each.strain),
@@ -68,7 +63,6 @@ QUANTITIES = (
 DISPLACEMENT = FieldQuantity(
     "displacement",
     "Displacement magnitude",
-    "|u|",
     "mm",
     False,
     lambda evaluation: np.hypot(*evaluation.displacement.T),
@@ -203,8 +197,8 @@ def draw_field(
         body.scale_bar(axes, extent)
         differences = ColourScale(-1.0, 1.0, mpl.colormaps[DIVERGING])
         legends = [
-            (scale, f"${quantity.symbol}$, {quantity.unit}", "both" if quantity.signed else "max"),
-            (differences, f"difference of ${quantity.symbol}$, share of the panel's scale", "both"),
+            (scale, f"{quantity.title}, {quantity.unit}", "both" if quantity.signed else "max"),
+            (differences, "difference, share of the panel’s scale", "both"),
         ]
         for number, (shared, title, extend) in enumerate(legends[:bars]):
             place, column = divmod(number, columns)

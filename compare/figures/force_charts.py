@@ -8,9 +8,9 @@ import numpy as np
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.force_curves import ForceCurve, follows_load
 from pinnray.comparison.figures.layout import axes_at, legend_above, legend_height, write_heading
-from pinnray.comparison.figures.solver_colours import solver_colour
+from pinnray.comparison.figures.solver_colours import solver_look
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import INK, MEASURED, WIDTH, Figure, figure
+from pinnray.runtime.figure import COLUMN, CONTACT, INK, MEASURED, WIDTH, Figure, figure
 
 
 def draw_force_displacement(
@@ -23,7 +23,7 @@ def draw_force_displacement(
 ) -> Figure:
     """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
 
-    A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line. The
+    A solver has its mark at each of its equilibria, a linear one a dashed line. The
     simulated finger's curve ends in a cross. A force that was identified from the markers, by the number of
     its solver in the run, is a square with its interval of 95 % at the end of the stroke.
     """
@@ -41,18 +41,18 @@ def draw_force_displacement(
         write_heading(drawn, "Force of the indenter along its stroke")
         axes = axes_at(drawn, (left, top, page - left - 0.65, height))
         straight = sum(not follows_load(curve.evaluation) for curve in curves)
-        for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
+        for curve, label in zip(curves, labels, strict=True):
             followed = follows_load(curve.evaluation)
             straight -= not followed
             axes.plot(
                 curve.stroke,
                 curve.force,
-                color=solver_colour(number),
+                color=(look := solver_look(curve.evaluation.solver)).colour,
                 linestyle="-" if followed else (0, (3, 2)),
                 # Straight lines often coincide: the later ones are narrower.
                 linewidth=1.3 if followed else 1.2 + 1.4 * straight,
-                marker="o" if followed or len(curve.stroke) == 1 else "",
-                markersize=3.2,
+                marker=look.mark,
+                markersize=3.6,
                 label=label,
                 zorder=3 if followed else 2,
             )
@@ -69,7 +69,7 @@ def draw_force_displacement(
                 "ms": 4.5,
                 "capsize": 2.5,
                 "lw": 1.2,
-                "color": solver_colour(number),
+                "color": solver_look(found[number][0].solver).colour,
                 "zorder": 5,
             }
             axes.errorbar([x], [value], yerr=interval, fmt="s", label=label, **style)
@@ -108,16 +108,16 @@ def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, 
     known = np.isfinite(forces).all(axis=1)
     top = float(forces[known, 2].max(initial=0.0)) or 1.0
     pressed = known & (forces[:, 0] > 0.1 * forces[known, 0].max(initial=0.0))
-    head, height, gap, left = 0.5, 1.9, 0.25, 0.75  # inches
-    with figure(head + 2 * height + gap + 0.45) as drawn:
+    head, height, gap, left = 0.5, 1.1, 0.15, 0.65  # inches
+    with figure(head + 2 * height + gap + 0.45, COLUMN) as drawn:
         note = f"for a depth of {depth:g} mm; bands: intervals of 95 %"
         write_heading(drawn, "Force of the indenter, by the markers", note)
         rows = ((forces, known, "force, N"), (places, pressed, "contact, x in mm"))
         for row, (values, shown, label) in enumerate(rows):
-            axes = axes_at(drawn, (left, head + row * (height + gap), WIDTH - left - 0.15, height))
+            axes = axes_at(drawn, (left, head + row * (height + gap), COLUMN - left - 0.15, height))
             value, low, high = np.where(shown[:, None], values, np.nan).T
-            axes.fill_between(times, low, high, color=solver_colour(0), alpha=0.25, linewidth=0)
-            axes.plot(times, value, color=solver_colour(0), linewidth=1.2)
+            axes.fill_between(times, low, high, color=CONTACT, alpha=0.25, linewidth=0)
+            axes.plot(times, value, color=CONTACT, linewidth=1.2)
             axes.set_ylabel(label)
             axes.grid()
             axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-3))

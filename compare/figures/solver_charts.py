@@ -19,7 +19,7 @@ from pinnray.comparison.figures.layout import (
     legend_height,
     write_heading,
 )
-from pinnray.comparison.figures.solver_colours import solver_colour
+from pinnray.comparison.figures.solver_colours import solver_look
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.figure import INK, MUTED, NARROW, SMALL, WIDTH, Figure, figure
 
@@ -38,29 +38,27 @@ def draw_losses(comparison: Results, page: float = WIDTH) -> Figure | None:
 
     None without a record.
     """
-    trained = {
-        number: evaluation
-        for number, evaluation in enumerate(comparison.evaluations)
-        if {"epoch", "PDE"} <= evaluation.history.keys()
-    }
+    trained = [each for each in comparison.evaluations if {"epoch", "PDE"} <= each.history.keys()]
     if not trained:
         return None
     units = {"PDE": "MPa", "BC": "mm²", "ASM": "mm²"}
-    terms = [name for name in units if any(name in each.history for each in trained.values())]
-    head = HEAD + legend_height([evaluation.label_at_markers for evaluation in trained.values()], page)
+    terms = [name for name in units if any(name in each.history for each in trained)]
+    head = HEAD + legend_height([evaluation.label_at_markers for evaluation in trained], page)
     height, gap, foot, left = 1.15, 0.15, 0.42, 0.85  # inches
     with figure(head + len(terms) * (height + gap) + foot, page) as drawn:
         write_heading(drawn, "Losses, without their weights")
         for row, term in enumerate(terms):
             axes = axes_at(drawn, (left, head + row * (height + gap), page - left - 0.15, height))
-            for number, evaluation in trained.items():
+            for evaluation in trained:
                 if term in evaluation.history:
                     epochs, losses = evaluation.history["epoch"], evaluation.history[term]
-                    colour, label = solver_colour(number), evaluation.label_at_markers
-                    axes.plot(epochs, losses, color=colour, lw=1, label=label)
+                    (colour, mark), label = solver_look(evaluation.solver), evaluation.label_at_markers
+                    style: dict[str, Any] = {"marker": mark, "ms": 3.6, "markevery": max(len(losses) // 8, 1)}
+                    axes.plot(epochs, losses, color=colour, lw=1, label=label, **style)
                     if wants_log(losses):
                         axes.set_yscale("log")
-            axes.set_ylabel(rf"$\mathcal{{L}}_\mathrm{{{term}}}$, {units[term]}")
+                        axes.yaxis.set_major_formatter("{x:g}")
+            axes.set_ylabel(f"{term} loss, {units[term]}")
             axes.grid()
             if row == 0:
                 legend_above(axes, page)
@@ -98,7 +96,7 @@ def draw_marker_errors(comparison: Results, page: float = WIDTH) -> Figure:
         for row, (evaluation, own) in enumerate(zip(evaluations, scores, strict=True)):
             for column, symbol in enumerate("uv"):
                 axes = axes_at(drawn, (left + column * page / 2, head + title + row * step, width, height))
-                said = _draw_errors(axes, symbol, own, solver_colour(row), span[0])
+                said = _draw_errors(axes, symbol, own, solver_look(evaluation.solver).colour, span[0])
                 _set_scales(axes, observations.visible, span)
                 axes.set_ylabel(rf"$|\Delta {symbol}|$", size=SMALL)
                 beside: dict[str, Any] = {"size": SMALL, "transform": axes.transAxes}

@@ -11,11 +11,12 @@ from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withTickedStroke
 
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.parameters import SYMBOLS
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.figure import BODY, CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, body_figure
+from pinnray.runtime.figure import BODY, COLUMN, CONTACT, INK, MEASURED, SMALL, Figure, body_figure
 
-COLUMN, ROW = 1.2, 0.17
+CELL, ROW = 1.55, 0.17
 """Width and height of a parameter below the section, inches."""
 
 HATCHED = (withTickedStroke(angle=-120, spacing=4, length=1.5),)
@@ -33,21 +34,23 @@ def plot_finger(
         finger: The finger.
         section: Its section in the frame of the picture.
         place: From the finger's frame into that of the picture, points of shape (n, 2), mm.
-        width: Of the figure, inches; the usual one if None.
+        width: Of the figure, inches; a journal's column if None.
     """
-    page = width or WIDTH
+    page = width or COLUMN
     extent = float(np.ptp(section.bounds, axis=0).max())
     contact = finger.section.front_point(finger.contact_abscissa)
     tip, tail = place(np.stack([contact, contact + np.array([0.0, 0.09 * extent])]))
     hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
     shown = _not_tall(np.concatenate([hatched, tip[None], tail[None]]))
-    parameters = [_with_symbol(symbol, value) for _, symbol, value in finger.facts() if symbol]
-    columns = int((page - 0.4) / COLUMN)
+    parameters = [
+        f"{SYMBOLS[symbol].replace('_', ' ')} {value}" for _, symbol, value in finger.facts() if symbol
+    ]
+    columns = int((page - 0.2) / CELL)
     rows = -(-len(parameters) // columns)
     with body_figure(shown, f"Finger “{finger.name}”", foot=ROW * rows, page=page) as (drawn, axes):
         for number, said in enumerate(parameters):
             row, column = divmod(number, columns)
-            x, y = 0.4 + column * COLUMN, ROW * (rows - row - 0.5)
+            x, y = 0.2 + column * CELL, ROW * (rows - row - 0.5)
             drawn.text(x / page, y / drawn.get_figheight(), said, fontsize=SMALL, color=INK, va="center")
         draw_section(axes, section)
         for loop, which in section.named("base"):
@@ -72,12 +75,6 @@ def plot_finger(
             aside, side = (-3, "right") if before else (3, "left")
             axes.annotate(str(number), centre, xytext=(aside, 3), ha=side, **text)
     return drawn
-
-
-def _with_symbol(symbol: str, value: str) -> str:
-    """A parameter of the paper, such as `L_tip`, and its value, with the symbol as mathematics."""
-    letter, _, index = symbol.partition("_")
-    return rf"${letter}_\mathrm{{{index}}}$ = {value}" if index else f"${letter}$ = {value}"
 
 
 def draw_section(axes: Axes, shape: Section) -> None:

@@ -35,7 +35,7 @@ def plot_field(
     # The colour scale holds 99.5 % of the area, because stress has no bound at sharp corners.
     high = float(sizes[order][np.searchsorted(area, 0.995 * area[-1])])
     points, edges = mesh.points + displacement, mesh.boundary_edges
-    with body_figure(np.concatenate([mesh.points, points]), title, foot=0.5) as (drawn, axes):
+    with body_figure(np.concatenate([mesh.points, points]), title, foot=0.56) as (drawn, axes):
         axes.add_collection(LineCollection(list(mesh.points[edges]), colors=MUTED, linewidths=0.5))
         colours = axes.tripcolor(
             Triangulation(points[:, 0], points[:, 1], mesh.triangles),
@@ -46,7 +46,7 @@ def plot_field(
         )
         axes.add_collection(LineCollection(list(points[edges]), colors=INK, linewidths=0.6))
         height = drawn.get_figheight()
-        place = drawn.add_axes((0.2, 0.38 / height, 0.6, 0.09 / height))
+        place = drawn.add_axes((0.2, 0.44 / height, 0.6, 0.09 / height))
         extend = "both" if signed else "max"
         drawn.colorbar(colours, cax=place, orientation="horizontal", label=label, extend=extend)
     return drawn

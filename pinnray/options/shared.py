@@ -264,11 +264,13 @@ class StudyOptions(CheckedModel):
     Attributes:
         processes: Worker processes; default: one per core.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
+        width: Width of the pictures, such as 85mm (a journal's column); default 140mm, with svg or pdf 180mm.
         out: Output folder; default: named after the command and the study, in out.
     """
 
     processes: int | None = None
     pictures: str = ""
+    width: str | None = None
     out: OptionalOutputPath = None
 
     def job(self, study: "S", file: Path, kind: str) -> "StudyJob[S]":
@@ -294,12 +296,22 @@ def comma_list(text: str) -> list[str]:
     return [word for part in text.split(",") if (word := part.strip())]
 
 
-def read_formats(text: str) -> list[str]:
-    """Formats of pictures besides PNG, from their names with commas between them."""
-    from pinnray.comparison.figures import check_formats
+def read_formats(options: StudyOptions) -> tuple[list[str], float]:
+    """Formats of the pictures besides PNG, and their width, inches."""
+    from pinnray.comparison.figures import check_formats, page_width
 
-    check_formats(formats := comma_list(text))
-    return formats
+    check_formats(formats := comma_list(options.pictures))
+    return formats, page_width(read_millimetres(options.width), formats)
+
+
+def read_millimetres(text: str | None) -> float | None:
+    """A width in mm from a number with or without its unit; None stays None."""
+    if text is None:
+        return None
+    given = re.fullmatch(r"(\d+(?:\.\d+)?) *(mm|cm|in)?", text.strip())
+    if given is None:
+        raise UserError(f"--width {text}: give a number in mm, cm or in, such as 85mm")
+    return float(given[1]) * {"cm": 10.0, "in": 25.4}.get(given[2], 1.0)
 
 
 def read_processes(processes: int | None) -> int:
@@ -317,11 +329,4 @@ def existing_table(path: Path | None) -> Path | None:
             f"--measurements {path}: this command takes a CSV file of displacements, and no film; "
             "`pinnray track` makes one from a film"
         )
-    return existing(path)
-
-
-def existing(path: Path | None) -> Path | None:
-    """The path, if it is None or a file; else a `UserError`."""
-    if path is not None and not path.is_file():
-        raise UserError(f"there is no file {path}")
     return path

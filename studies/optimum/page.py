@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pinnray.runtime.atomic import write_text
+from pinnray.runtime.figure import WIDTH
 from pinnray.runtime.tables import TextTable
 from pinnray.solvers.finger_figures import QUANTITIES, heading
 from pinnray.solvers.solution import Solution
@@ -42,6 +43,7 @@ def write_front(
     folder: Path,
     record: dict[str, Any],
     formats: Collection[str] = (),
+    page: float = WIDTH,
 ) -> tuple[list[Path], list[Path]]:
     """Write the table, design files, pictures and page of a front.
 
@@ -51,6 +53,7 @@ def write_front(
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
         formats: Of the pictures besides PNG.
+        page: Width of the pictures, inches.
 
     Returns:
         Page, table and pictures, and a design file for each run on the front.
@@ -65,9 +68,12 @@ def write_front(
     shown = spread(optimum)
     solutions = {run: _solved(tasks[run]) for run in shown}
     drawn = {
-        "front": (draw_front(optimum, shown), "Every run, with the fingers of the table; dashed: limits."),
+        "front": (
+            draw_front(optimum, shown, page),
+            "Every run, with the fingers of the table; dashed: limits.",
+        ),
         "fingers": (
-            draw_front_fingers(optimum, solutions),
+            draw_front_fingers(optimum, solutions, page),
             "Fingers of the table at rest and under the load, by their numbers."
             f"{CIRCLE if any(each.problem.load.radius for each in solutions.values()) else ''}",
         ),

@@ -7,35 +7,37 @@ from matplotlib.patches import Circle
 
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.canvas import Extent
-from pinnray.comparison.figures.layout import HALO, axes_at, write_heading
+from pinnray.comparison.figures.layout import HALO, axes_at, wrapped, write_heading
+from pinnray.comparison.figures.solver_colours import solver_look
 from pinnray.geometry.mesh.boundary import edge_paths
-from pinnray.runtime.figure import CONTACT, MUTED, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.figure import CONTACT, MUTED, NARROW, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.problem import Problem, contact_ends, front_points
 from pinnray.solvers.solution import Solution
 from pinnray.studies.optimum.search import Optimum, is_allowed
 from pinnray.studies.sweep.measurement import Measurement
 
-BLUE = "#0072b2"
-
 RUN = "run"
 """Stands for a quantity where the number of a run is meant."""
 
 
-def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
+def draw_front(optimum: Optimum, shown: Sequence[int], page: float = WIDTH) -> Figure:
     """Draw every run over two quantities; the best are filled, the shown ones numbered, limits are dashed.
 
-    The first two objectives; or one over the first quantity with a limit, or over the runs.
+    The first two objectives; or one over the first quantity with a limit, or over the runs. The page has a
+    width in inches.
     """
     question = optimum.study
     limited = (name for name in question.constraints if name not in question.objectives)
     across = [next(limited, RUN)] if question.single else []
     first, second, *third = [*across, *question.objectives]
-    with figure(3.9) as drawn:
-        rest = f"the third objective, {third[0]}, is not drawn" if third else "every point is a run"
-        note = f"{len(optimum.measurements)} runs of {question.solver}; {rest}"
-        write_heading(drawn, f"{question.heading}: {question.wanted}", note)
-        axes = axes_at(drawn, (0.7, 0.55, WIDTH - 0.9, 2.75))
+    rest = f"the third objective, {third[0]}, is not drawn" if third else "every point is a run"
+    count = f"{len(optimum.measurements)} runs of {question.solver}; {rest}"
+    note = "\n".join(wrapped(text, page) for text in (f"Wanted: {question.wanted}", count))
+    head = 0.35 + 0.15 * (note.count("\n") + 1)
+    with figure(head + 3.35, page) as drawn:
+        write_heading(drawn, question.heading, note)
+        axes = axes_at(drawn, (0.7, head, page - 0.9, 2.75))
         others = [each for each in optimum.measurements if each.number not in optimum.front and each.values]
         allowed = np.array([is_allowed(optimum.study, each) for each in others], dtype=bool)
         points = np.array([_place(each, first, second) for each in others]).reshape(-1, 2)
@@ -44,8 +46,9 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
             axes.plot(*points[~allowed].T, "x", ms=3.5, c=MUTED, label="impossible or against a constraint")
         best = np.array([_place(optimum.measurements[run], first, second) for run in optimum.front])
         line = "-" if len(question.objectives) == 2 else "none"
-        axes.plot(*best.T, color=BLUE, lw=0.8, ls=line)
-        axes.scatter(best[:, 0], best[:, 1], s=18, color=BLUE, zorder=3, label=question.heading.lower())
+        colour = solver_look(question.solver).colour
+        axes.plot(*best.T, color=colour, lw=0.8, ls=line)
+        axes.scatter(best[:, 0], best[:, 1], s=18, color=colour, zorder=3, label=question.heading.lower())
         for name, limit in ((first, axes.axvline), (second, axes.axhline)):
             for end in question.constraints[name].ends if name in question.constraints else ():
                 limit(end, color=MUTED, lw=0.8, ls="--")
@@ -64,12 +67,13 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
     return drawn
 
 
-def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figure:
+def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution], page: float = WIDTH) -> Figure:
     """Draw fingers on the front, at rest and deformed, to one scale.
 
     Args:
         optimum: The search.
         solutions: Solutions of the runs to draw, by their numbers.
+        page: Width of the figure, inches.
     """
     meshes = {run: solution.problem.mesh for run, solution in solutions.items()}
     moved = {run: mesh.points + solutions[run].displacement(mesh.points) for run, mesh in meshes.items()}
@@ -80,10 +84,12 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
         if each
     ]
     extent = Extent.around(*(mesh.points for mesh in meshes.values()), *moved.values(), *halves, margin=1)
-    columns, label = 2, 0.42
-    width = (WIDTH - 0.3) / columns - 0.1
+    columns = 1 if page < NARROW else 2
+    width = (page - 0.3) / columns - 0.1
+    titles = {run: wrapped(f"{optimum.place(run)}:  {_said(optimum, run)}", width) for run in meshes}
+    label = 0.27 + 0.15 * (1 + max(text.count("\n") for text in titles.values()))
     height = width * extent.height / extent.width
-    with figure(0.55 + -(-len(meshes) // columns) * (height + label)) as drawn:
+    with figure(0.55 + -(-len(meshes) // columns) * (height + label), page) as drawn:
         write_heading(
             drawn,
             optimum.study.heading,
@@ -99,9 +105,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
             body.draw_outline(axes, paths, moved[run], width=0.8)
             if circle := ends[run]:
                 axes.add_patch(circle)
-            values = optimum.measurements[run].values
-            text = ", ".join(f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.names[:3])
-            axes.set_title(f"{optimum.place(run)}:  {text}", size=SMALL, loc="left")
+            axes.set_title(titles[run], size=SMALL, loc="left")
     return drawn
 
 
@@ -112,6 +116,13 @@ def cylinder_at_end(problem: Problem) -> Circle | None:
     middle = front_points(problem.mesh, np.array([np.mean(contact_ends(problem))]))[0]
     centre = middle + problem.load.values + np.array([0.0, problem.load.radius])
     return Circle((centre[0], centre[1]), problem.load.radius, fill=False, color=CONTACT, lw=0.8)
+
+
+def _said(optimum: Optimum, run: int) -> str:
+    """The first quantities of the question, of a run."""
+    values = optimum.measurements[run].values
+    names = optimum.study.names[:3]
+    return ", ".join(f"{name.replace('_', ' ')} {values[name]:.3g} {_unit(name)}" for name in names)
 
 
 def _place(run: Measurement, first: str, second: str) -> tuple[float, float]:

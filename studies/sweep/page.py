@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pinnray.runtime.figure import Figure
+from pinnray.runtime.figure import WIDTH, Figure
 from pinnray.runtime.html import write_html
 from pinnray.runtime.tables import TextTable
 from pinnray.studies.sweep.pictures import SHOWN, draw_maps, draw_pairs
@@ -65,7 +65,7 @@ def write_page(
 
 
 def write_sweep(
-    sweep: Sweep, folder: Path, record: Mapping[str, Any], formats: Collection[str] = ()
+    sweep: Sweep, folder: Path, record: Mapping[str, Any], formats: Collection[str] = (), page: float = WIDTH
 ) -> list[Path]:
     """Write the table, the page and the pictures of a sweep, and return the paths.
 
@@ -74,16 +74,23 @@ def write_sweep(
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
         formats: Of the pictures besides PNG.
+        page: Width of the pictures, inches.
     """
     files = write_frame(sample_table(sweep), folder / "samples")
     drawn: dict[str, tuple[Figure, str]] = {}
     if sweep.study.sampling == "grid" and len(sweep.study.varied) == 2:
         trained = "rel_l2_displacement" in known_quantities(sweep)
         names = ("rel_l2_displacement", "boundary_violation") if trained else SHOWN[:2]
-        drawn["map"] = (draw_maps(sweep, names), "Quantities over both parameters; framed: the least value.")
+        drawn["map"] = (
+            draw_maps(sweep, names, page),
+            "Quantities over both parameters; framed: the least value.",
+        )
     tables = [quantity_grid(sweep), failure_grid(sweep)]
     if len(sweep.good) > 1 and not sweep.study.settings_alone:
-        drawn["pairs"] = (draw_pairs(sweep), "Quantities over the varied parameters, a dot for each finger.")
+        drawn["pairs"] = (
+            draw_pairs(sweep, page),
+            "Quantities over the varied parameters, a dot for each finger.",
+        )
         tables.append(correlation_grid(sweep, SHOWN))
     note = f"{FILES}. Started {record['started']}."
     title = f"Sweep {sweep.study.name}"

@@ -1,12 +1,13 @@
 """The picture of a calibration."""
 
 import numpy as np
+import pytest
 
 from pinnray.film.calibration_report import draw_calibration
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.camera_calibration import Calibration
 from pinnray.vision.calibration.chessboard import Board
-from tests.compare.figures.drawn_pages import page_of
+from tests.compare.figures.drawn_pages import page_of, printed
 from tests.vision.calibration.chessboards import distorted
 
 CAMERA = Camera(320, 240, 250.0, 250.0, 160.0, 120.0, distortion=(-0.3, 0.1, 0.0, 0.0, 0.0))
@@ -23,4 +24,5 @@ def test_the_picture_tells_the_errors_and_leaves_nothing_outside():
     page = page_of(drawn)
     assert "held out 0.234 px" in page.text
     assert page.cut_off() == page.overlaps() == []
+    assert printed(drawn) == (pytest.approx(85, abs=0.01), 8.1)
     assert len(drawn._repr_png_()) > 10_000

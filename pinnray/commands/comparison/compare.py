@@ -27,7 +27,7 @@ from pinnray.options.shared import (
     PhysicsOptions,
     SolverOptions,
     comma_list,
-    existing,
+    read_millimetres,
 )
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import NOT_CONVERGED, say
@@ -82,8 +82,7 @@ def command(
         out: Output folder; default out/DESIGN, or out/DESIGN-MEASUREMENTS with the name of their file, unless
             that holds the finished run of another job.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
-        width: Width of the pictures, such as 85mm (a journal's column) or 180mm (its page), whose type has 8
-            to 9 points; default 140mm.
+        width: Width of the pictures, such as 85mm (a journal's column); default 140mm, with svg or pdf 180mm.
         resume: Reuse solutions that an earlier run finished.
         json_: Print metrics.json and nothing else.
     """
@@ -129,7 +128,7 @@ def command(
             out=folder,
             resume=resume,
             picture_formats=comma_list(pictures),
-            picture_width=None if width is None else _millimetres(width),
+            picture_width=read_millimetres(width),
             options=given,
         )
         try:
@@ -171,14 +170,6 @@ def _own_folder(name: str, measurements: str | None) -> Path:
     return Path("out") / f"{name}-{source or 'measurements'}"
 
 
-def _millimetres(text: str) -> float:
-    """A width in mm from a number with or without its unit."""
-    given = re.fullmatch(r"(\d+(?:\.\d+)?) *(mm|cm|in)?", text.strip())
-    if given is None:
-        raise UserError(f"--width {text}: give a number in mm, cm or in, such as 85mm")
-    return float(given[1]) * {"cm": 10.0, "in": 25.4}.get(given[2], 1.0)
-
-
 def _measurements(source: str | None, options: FilmSettings) -> "Path | MeasuredFilm | None":
     """A CSV file by its suffix, else a film."""
     if source is None or Path(source).suffix.lower() != ".csv":
@@ -187,4 +178,4 @@ def _measurements(source: str | None, options: FilmSettings) -> "Path | Measured
         from pinnray.film.measured_film import MeasuredFilm
 
         return None if source is None else MeasuredFilm(source=source, **options.model_dump())
-    return existing(Path(source))
+    return Path(source)

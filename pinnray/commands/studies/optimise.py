@@ -27,13 +27,13 @@ def command(
     from pinnray.studies.optimum.question import Question
     from pinnray.studies.optimum.search import search_front
 
-    formats = read_formats(options.pictures)
+    formats, page = read_formats(options)
     read = Question.load(question)
     job = options.job(read, question, "optimum")
     with going_on_from(job.out), Stages() as stages:
         found = search_front(job, stages)
         with stages.stage("pictures"):
-            paths, designs = write_front(found, job, job.out, stages.record(), formats)
+            paths, designs = write_front(found, job, job.out, stages.record(), formats, page)
     columns = [0, *range(2, 2 + len(read.names))]  # the table in the file is too wide for a terminal
     shown = text_table(read.heading, front_table(found).iloc[:, columns])
     Console().print(terminal_table(shown.title, shown.headings, shown.rows))

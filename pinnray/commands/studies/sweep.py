@@ -28,13 +28,13 @@ def command(
     from pinnray.studies.sweep.sweep import run_sweep
     from pinnray.studies.sweep.tables import failure_grid, quantity_grid
 
-    formats = read_formats(options.pictures)
+    formats, page = read_formats(options)
     read = Study.load(study)
     job = options.job(read, study, "sweep")
     with going_on_from(job.out), Stages() as stages:
         done = run_sweep(job, stages)
         with stages.stage("pictures"):
-            written = write_sweep(done, job.out, stages.record(), formats)
+            written = write_sweep(done, job.out, stages.record(), formats, page)
     quantities, failures = quantity_grid(done), failure_grid(done)
     for grid in (quantities, failures):
         if grid.rows:

@@ -1,6 +1,10 @@
 """The words of a matplotlib figure and their places."""
 
 import itertools
+import re
+import zlib
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import pytest
@@ -55,3 +59,15 @@ def page_of(figure: Figure) -> Page:
         patch.setattr(Text, "draw", noted)
         figure.canvas.draw()
     return Page(figure, words, min(sizes), max(sizes))
+
+
+def printed(figure: Figure) -> tuple[float, float]:
+    """Width of a figure as PDF, mm, and the size of its smallest type, indices and exponents too, points."""
+    with TemporaryDirectory() as folder:
+        content = figure.save(Path(folder) / "figure.pdf").read_bytes()
+    box = re.search(rb"/MediaBox \[ *0 0 ([\d.]+) ", content)
+    streams = re.findall(rb"FlateDecode.*?>>\s*stream\r?\n(.*?)\r?\nendstream", content, re.DOTALL)
+    written = b"".join(zlib.decompressobj().decompress(stream) for stream in streams)
+    sizes = [float(size) for size in re.findall(rb"/F\d+ ([\d.]+) Tf", written)]
+    assert box is not None
+    return float(box[1]) * 25.4 / 72, min(sizes)

@@ -62,7 +62,7 @@ def test_no_type_runs_into_other_type_or_leaves_the_page(pages):
 def test_the_drawing_of_a_design_has_the_papers_parameters(comparison, pages):
     facts = [value for _, symbol, value in comparison.design.facts() if symbol]
     assert len(facts) == (9 if comparison.design.name == "csiro" else 0)
-    assert [value for value in facts if f"= {value}" not in pages["design"].text] == []
+    assert [value for value in facts if f" {value}" not in pages["design"].text] == []
     assert all(str(number + 1) in pages["design"].text for number in range(len(comparison.design.markers)))
 
 
