@@ -281,7 +281,7 @@ def _who(better: Sequence[str], given: Collection[str]) -> str:
     if not better:
         return "no solver that was given markers is"
     if len(better) == len(given):
-        return f"all {len(given)} solvers that were given markers are"
+        return f"{_all(len(given))} solvers that were given markers are"
     return f"only {_listed(better)} {'is' if len(better) == 1 else 'are'}"
 
 
@@ -311,7 +311,7 @@ def _convergence(scores: Scores) -> RunAnswer:
         sentences += [f"{name} {what}: {message.rstrip('. ')}." for name, message in reasons.items()]
     bad = [*faulty, *scores.failed]
     count = len(scores.solvers) + len(scores.failed)
-    met = "the solver met its" if count == 1 else f"all {count} solvers met their"
+    met = "the solver met its" if count == 1 else f"{_all(count)} solvers met their"
     verdict = f"{len(bad)} of {count} solvers: {_listed(bad)}." if bad else f"Nothing: {met} own criterion."
     own = scores[scores.reference].uncertainty
     if own and not any(each.family == "neural network" for each in scores.solvers.values()):
@@ -320,6 +320,10 @@ def _convergence(scores: Scores) -> RunAnswer:
             f"{share(own.rel_l2_displacement)} in displacement and {share(own.rel_l2_von_mises)} in stress."
         )
     return RunAnswer("What is not converged?", verdict, sentences)
+
+
+def _all(count: int) -> str:
+    return "both" if count == 2 else f"all {count}"
 
 
 def _listed(names: Sequence[str]) -> str:
