@@ -140,7 +140,7 @@ def draw_growth() -> Figure:
     with figure(2.6, PAGE) as drawn:
         write_heading(drawn, "Cost over the number of unknowns", "default finger, one core")
         for side, (column, label) in enumerate({"seconds": "CPU time, s", "gigabytes": "memory, GB"}.items()):
-            axes = axes_at(drawn, (0.7 + side * PAGE / 2, 0.5, PAGE / 2 - 0.85, 1.6))
+            axes = axes_at(drawn, (0.7 + side * PAGE / 2, 0.5, PAGE / 2 - 1.0, 1.6))
             for solver, rows in table.groupby("solver"):
                 colour, mark = solver_look(str(solver))
                 x, y = rows["unknowns"].to_numpy(), rows[column].to_numpy()
