@@ -28,13 +28,6 @@ BENCHMARKS = {
 }
 """Names, and functions that return a table; the modules' docstrings have descriptions and times."""
 
-SETTLED = (
-    *("recipes", "deepxde", "epochs", "sizes", "inference", "kernels", "meshing", "predict", "paper"),
-    *("million", "readings", "plane_strain", "localisation", "dots", "sweep", "optimise", "live", "growth"),
-    "posterior",
-)
-"""Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
-
 SHORT = ("fem", "pinn")
 ROWED = ("stress", "reliability")
 
@@ -56,12 +49,9 @@ def main() -> int:
     parser.add_argument("--rows", default="", help=f"words in the names of the rows of {' and '.join(ROWED)}")
     arguments = parser.parse_args()
     for name in arguments.names:
-        if name in SETTLED:
-            parser.error(
-                f"{name} is settled: docs/evidence/settled.md has its figures and the commit that ran it"
-            )
         if name not in BENCHMARKS:
-            parser.error(f"no benchmark {name!r}; there are {', '.join(BENCHMARKS)}")
+            names = ", ".join(BENCHMARKS)
+            parser.error(f"no benchmark {name!r}; there are {names}; docs/evidence/tried.md has former ones")
     for name in arguments.names or SHORT:
         options = {"rows": arguments.rows} if arguments.rows and name in ROWED else {}
         module, _, function = BENCHMARKS[name].partition(":")

@@ -7,11 +7,17 @@ import tomllib
 from importlib.util import find_spec
 from pathlib import Path
 
+from docutils import nodes
+from latex2mathml.converter import convert
 from pydantic import BaseModel
 from pygments.lexers.special import TextLexer
+from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.directives.code import CodeBlock
 from sphinx.ext.napoleon.docstring import GoogleDocstring
+from sphinx.writers.html5 import HTML5Translator
+
+import pinnray as pr
 
 project = "pinn-ray"
 version = release = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text("utf-8"))[
@@ -27,20 +33,20 @@ NOTEBOOKS_RUN = find_spec("myst_nb") is not None and os.environ.get("NOTEBOOKS")
 extensions = [
     "myst_nb" if NOTEBOOKS_RUN else "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
-    "sphinx.ext.viewcode",
     "cyclopts.sphinx_ext",
 ]
 exclude_patterns = ["examples"]
 suppress_warnings = ["config.cache"]
 
 myst_enable_extensions = ["colon_fence"]
+myst_fence_as_directive = ["math"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 
+default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 autodoc_typehints_format = "short"
@@ -64,16 +70,18 @@ nitpick_ignore_regex = [
     ("py:.*", r"pinnray\.solvers\.fem\.adaptive_refinement\..*"),
 ]
 
+html_math_renderer = "mathml"  # which browsers draw without a script
 html_theme = "pydata_sphinx_theme"
 html_title = f"pinn-ray {version}"
 html_logo = html_favicon = "static/logo.svg"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = html_show_sourcelink = False
-html_sidebars = {page: [] for page in ("tutorial", "gallery", "faq", "changelog")}  # no pages below them
+html_sidebars = {page: [] for page in ("tutorial", "questions", "gallery")}  # no pages below them
 html_theme_options = {
     "navbar_align": "left",
-    "header_links_before_dropdown": 7,
+    "header_links_before_dropdown": 9,
+    "navbar_persistent": ["search-button"],
     "show_prev_next": True,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
@@ -111,6 +119,14 @@ def shorten(_app: Sphinx, _what: str, _name: str, value: object, _options: objec
 def is_hidden(_app: Sphinx, _what: str, name: str, _value: object, skipped: bool, _options: object) -> bool:
     """Whether a name is left out: constants are for readers of the code."""
     return skipped or name.isupper()
+
+
+def name_public(_app: Sphinx, doctree: nodes.document) -> None:
+    """Write `pr.` before the names that `import pinnray as pr` has."""
+    public = {f"{value.__module__}.{name}" for name in pr.__all__ if callable(value := getattr(pr, name))}
+    for signature in doctree.findall(addnodes.desc_signature):
+        if public & set(signature["ids"]):
+            signature.insert(0, addnodes.desc_addname("pr.", "pr."))
 
 
 NOT_IN_NOTEBOOKS = r"^:::.*\n?|^\[?!\[.*\n?|\[(.*?)\]\([^)]*\)"
@@ -159,13 +175,23 @@ def offer_notebook(app: Sphinx, page: str, _template: str, context: dict[str, st
     context["body"] = context["body"].replace("</h1>", f"</h1>{link}", 1)
 
 
+def formula(translator: HTML5Translator, node: nodes.math | nodes.math_block) -> None:
+    """Write a formula as MathML."""
+    display = "block" if isinstance(node, nodes.math_block) else "inline"
+    mathml = convert(node.astext(), display=display)
+    translator.body.append(f'<div class="formula">{mathml}</div>' if display == "block" else mathml)
+    raise nodes.SkipNode
+
+
 def setup(app: Sphinx) -> None:
     """Show the code of notebooks where the packages that run them are missing."""
     if not NOTEBOOKS_RUN:
         app.add_directive("code-cell", CodeBlock)
     app.add_lexer("csv", TextLexer)
+    app.add_html_math_renderer("mathml", (formula, None), (formula, None))
     app.connect("autodoc-process-signature", shorten)
     app.connect("autodoc-skip-member", is_hidden)
+    app.connect("doctree-read", name_public)
     app.connect("html-page-context", offer_notebook)
     # The sentence below a constant may have a colon; what stands before it is no type.
     GoogleDocstring._parse_attribute_docstring = GoogleDocstring._consume_to_end

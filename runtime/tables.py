@@ -264,7 +264,7 @@ def terminal_table(
     `narrow` sets the columns as close as they can stand.
     """
     table = Table(
-        title=title or None,
+        title=shown(title) or None,
         caption=caption or None,
         box=SIMPLE_HEAD,
         title_justify="left",
@@ -273,7 +273,7 @@ def terminal_table(
         pad_edge=not narrow,
     )
     for heading in headings:
-        table.add_column(heading, justify="left" if heading in left else "right", no_wrap=True)
+        table.add_column(shown(heading), justify="left" if heading in left else "right", no_wrap=True)
     for row in rows:
         table.add_row(*map(shown, row))
     return table

@@ -2,8 +2,12 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
+from html import unescape
+from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -13,6 +17,19 @@ pytestmark = pytest.mark.usefixtures("few_elements", "discs_fitted_once")
 
 CELL = "{code-cell} python"
 NOTEBOOKS = sorted({block.page for block in ALL_BLOCKS if block.language == CELL})
+
+
+def dead_links(site: Path) -> list[tuple[str, str]]:
+    """Links of a built site to places in its pages that are not there, each with its page."""
+    texts = {path: path.read_text() for path in site.rglob("*.html") if "_static" not in path.parts}
+    places = {path: {*re.findall(r'\b(?:id|name)="([^"]+)"', text)} for path, text in texts.items()}
+    return [
+        (str(page), link)
+        for page, text in texts.items()
+        for link in map(unescape, re.findall(r'href="([^":]*#[^":]+)"', text))
+        if (other := (page.parent / link.split("#")[0]).resolve() if link[0] != "#" else page) in places
+        and unquote(link.split("#")[1]) not in places[other]
+    ]
 
 
 @pytest.mark.release
@@ -28,6 +45,8 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert (built.returncode, built.stderr) == (0, "")
     pages = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md")}
     assert {page for page in pages if not (tmp_path / "html" / page).is_file()} == set()
+    assert dead_links(tmp_path / "html") == []
+    assert "<math" in (tmp_path / "html" / "theory" / "elasticity.html").read_text()
     for page in [DOCS / "gallery.md", *NOTEBOOKS]:
         file = (tmp_path / "html" / page.relative_to(DOCS)).with_suffix(".ipynb")
         code = [cell for cell in json.loads(file.read_text())["cells"] if cell["cell_type"] == "code"]

@@ -9,13 +9,15 @@ from typing import Literal
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse.csgraph import minimum_spanning_tree
+from scipy.spatial.distance import pdist, squareform
 
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import HAND_HELD, Homography, nearest_similarity
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import read_table
-from pinnray.vision.point_order import SURE, likeliest_order, likelihoods, order_text
+from pinnray.vision.point_order import SURE, astray, likeliest_order, likelihoods, order_text
 
 FEWEST = 3
 """Points that tell a picture's mirror image from itself."""
@@ -29,6 +31,8 @@ OTHER_UNIT = 1.25
 """Ratio of the sizes of both pictures' points beyond which they are in two units or scales."""
 FARTHEST = 0.5
 """Movement of a point, over the points' extent, beyond which the pictures may be turned or cut."""
+STRETCHED = 0.04
+"""Change of the distances between neighbouring points that is another scale; walls stretch by less."""
 MOST_CHOICES, CLEAR = 5000, 5.0
 """Number of ways to leave out points of the longer list up to which they are tried, and lead in logarithmic
 likelihood from which on one is the right one."""
@@ -158,9 +162,8 @@ def clicked_points(
     here, there, given = scales[0] * here, scales[1] * there, scales[1] * given
     motion: Homography = nearest_similarity(here, own, rigid=True)
     here, there, given = motion.moved(here), motion.moved(there), motion.moved(given)
-    if (found.order != np.arange(len(here))).any():
+    if (mixed := found.order != np.arange(len(here))).any():
         text = order_text(found.order, names)
-        mixed = found.order != np.arange(len(here))
         far, least = (
             float(np.linalg.norm((each - here)[mixed], axis=1).max()) for each in (given, given[found.order])
         )
@@ -171,6 +174,8 @@ def clicked_points(
         )
     if _misfit(there, own) < _misfit(here, own) / UNKNOWN_BY - ROUNDING * float(np.ptp(own)):
         remarks.append("the pressed points are nearer to the drawing than those at rest: exchanged?")
+    if (order == found.order).all():
+        remarks += _doubts(own, here, there, names)
     if len(absent := np.setdiff1d(np.arange(len(markers)), owner)):
         remarks.append(f"not visible, for want of a point: marker {_listed(absent + 1)}")
     misfit = float(np.sqrt(((here - own) ** 2).sum() / max(2 * len(own) - 4, 1)))
@@ -270,6 +275,37 @@ def _size(places: FloatArray) -> float:
     if size <= ROUNDING * float(np.nanmax(np.abs(places))):
         raise UserError("all points of a picture are at one place")
     return size
+
+
+def _doubts(own: FloatArray, here: FloatArray, there: FloatArray, names: list[str]) -> list[str]:
+    """Remarks on a picture at another scale, and on a point that goes astray; places in mm, shape (m, 2)."""
+    remarks = []
+    for less, more, where in (
+        (own, here, "at rest than on the drawing"),
+        (here, there, "pressed than at rest"),
+    ):
+        stretch, deviation = _stretch(less, more)
+        if abs(stretch) > max(STRETCHED, 3 * deviation):
+            way = "farther apart" if stretch > 0 else "closer together"
+            remarks.append(
+                f"neighbouring points lie {abs(stretch):.1%} {way} {where}, more than walls stretch: see the "
+                "scale of each picture"
+            )
+    if (alone := astray(here, there)) is not None:
+        remarks.append(f"point {names[alone]} moves unlike the points around it: see both of its clicks")
+    return remarks
+
+
+def _stretch(less: FloatArray, more: FloatArray) -> tuple[float, float]:
+    """Median relative change of the distances between neighbours in `less`, and its standard deviation.
+
+    Neighbours are those of the shortest tree that joins all points: they mostly lie along one wall.
+    """
+    tree = minimum_spanning_tree(squareform(pdist(less))).tocoo()
+    changes = np.linalg.norm(more[tree.row] - more[tree.col], axis=1) / tree.data - 1
+    median = float(np.median(changes))
+    spread = 1.4826 * float(np.median(np.abs(changes - median)))
+    return median, spread * float(np.sqrt(np.pi / 2 / len(changes)))
 
 
 def _listed(names: Sequence[float] | FloatArray | IntArray) -> str:

@@ -21,6 +21,8 @@ SIZES, ERRORS = (0.003, 0.01, 0.03, 0.1, 0.2), (3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.
 """Standard deviations of the field and of the errors."""
 SURE = 10.0
 """Gain in logarithmic likelihood from which on another order counts as the right one."""
+ODD = 3.0
+"""Lead in logarithmic likelihood from which on one point counts as astray."""
 GAINED = 1e-6
 """Smallest gain of an exchange, relative, above what rounding makes."""
 MOST = 60
@@ -68,6 +70,25 @@ def likelihoods(first: FloatArray, seconds: FloatArray) -> FloatArray:
     """Logarithmic likelihoods of several second pictures, shape (n, m, 2), of points, shape (m, 2); (n,)."""
     extent = float(np.ptp(first, axis=0).max())
     return _Field((first - first.mean(axis=0)) / extent).likelihoods((seconds - first) / extent)
+
+
+def astray(points: FloatArray, shown: FloatArray) -> int | None:
+    """Number of the one point that `shown` has where no smooth field moves it; None if there is none.
+
+    Compared are the field with one point left out, which may be anywhere in the square of the points' extent,
+    and that of all. Arguments as of `likeliest_order`.
+    """
+    extent, count = float(np.ptp(points, axis=0).max()), len(points)
+    if not 3 < count <= MOST or extent == 0:
+        return None
+    places, moved = points / extent - points.mean(axis=0) / extent, (shown - points)[None] / extent
+    together = _Field(places).likelihoods(moved)[0]
+    without = [
+        _Field(np.delete(places, each, axis=0)).likelihoods(np.delete(moved, each, axis=1))[0]
+        for each in range(count)
+    ]
+    lead = max(without) - together + np.log(2 * np.pi / count)  # likelihoods leave out 2 pi
+    return int(np.argmax(without)) if lead > ODD else None
 
 
 def order_text(order: IntArray, names: Sequence[str]) -> str:

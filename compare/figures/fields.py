@@ -101,7 +101,8 @@ def drawn_solvers(
 ) -> list[Evaluation]:
     """The fields that a picture has room for: what they are compared with, the reference, then the others.
 
-    Those that converged come before those that did not, and `solvers` are the chosen ones, all if empty.
+    Those that converged come before those that did not. `solvers` are the chosen ones; if empty, all but
+    those of `near_pairs`.
 
     Raises:
         UserError: If one of them is no solver of the comparison.
@@ -114,11 +115,39 @@ def drawn_solvers(
     columns, width = _columns(comparison, page)
     extent = body.field_extent(comparison.mesh, width)
     panels = int((TALLEST - HEAD - FOOT) / (PANEL_TITLE + width * extent.height / extent.width)) * columns
+    if not solvers:
+        near = near_pairs(comparison)
+        known = [each for each in known if each.solver not in near]
     chosen = fitting(
         known, comparison.reference, (panels - 1) // 2 if columns == 1 else panels // 2 - 1, solvers
     )
     chosen.sort(key=lambda each: (each.solver != comparison.reference.solver, not each.converged))
     return [base, *chosen]
+
+
+NEAR = 0.01
+"""Relative difference of two displacements below which one of them is drawn for both."""
+
+
+def near_pairs(comparison: Results) -> dict[str, tuple[str, float]]:
+    """Solvers whose displacement is near that of one before them, which is drawn, and how near, relative.
+
+    One that found the load is drawn in any case.
+    """
+    drawn: list[Evaluation] = [comparison.reference]
+    near = {}
+    for each in comparison.evaluations:
+        pairs = ((other.solver, _apart(each, other)) for other in drawn)
+        found = next((pair for pair in pairs if pair[1] < NEAR), None)
+        if found and each is not comparison.reference and each.identified is None:
+            near[each.solver] = found
+        else:
+            drawn.append(each)
+    return near
+
+
+def _apart(one: Evaluation, other: Evaluation) -> float:
+    return FieldDifference.of(one.displacement, other.displacement, other.weights).rel_l2
 
 
 def draw_field(
@@ -159,7 +188,7 @@ def draw_field(
             body.panel(axes := next_axes(), canvas, mesh, scale.paint(means), name, note)
             if evaluation is not reference:
                 own = difference_scale(quantity, mesh, evaluation, reference)
-                distance = percent(FieldDifference.of(values, base, reference.weights).rel_l2)
+                distance = percent(FieldDifference.of(values, base, reference.weights).rel_l2, 2)
                 title = f"minus {reference.solver}, ±{significant(own.high, 2)} {quantity.unit}"
                 colours = own.paint(evaluation.per_triangle(values - base))
                 body.panel(

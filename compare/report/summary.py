@@ -3,16 +3,14 @@
 A question that they cannot answer is not asked.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from math import hypot, isfinite, nan
 from typing import NamedTuple
 
 from pinnray.comparison.evaluation.scores import FigureScores, Scores, SolverScores
-from pinnray.runtime.tables import NONE, TextTable, number, percent
+from pinnray.comparison.report.numbers import at_markers, error, share
+from pinnray.runtime.tables import NONE, TextTable, number
 from pinnray.solvers.finger_figures import break_answer
-
-TRUTH_FIELDS = ("displacement", "von Mises stress", "force")
-"""Quantities that are compared with the simulated finger, in the order of `_to_truth`."""
 
 
 class RunAnswer(NamedTuple):
@@ -38,89 +36,111 @@ def _warnings(scores: Scores) -> RunAnswer | None:
 
 
 FIGURES = (
-    ("force_N", "force", "N"),
-    ("tangential_force_N", "tangential force, positive toward the tip", "N"),
-    ("force_50_N", "force at half of the stroke", "N"),
-    ("tip_u_mm", "tip, along the finger", "mm"),
-    ("tip_v_mm", "tip, toward the indenter", "mm"),
-    ("wrap_deg", "wrap of the front face", "deg"),
-    ("contact_angle_deg", "angle of the cylinder that is touched", "deg"),
-    ("contact_length_mm", "length of the contact", "mm"),
-    ("lift_kg", "mass that two such fingers hold **", "kg"),
-    ("compliance_across_mm_per_N", "compliance across, at rest", "mm/N"),
-    ("compliance_along_mm_per_N", "compliance along, at rest", "mm/N"),
-    ("von_mises_MPa", "largest von Mises stress *", "MPa"),
-    ("principal_strain", "largest principal strain *", ""),
-    ("peak_strain", "largest principal strain, corners included", ""),
-    ("peak_radius_mm", "radius of the corner there, 0 if sharp", "mm"),
-    ("strain_over_break", "that over the material's strain at break", ""),
-    ("strain_energy_mJ", "strain energy", "mJ"),
-    ("mass_g", "mass", "g"),
-    ("thinnest_wall_mm", "thinnest wall", "mm"),
+    ("force_N", "force, N"),
+    ("tangential_force_N", "tangential force, N"),
+    ("lift_kg", "mass that two such fingers hold *, kg"),
+    ("tip_u_mm", "tip, along the finger, mm"),
+    ("tip_v_mm", "tip, toward the indenter, mm"),
+    ("wrap_deg", "wrap of the front face, deg"),
+    ("contact_angle_deg", "angle of the cylinder that is touched, deg"),
+    ("contact_length_mm", "length of the contact, mm"),
+    ("von_mises_MPa", "largest von Mises stress **, MPa"),
+    ("principal_strain", "largest principal strain **"),
+    ("strain_over_break", "largest strain over that at break"),
 )
-"""Key in the metrics, words and unit of each figure that is shown."""
-SHARES = ("principal_strain", "peak_strain", "strain_over_break")
+"""Key in the metrics and words with the unit of each figure of the table."""
+AT_REST = (
+    ("compliance_across_mm_per_N", "compliance across {} mm/N"),
+    ("compliance_along_mm_per_N", "along {} mm/N"),
+    ("mass_g", "mass {} g"),
+    ("thinnest_wall_mm", "thinnest wall {} mm"),
+)
+"""Figures that do not depend on the load: told once."""
+SHARES = ("principal_strain", "strain_over_break")
 """Those that are shown in per cent."""
+FIGURES_NOTE = (
+    "* By friction, 2 µ force / g: µ is the load's, else 0.5. ** A wall thickness away from corners, base "
+    "and contact."
+)
 
 
 def _figures(scores: Scores) -> RunAnswer | None:
-    """What the finger does: newtons, tip, wrap and stress by every solver."""
+    """What the finger does, by the best solver at hand, beside the truth and the other solvers."""
     known = {name: own.figures for name, own in scores.solvers.items() if own.figures}
     if not known:
         return None
-    name = _best(known, scores)
-    values, error = known[name].values, scores[name].force_to_truth_rel
-    low, high = (values.get(f"force_{end}_N") for end in ("low", "high"))
-    beside = []
-    if low is not None and high is not None:
-        beside.append(f"95 % interval {number(low, 3)} to {number(high, 3)} N")
-    if isfinite(error):
-        beside.append(f"{percent(error, 2, plus=True)} off the simulated finger’s")
-    interval = f" ({'; '.join(beside)})" if beside else ""
-    force, strain = values["force_N"], values["principal_strain"]
-    moved = hypot(values["tip_u_mm"], values["tip_v_mm"])
-    parts = {
-        f"the force is {number(force, 3)} N{interval}": force,
-        f"its tip moves by {number(moved, 3)} mm": moved,
-        f"the largest strain away from corners is {percent(strain, 2)}": strain,
-    }
-    said = _listed([words for words, value in parts.items() if isfinite(value)])
-    breaks = break_answer(*(values.get(key, nan) for key in ("strain_over_break", "peak_radius_mm")))
-    columns = {scores.label(each): figures for each, figures in known.items()}
-    if scores.truth:
-        columns["simulated finger"] = scores.truth
-    rows = []
-    for key, words, unit in FIGURES:
-        cells = [_figure(each, key) for each in columns.values()]
-        if any(cell != NONE for cell in cells):
-            rows.append([f"{words}, {unit}" if unit else words, *cells])
-    caption = (
-        "* At nodes that are a wall thickness away from re-entrant corners, base and contact. ** By "
-        "friction, 2 µ F / g: µ is the load's, else 0.5."
-    )
+    name = _best(list(known), scores)
+    values, truth = known[name].values, scores.truth.values if scores.truth else {}
+    parts = [
+        _beside("the force is {} N", _figure(known[name], "force_N"), truth.get("force_N", nan)),
+        _beside("the tip moves by {} mm", number(_tip(values), 3), _tip(truth)),
+    ]
+    strain = values.get("principal_strain", nan)
+    if isfinite(strain):
+        parts.append(f"the largest strain away from corners is {share(strain)}")
+    said = _listed([part for part in parts if part])
+    columns = {"truth": scores.truth} if scores.truth else {}
+    for each in (name, *known):
+        columns.setdefault(scores.label(each), known[each])
+    rows = [[words, *(_figure(each, key) for each in columns.values())] for key, words in FIGURES]
+    rest = [
+        words.format(_figure(known[name], key)) for key, words in AT_REST if isfinite(values.get(key, nan))
+    ]
+    sentences = [f"At rest: {', '.join(rest)}."] if rest else []
+    breaks = values.get("strain_over_break", nan)
+    if isfinite(breaks):
+        sentences.append(break_answer(breaks, values.get("peak_radius_mm", nan)))
+    intervals = "In brackets: 95 % intervals. "
+    shown = [row for row in rows if any(cell not in (NONE, "0.00") for cell in row[1:])]
     return RunAnswer(
         "What does the finger do?",
         f"By {scores.label(name)} {said}." if said != NONE else f"{scores.label(name)} does not tell.",
-        [breaks],
-        TextTable("", ["", *columns], rows, caption, left=[""]),
+        sentences,
+        TextTable(
+            "",
+            ["", *columns],
+            shown,
+            intervals * any("(" in cell for row in shown for cell in row[1:]) + FIGURES_NOTE,
+            left=[""],
+        ),
     )
 
 
-def _best(known: Collection[str], scores: Scores) -> str:
-    """The solver at hand that is nearest to the truth, else has found the force, else is the reference."""
-    away = {name: own.to_truth.displacement.rel_l2 for name in known if (own := scores[name]).to_truth}
-    if away and all(map(isfinite, away.values())):
-        return min(away, key=lambda name: (not scores[name].converged, away[name]))
-    found = [name for name in known if scores[name].identified]
-    return next(iter([*found, *(each for each in known if each == scores.reference), *known]))
+def _beside(words: str, said: str, truth: float) -> str:
+    """A figure in words, beside the truth where that is known; empty if there is no figure."""
+    if said == NONE:
+        return ""
+    return words.format(said) + (f" (truth {number(truth, 3)})" if isfinite(truth) else "")
+
+
+def _tip(values: Mapping[str, float]) -> float:
+    return hypot(values.get("tip_u_mm", nan), values.get("tip_v_mm", nan))
+
+
+def _best(known: Sequence[str], scores: Scores) -> str:
+    """The solver at hand that is nearest to the truth, else to the markers that it was not given.
+
+    Those that found the load come first, then those that were not given the markers: the others carry the
+    forces of the markers too. One that did not converge comes last.
+    """
+
+    def rank(name: str) -> tuple[bool, bool, bool, float, bool]:
+        own = scores[name]
+        away = own.to_truth.displacement.rel_l2 if own.to_truth else _held_out(own)
+        fitted = own.identified is None and own.markers.in_sample
+        found = own.identified is not None
+        other = name != scores.reference
+        return not own.converged, fitted, not found, away if isfinite(away) else float("inf"), other
+
+    return min(known, key=rank)
 
 
 def _figure(known: FigureScores, key: str) -> str:
     """A figure with its interval, if there is one."""
-    value = known.values.get(key)
-    if value is None or not isfinite(value):
+    value = known.values.get(key, nan)
+    if not isfinite(value):
         return NONE
-    said = percent(value, 2) if key in SHARES else number(value, 3)
+    said = share(value) if key in SHARES else number(value, 3)
     name, _, unit = key.rpartition("_")
     low, high = (known.values.get(f"{name}_{end}_{unit}") for end in ("low", "high"))
     return said if low is None or high is None else f"{said} ({number(low, 3)} to {number(high, 3)})"
@@ -128,140 +148,161 @@ def _figure(known: FigureScores, key: str) -> str:
 
 def _trust(scores: Scores) -> RunAnswer | None:
     """Whether the networks that were given no markers solve the equations of the reference."""
-    networks = {name: own for name, own in scores.solvers.items() if own.family == "neural network"}
+    networks = [name for name, own in scores.solvers.items() if own.family == "neural network"]
     if not networks or scores.reference in networks:
         return None
-    plain = [name for name, own in networks.items() if not own.markers.in_sample]
-    verdicts = [_verdict(name, scores) for name in plain]
-    sentences = [said for name in plain for said in _against_reference(name, scores)]
-    return RunAnswer("May the network be trusted here?", " ".join(verdicts), sentences)
+    plain = {name: own for name, own in scores.solvers.items() if not own.markers.in_sample}
+    judged = [name for name in networks if name in plain]
+    reference = scores.label(scores.reference)
+    listed = {scores.reference: scores[scores.reference], **plain}
+    table = TextTable(
+        f"Relative L² distance over the body, from {reference}"
+        + (" and from the truth, with the error of the force" if scores[scores.reference].to_truth else ""),
+        ["Solver", "displacement", "von Mises", *TRUTH_HEADS][
+            : 3 + 3 * bool(scores[scores.reference].to_truth)
+        ],
+        [
+            [scores.label(name), *_from_reference(name, scores), *_to_truth(own)]
+            for name, own in listed.items()
+        ],
+        f"±: error of {reference}, as it estimates it." if scores[scores.reference].uncertainty else "",
+    )
+    return RunAnswer(
+        "May the network be trusted here?",
+        " ".join(_verdict(name, scores) for name in judged),
+        [said for name in judged if (said := _model_error(name, scores))],
+        table if judged else None,
+    )
+
+
+TRUTH_HEADS = ("truth:\ndisplacement", "truth:\nvon Mises", "truth:\nforce")
+
+
+def _from_reference(name: str, scores: Scores) -> list[str]:
+    """Distances from the reference in displacement and stress; its own error for the reference."""
+    own = scores[name]
+    if name != scores.reference:
+        return [share(own.to_reference.rel_l2_displacement), share(own.to_reference.rel_l2_von_mises)]
+    if not own.uncertainty:
+        return [NONE, NONE]
+    return [f"± {share(own.uncertainty.rel_l2_displacement)}", f"± {share(own.uncertainty.rel_l2_von_mises)}"]
+
+
+def _to_truth(own: SolverScores) -> list[str]:
+    """Distances from the simulated finger in displacement, stress and force; none if there is no such."""
+    if own.to_truth is None:
+        return []
+    found = own.to_truth
+    return [share(found.displacement.rel_l2), share(found.von_mises.rel_l2), error(own.force_to_truth_rel)]
 
 
 def _verdict(solver: str, scores: Scores) -> str:
     name, reference = scores.label(solver), scores.label(scores.reference)
-    own, to = scores[solver], scores[solver].to_reference
+    own, away = scores[solver], scores[solver].to_reference.rel_l2_displacement
     if not own.converged:
         return f"No, not with {name}."
     if own.law != scores[scores.reference].law:
         return f"{name} has another material law than {reference}, so that this run does not tell."
-    if not isfinite(to.rel_l2_displacement):
+    if not isfinite(away):
         return f"How far {name} is from {reference} in displacement is not known."
-    known = to.reference_uncertainty
-    if known and to.rel_l2_displacement < known.rel_l2_displacement:
-        return (
-            f"Yes, as a solver: {name} and {reference} differ by less than {reference}’s own error in "
-            "displacement."
-        )
-    away = percent(to.rel_l2_displacement, 2)
-    return f"As a solver to {away}: that far is {name} from {reference} in displacement."
+    known = own.to_reference.reference_uncertainty
+    if known and away < known.rel_l2_displacement:
+        return f"Yes, as a solver: {name} differs from {reference} by less than {reference}’s own error."
+    return f"As a solver to {share(away)}: that far is {name} from {reference} in displacement."
 
 
-def _against_reference(solver: str, scores: Scores) -> list[str]:
-    name, reference = scores.label(solver), scores.label(scores.reference)
-    own, to = scores[solver], scores[solver].to_reference
-    fields = [
-        f"{_plus_minus(getattr(to, key), getattr(to.reference_uncertainty, key, nan))} in {field}"
-        for key, field in (("rel_l2_displacement", "displacement"), ("rel_l2_von_mises", "von Mises stress"))
-        if isfinite(getattr(to, key))
-    ]
-    own_error = f"; after ± the estimated error of {reference} itself" if "±" in str(fields) else ""
-    away = f"{name} is {', '.join(fields)} away from {reference} (relative L² over the body{own_error})."
-    said = [away] if fields else []
-    if own.to_truth:
-        sentence = (
-            f"In displacement, von Mises stress and force, {name} is {_truth_numbers(own)} away from the "
-            f"simulated finger, {reference} {_truth_numbers(scores[scores.reference])}."
-        )
-        if to.rel_l2_displacement < 0.1 * own.to_truth.displacement.rel_l2:
-            sentence += " That is the error of the model and its load, not of the network."
-        said.append(sentence)
-    return said
+def _model_error(solver: str, scores: Scores) -> str:
+    """That a network's distance from the truth is not its own, where that is so."""
+    own = scores[solver]
+    if not own.to_truth or not own.to_reference.rel_l2_displacement < 0.1 * own.to_truth.displacement.rel_l2:
+        return ""
+    return (
+        f"{scores.label(solver)} and {scores.label(scores.reference)} are equally far from the truth: that "
+        "is the error of the model and its load, not of the network."
+    )
 
 
 def _markers(scores: Scores) -> RunAnswer | None:
     """Whether solvers that were given the markers are nearer than the reference, at held-out markers."""
-    reference, source = scores.label(scores.reference), scores.measurements.source
     plain = scores[scores.reference]
     given = {scores.label(name): own for name, own in scores.solvers.items() if own.given}
     if not given or plain.given or not plain.held_out:
         return None
-    told = {name: own for name, own in given.items() if isfinite(_held_out(own)[0] + _held_out(plain)[0])}
-    listed = {reference: plain, **given}
-    nearer, inside = [], []
-    heads, columns = ["Solver"], [list(listed)]
-    if told:
-        heads += ["held out, mm", "least to largest"]
-        columns += [list(column) for column in zip(*map(_held_out_cells, listed.values()), strict=True)]
-        better = [name for name, own in told.items() if _held_out(own)[0] < _held_out(plain)[0]]
-        nearer.append(f"at held-out {source} markers {_those(better, told)}")
-    for place, field in enumerate(TRUTH_FIELDS if plain.to_truth else ()):
-        found = {name: _to_truth(own)[place] for name, own in listed.items()}
-        heads.append(field)
-        columns.append([percent(share, 2, plus=field == "force") for share in found.values()])
-        better = [name for name in given if abs(found[name]) < abs(found[reference])]
-        if any(isfinite(found[name] + found[reference]) for name in given):
-            inside.append(f"in {field} {_those(better, given)}")
-    if inside:
-        nearer.append(f"over the simulated body {', '.join(inside)}")
-    held_out = (
-        "Held out: mean |Δu| + |Δv| at markers that the solver was not given, each predicted from the "
-        "others. The range is over neighbouring markers under one load and no confidence interval; those are "
-        "from pinnray crossval."
-    )
-    sentences = [held_out] if told else []
-    if not plain.to_truth:
-        sentences.append("Whether stress and force are nearer is unknown: no camera tells them.")
-    sentences += filter(None, (_force_interval(name, own, scores) for name, own in given.items()))
-    verdict = f"nearer than {reference}: {'; '.join(nearer)}." if nearer else "this run does not tell."
-    if len(given) > 1:
-        verdict = f"of {len(given)} solvers that were given markers, {verdict}"
-    verdict = verdict[0].upper() + verdict[1:]
-    caption = f"Errors at {source} markers that were not given"
+    listed = {scores.label(scores.reference): plain, **given}
+    measures: dict[str, Callable[[SolverScores], float]] = {"at held-out markers": _held_out}
+    heads = ["Solver", f"held-out {scores.measurements.source}\nmarkers, mm"]
+    rows = [[name, at_markers(_held_out(own)), *_to_truth(own)] for name, own in listed.items()]
+    sentences = []
     if plain.to_truth:
-        caption += ", and distance from the simulated finger over the whole body"
-    rows = [list(row) for row in zip(*columns, strict=True)]
-    return RunAnswer("Did the markers help?", verdict, sentences, TextTable(caption, heads, rows))
-
-
-def _held_out(own: SolverScores) -> tuple[float, float, float]:
-    """Mean, least and largest |Δu| + |Δv| at held-out markers, mm; NaN where there are none."""
-    if not (errors := own.held_out):
-        return nan, nan, nan
-    each = [u + v for u, v in zip(errors.ae_u, errors.ae_v, strict=True) if isfinite(u + v)] or [nan]
-    return errors.mae_sum, min(each), max(each)
-
-
-def _held_out_cells(own: SolverScores) -> list[str]:
-    mean, least, largest = _held_out(own)
-    return [f"{mean:.3f}", f"{least:.3f} to {largest:.3f}"] if isfinite(mean + least) else [NONE, NONE]
-
-
-def _force_interval(name: str, own: SolverScores, scores: Scores) -> str:
-    """The force that a solver found, with its 95 % interval, beside the true one where that is known."""
-    if not own.identified or not own.figures:
-        return ""
-    values = own.figures.values
-    force, low, high, across = (
-        values.get(f"{key}_N", nan) for key in ("force", "force_low", "force_high", "tangential_force")
+        heads += TRUTH_HEADS
+        measures |= TRUTH_MEASURES
+    else:
+        sentences.append("Whether stress and force are nearer is unknown: no camera tells them.")
+    sentences += _loads_found(scores)
+    table = TextTable(
+        "", heads, rows, "Held out: mean |Δu| + |Δv| at each marker, predicted from the others."
     )
-    if not isfinite(force):
-        return ""
-    source = scores.measurements.source
-    said = f"{name} finds a force of {number(force, 3)} N (95 % interval {number(low, 3)} to "
-    said += f"{number(high, 3)}) and a tangential force of {number(across, 2)} N"
-    if place := own.identified.position:
-        middle, start, end = (number(each, 3) for each in (place.value, place.low, place.high))
-        said += f" at x = {middle} mm ({start} to {end} mm)"
-    said += f" from the {source} markers"
-    if scores.truth and isfinite(true := scores.truth.values["force_N"]):
-        where = "inside" if low <= true <= high else "outside"
-        placed = f", {where} it" if isfinite(low + high) else ""
-        said += f"; the force on the simulated finger is {number(true, 3)} N{placed}"
-    return f"{said}. {own.identified.advice}".rstrip()
+    return RunAnswer("Did the markers help?", _nearer(plain, given, measures, scores), sentences, table)
+
+
+TRUTH_MEASURES: Mapping[str, Callable[[SolverScores], float]] = {
+    "in displacement": lambda own: own.to_truth.displacement.rel_l2 if own.to_truth else nan,
+    "in von Mises stress": lambda own: own.to_truth.von_mises.rel_l2 if own.to_truth else nan,
+    "in force": lambda own: abs(own.force_to_truth_rel),
+}
+
+
+def _nearer(
+    plain: SolverScores,
+    given: Mapping[str, SolverScores],
+    measures: Mapping[str, Callable[[SolverScores], float]],
+    scores: Scores,
+) -> str:
+    """The solvers that are nearer than the reference, in which of the measures."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for words, measure in measures.items():
+        known = {name: measure(own) for name, own in given.items() if isfinite(measure(own))}
+        if known and isfinite(measure(plain)):
+            better = tuple(name for name, value in known.items() if value < measure(plain))
+            found.setdefault(better, []).append(words)
+    if not found:
+        return "This run does not tell."
+    said = [f"{_who(better, given)} nearer {_listed(fields)}" for better, fields in found.items()]
+    text = "; ".join(said).replace(" nearer ", f" nearer than {scores.reference} ", 1)
+    return f"{text[0].upper() if len(given) > 1 else text[0]}{text[1:]}."
+
+
+def _who(better: Sequence[str], given: Collection[str]) -> str:
+    """Subject and verb of a sentence on those solvers that are better, of all that were given markers."""
+    if len(given) == 1:
+        return f"{next(iter(given))} is{'' if better else ' not'}"
+    if not better:
+        return "no solver that was given markers is"
+    if len(better) == len(given):
+        return f"all {len(given)} solvers that were given markers are"
+    return f"only {_listed(better)} {'is' if len(better) == 1 else 'are'}"
+
+
+def _held_out(own: SolverScores) -> float:
+    """Mean |Δu| + |Δv| at held-out markers, mm; NaN where there are none."""
+    return own.held_out.mae_sum if own.held_out else nan
+
+
+def _loads_found(scores: Scores) -> list[str]:
+    """Places of the forces that solvers found from the markers, and what would narrow their intervals."""
+    found = {scores.label(name): own for name, own in scores.solvers.items() if own.identified}
+    places = []
+    for name, own in found.items():
+        if own.identified and (place := own.identified.position) and isfinite(place.value):
+            middle, low, high = (number(each, 3) for each in (place.value, place.low, place.high))
+            places.append(f"{middle} mm ({low} to {high} mm) by {name}")
+    said = [f"The force acts at x = {_listed(places)}."] if places else []
+    advice = [own.identified.advice for own in found.values() if own.identified and own.identified.advice]
+    return said + list(dict.fromkeys(advice))
 
 
 def _convergence(scores: Scores) -> RunAnswer:
-    """The solvers that did not converge, and how far the others are from the exact solution."""
+    """The solvers that did not converge, failed or were left out, and the error of the mesh."""
     faulty = {scores.label(name): own for name, own in scores.solvers.items() if not own.converged}
     sentences = [f"{name}: {own.message.rstrip('. ')}." for name, own in faulty.items()]
     for what, reasons in (("failed", scores.failed), ("was left out", scores.left_out)):
@@ -270,50 +311,13 @@ def _convergence(scores: Scores) -> RunAnswer:
     count = len(scores.solvers) + len(scores.failed)
     met = "the solver met its" if count == 1 else f"all {count} solvers met their"
     verdict = f"{len(bad)} of {count} solvers: {_listed(bad)}." if bad else f"Nothing: {met} own criterion."
-    if own := scores[scores.reference].uncertainty:
+    own = scores[scores.reference].uncertainty
+    if own and not any(each.family == "neural network" for each in scores.solvers.values()):
         sentences.append(
-            f"The mesh is a limit too: {scores.label(scores.reference)} estimates its own error as "
-            f"{percent(own.rel_l2_displacement, 2)} in displacement, "
-            f"{percent(own.rel_l2_von_mises, 2)} in von Mises stress (relative L²), "
-            f"{percent(own.energy_norm, 2)} in the energy norm."
-        )
-    certificates = {scores.label(name): own.certificate for name, own in scores.solvers.items()}
-    above = [(name, each.rel_excess) for name, each in certificates.items() if each and each.rel_excess > 0]
-    if above:
-        each = ", ".join(f"{name} {percent(excess, 2)}" for name, excess in above)
-        sentences.append(
-            f"Energy above the least on the shared mesh, which no solver can argue away: {each}."
+            f"The mesh leaves {scores.label(scores.reference)} an estimated error of "
+            f"{share(own.rel_l2_displacement)} in displacement and {share(own.rel_l2_von_mises)} in stress."
         )
     return RunAnswer("What is not converged?", verdict, sentences)
-
-
-def _to_truth(own: SolverScores) -> tuple[float, float, float]:
-    """Relative distances from the simulated finger in displacement, von Mises stress and force."""
-    if own.to_truth is None:
-        return nan, nan, nan
-    return own.to_truth.displacement.rel_l2, own.to_truth.von_mises.rel_l2, own.force_to_truth_rel
-
-
-def _truth_numbers(own: SolverScores) -> str:
-    return _listed(
-        [
-            percent(share, 2, plus=field == "force")
-            for share, field in zip(_to_truth(own), TRUTH_FIELDS, strict=True)
-        ]
-    )
-
-
-def _plus_minus(share: float, own: float) -> str:
-    if not isfinite(own):
-        return percent(share, 2)
-    return f"{percent(share, 2, sign=False)} ± {percent(abs(own), 2)}"
-
-
-def _those(some: Sequence[str], of: Mapping[str, object]) -> str:
-    """The names that something holds for: all, none, or the list."""
-    if len(some) == len(of):
-        return f"all {len(of)}" if len(of) > 1 else _listed(some)
-    return f"only {_listed(some)}" if some else "none"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -13,10 +13,11 @@ from rich.table import Table
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.scores import MEANS, Means, Scores, SolverScores
+from pinnray.comparison.report.numbers import at_markers, error, seconds, share
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS
-from pinnray.runtime.tables import NONE, Cell, percent, terminal_table, write_csv
+from pinnray.runtime.tables import NONE, Cell, terminal_table, write_csv
 
 RIGID = "rigid motion off"
 """What is added to the name of a solver whose markers are moved rigidly to the pressed picture."""
@@ -40,8 +41,7 @@ class Row(NamedTuple):
 
     def cells(self, kind: str) -> list[str]:
         """The means of `given` or `held_out`, mm, to 0.001; the paper's without a last zero, as there."""
-        values = [getattr(getattr(self, kind), name, nan) for name in MEANS]
-        texts = [NONE if isnan(value) else f"{value:.3f}" for value in values]
+        texts = [at_markers(getattr(getattr(self, kind), name, nan)) for name in MEANS]
         return [text.removesuffix("0") if self.converged is None else text for text in texts]
 
 
@@ -135,12 +135,6 @@ def write_summary(path: Path, comparison: Results) -> None:
     _write(path, comparison.scores.rows())
 
 
-def seconds(own: SolverScores) -> str:
-    """Time of the solve, s, or a dash if it is not recorded."""
-    value = own.seconds
-    return NONE if isnan(value) else f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
-
-
 def marker_table(comparison: Results) -> Table:
     """Mean absolute errors at the markers; below, for the paper's finger, the paper's own numbers."""
     observations, printed = comparison.observations, printed_rows(comparison.design)
@@ -176,21 +170,24 @@ def body_table(comparison: Results) -> Table:
     known = scores[scores.reference].to_reference.reference_uncertainty
     lines = [f"from ref.: relative L² difference of the displacement from {reference}."]
     if known and len(scores.solvers) > 1:
-        lines.append(f"±: error of {reference} itself, estimated; a smaller difference says nothing.")
+        own_error = share(known.rel_l2_displacement)
+        lines.append(
+            f"{reference} itself is off by {own_error}, estimated; a smaller difference says nothing."
+        )
     lines.append("above fem: energy of the displacement on fem's elements above the least there.")
     if truth is not None:
         lines.append("truth: relative L² difference from the simulated finger of finite strain;")
         lines.append("force: signed error of the force along the stroke.")
     rows = []
     for name, own in scores.solvers.items():
-        cells = [NONE if name == scores.reference else _from_reference(own), _above_fem(own)]
-        if own.to_truth:
-            shares = own.to_truth.displacement.rel_l2, own.to_truth.von_mises.rel_l2
-            cells += [percent(share, 2, sign=False) for share in shares]
-            cells.append(percent(own.force_to_truth_rel, 2, sign=False, plus=True))
+        away = own.to_reference.rel_l2_displacement
+        cells = [NONE if name == scores.reference else share(away), _above_fem(own)]
+        if found := own.to_truth:
+            cells += [share(found.displacement.rel_l2), share(found.von_mises.rel_l2)]
+            cells.append(error(own.force_to_truth_rel))
         rows.append((scores.label(name), own.converged, [*cells, seconds(own)]))
-    headings = ["truth\ndispl.", "\nv. Mises", "\nforce, %"] if truth else []
-    headings = ["from ref.\n%", "above fem\n%", *headings, "time\ns"]
+    headings = ["truth\ndispl.", "\nv. Mises", "\nforce"] if truth else []
+    headings = ["from ref.", "above fem", *headings, "time\ns"]
     return _table("Over the whole body", headings, rows, "\n".join(lines))
 
 
@@ -204,16 +201,8 @@ def _table(title: str, headings: list[str], rows: list[tuple[str, bool, list[str
     return table
 
 
-def _from_reference(own: SolverScores) -> str:
-    """The relative difference of the displacement in %, and the reference's own error."""
-    share, known = own.to_reference.rel_l2_displacement, own.to_reference.reference_uncertainty
-    if known is None:
-        return percent(share, sign=False)
-    return f"{percent(share, 2, sign=False)}±{percent(known.rel_l2_displacement, 1, sign=False)}"
-
-
 def _above_fem(own: SolverScores) -> str:
-    """Excess energy over the least of finite elements, %; a dash without a certificate."""
+    """Excess energy over the least of finite elements; a dash without a certificate."""
     if own.certificate is None:
         return NONE
-    return percent(own.certificate.excess_beyond_rounding, 2, sign=False)
+    return share(own.certificate.excess_beyond_rounding)

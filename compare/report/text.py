@@ -6,8 +6,9 @@ from markupsafe import Markup
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
+from pinnray.comparison.report.numbers import share
 from pinnray.geometry.finger.finger import Finger
-from pinnray.runtime.tables import number, percent
+from pinnray.runtime.tables import NONE, number
 from pinnray.solvers.problem import Load
 
 FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"
@@ -30,19 +31,6 @@ def material_rows(comparison: Results) -> list[tuple[str, str]]:
         return [("Material", f"{LAW_WORDS[next(iter(solvers))]}; {constants}")]
     rows = [(f"Law of {', '.join(labels)}", LAW_WORDS[law]) for law, labels in solvers.items()]
     return [("Material", constants), *rows]
-
-
-PRESET_WORDS = {
-    "fast": "network with random hidden weights, output layer solved exactly (preset fast)",
-    "paper": "the paper’s training (preset paper)",
-    "trained": "network of small windows, all weights trained on the energy (preset trained)",
-}
-
-
-def preset_meanings(settings: Mapping[str, Mapping[str, object]]) -> dict[str, str]:
-    """The kind of training of each solver whose preset says it, from all solvers' settings."""
-    chosen = {name: str(own.get("preset", "")) for name, own in settings.items()}
-    return {name: PRESET_WORDS[preset] for name, preset in chosen.items() if preset in PRESET_WORDS}
 
 
 def load_sentence(load: Load, design: Finger) -> str:
@@ -107,31 +95,25 @@ def symbol(name: str) -> Markup:
     )
 
 
-def stat(name: str, value: object) -> str:
-    """A number of a solver's record: whole numbers in full, others with four digits; a probability in %."""
-    if not isinstance(value, float):
-        return str(value)
-    return percent(value, 4) if name.startswith("probability") else number(value)
-
-
 ASPECTS = ("", "_deviation", "_low", "_high", "_resolution")
 """Endings of the numbers of a quantity that a solver has found with an interval."""
 
 
-def solve_numbers(stats: Mapping[str, object]) -> tuple[list[tuple[str, list[str]]], list[tuple[str, str]]]:
-    """The numbers that a solver recorded of its solve, but for its time.
-
-    Returns:
-        The quantities that it found with an interval, each with its `ASPECTS`, and the rest by name.
-    """
-    names = [name for name in stats if f"{name}_low" in stats]
-    known = {f"{name}{aspect}" for name in names for aspect in ASPECTS} | {"seconds"}
+def found_numbers(stats: Mapping[str, object]) -> list[tuple[str, list[str]]]:
+    """The quantities that a solver recorded with an interval, each with its `ASPECTS`."""
 
     def told(name: str) -> str:
-        return stat(name, stats[name]) if name in stats else "–"
+        value = stats.get(name)
+        return number(value) if isinstance(value, float | int) else NONE
 
-    found = [(name.replace("_", " "), [told(f"{name}{aspect}") for aspect in ASPECTS]) for name in names]
-    return found, [(name.replace("_", " "), told(name)) for name in stats if name not in known]
+    names = [name for name in stats if f"{name}_low" in stats]
+    return [(name.replace("_", " "), [told(f"{name}{aspect}") for aspect in ASPECTS]) for name in names]
+
+
+def ending(message: str, stats: Mapping[str, object]) -> str:
+    """A solver's message without the numbers that `found_numbers` tells with their intervals."""
+    parts = [part for part in message.split("; ") if f"{part.split(' ')[0]}_low" not in stats]
+    return sentence("; ".join(parts)) if parts else ""
 
 
 def sentence(text: str) -> str:
@@ -139,25 +121,12 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:].rstrip(". ") + "."
 
 
-def beside(value: float, own: float | None) -> Markup:
-    """A difference from a reference and, if there is one, the reference's own error, as HTML.
-
-    A difference that is smaller than that error is set in grey.
-    """
-    if own is None:
-        return Markup("{}").format(number(value, 3))
-    kind = "within" if abs(value) < abs(own) else "beyond"
-    return Markup('<span class="{}">{}</span><br><span class="unit">±&nbsp;{}</span>').format(
-        kind, number(value, 3), number(abs(own), 2)
-    )
-
-
 def missed_energy(evaluation: Evaluation) -> str:
     """That a result misses energy; empty for others."""
     certificate = evaluation.certificate
     if certificate is None or not certificate.misses_energy:
         return ""
-    missed = percent(certificate.missed / certificate.fem_energy)
+    missed = share(certificate.missed / certificate.fem_energy)
     return (
         f"{evaluation.label} reports {missed} less energy than the least that is possible: its quadrature "
         "misses it."

@@ -304,7 +304,6 @@
   function give(up) {
     box.hidden = up;
     byId("viewer-absent").hidden = !up;
-    if (byId("stills")) byId("stills").open = up;
   }
 
   if (!("DecompressionStream" in window && canvas.getContext("2d"))) return;

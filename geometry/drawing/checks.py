@@ -104,7 +104,8 @@ def _check_sound(rings: Sequence[shapely.LinearRing]) -> None:
         fault, where = "two curves touch", np.array(shapely.shortest_line(*lines[touching[0]]).coords[0])
     else:
         return
+    fault = fault.lower().replace("hole lies outside shell", "a closed curve lies outside the outline")
     raise UserError(
-        f"{fault.lower()} at {place(where)}; draw one outline, and inside it cavities that neither cross nor "
+        f"{fault} at {place(where)}; draw one outline, and inside it cavities that neither cross nor "
         "touch it or each other"
     )

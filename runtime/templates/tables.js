@@ -70,7 +70,7 @@
 
   const number = (text) => {
     const found = /^(?:[<>] )?([+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?)/i.exec(text);
-    return found ? parseFloat(found[1]) : NaN;
+    return found ? parseFloat(found[1]) * (/ times$/.test(text) ? 100 : 1) : NaN; // the others are in per cent
   };
 
   function compare(a, b) {

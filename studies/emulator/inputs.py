@@ -120,12 +120,13 @@ class Inputs:
         bases = {
             **dict.fromkeys(QUANTITIES, one),  # of which the frames say nothing
             **{"force": force, "force_25": force / 4, "force_50": force / 2, "force_75": 0.75 * force},
+            "tangential_force": np.zeros(len(fingers)),
             **{"tip_u": answers[:, 3], "tip_v": answers[:, 4], "wrap": answers[:, 5]},
             "compliance_along": answers[:, 1] / (modulus * depth),
             "compliance_across": answers[:, 2] / (modulus * depth),
             **{"von_mises": modulus * largest, "principal_strain": largest},
         }
-        forces = dict.fromkeys(("force", "force_25", "force_50", "force_75"), modulus * depth)
+        forces = dict.fromkeys((name for name in bases if "force" in name), modulus * depth)
         return Features(
             np.concatenate([columns, np.stack([np.cos(phase), np.sin(phase)], axis=1), stress], axis=1),
             bases,

@@ -57,6 +57,7 @@ def proposals(
     )
     people = found.pop.get("X"), found.pop.get("F"), found.pop.get("G")
     places, hoped, excess = (np.asarray(each, dtype=np.float64) for each in people)
+    places = np.array([places_of(question, sample_at(question, row)) for row in places])  # of whole numbers
     allowed = (excess <= 0).all(axis=1)
     order = np.argsort(np.maximum(excess, 0).sum(axis=1), kind="stable")
     chosen: list[int] = []

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.validation.printed_finger import FINGERS
 from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.runtime.errors import UserError
 from pinnray.vision.clicked_points import Clicks, clicked_points, read_clicks
@@ -258,3 +259,24 @@ def test_the_page_makes_clicks_of_an_export(tmp_path, monkeypatch, program, cont
     result = found(read_clicks(Path("rest.csv")), read_clicks(Path("pressed.csv")))
     assert result.mirrored
     np.testing.assert_allclose(result.observations.displacements, np.full((9, 2), (0.5, 0)), atol=1e-9)
+
+
+@pytest.mark.parametrize("finger", FINGERS)
+def test_another_scale_and_a_point_astray_are_told_of_real_fingers_and_nothing_of_right_points(finger):
+    rest, pressed = (read_clicks(path) for path in finger.clicks)
+
+    def said(places, scale="lengths"):
+        clicks = rest, Clicks(places, None)
+        found = clicked_points(*clicks, finger.markers, marker_radius=0.2, scale=scale, source="clicks")
+        return " ".join(found.remarks)
+
+    assert said(pressed.places) == ""
+    right = clicked_points(rest, pressed, finger.markers, marker_radius=0.2, scale="lengths", source="clicks")
+    assert said(pressed.places, right.scales) == ""
+    one, other = right.scales
+    assert "farther apart pressed than at rest" in said(pressed.places, (one, 1.08 * other))
+    assert "closer together pressed than at rest" in said(pressed.places, (one, 0.92 * other))
+    assert "farther apart at rest than on the drawing" in said(pressed.places, (1.08 * one, 1.08 * other))
+    astray = pressed.places.copy()
+    astray[4] += (7.0, -5.0)
+    assert "point 5 moves unlike the points around it" in said(astray, right.scales)

@@ -16,6 +16,8 @@ FEWEST = 4
 """Number of fiducials that determines the pose of a camera."""
 STEADY = 2.0
 """Fiducial shift, in standard deviations, below which the camera counts as static."""
+MANY = 6
+"""Fiducials whose misfit shows what a zoom leaves; fewer follow the lens by another pose."""
 UNKNOWNS = 6
 """Parameters of a pose."""
 EXCESS = 0.05
@@ -33,7 +35,7 @@ class CameraMotion(NamedTuple):
         poses: Covariances of the camera's poses at both ends, by the fiducials' noise; none without a camera.
         enlargement: Scale of the picture at the end over that at the start, less one.
         remains: Root mean square of what the planes leave of the fiducials' motion, beyond noise, pixels: a
-            lens whose zoom or focus changed is not undone by another pose.
+            lens whose zoom or focus changed is not undone by another pose. Without planes all of it.
     """
 
     shift: float
@@ -46,7 +48,7 @@ class CameraMotion(NamedTuple):
     def undone(self, final: DiscDetections) -> DiscDetections:
         """Discs at the end, mapped to where a static camera would have seen them."""
         if self.planes is None:
-            return final
+            return final._replace(covariances=final.covariances + self.remains**2 * np.eye(2))
         start, end = self.planes
         centres, known = final.centres.copy(), np.isfinite(final.radii)
         points = end.points(centres[known])
@@ -75,15 +77,17 @@ def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDe
     shift = float(np.median(np.linalg.norm(after.centres - before.centres, axis=1)[common]))
     variances = np.diagonal(before.covariances + after.covariances, axis1=1, axis2=2)[common]
     noise, count = float(np.sqrt(np.median(variances))), int(common.sum())
-    if shift < STEADY * noise or count < FEWEST:
+    if shift < STEADY * noise:
         return CameraMotion(shift, None)
+    if count < FEWEST:
+        return CameraMotion(shift, None, remains=shift)
     numbers = np.where(common, np.arange(len(common)), -1)
     # Equal weights make the distortion of the lens cancel, also where it is not known.
     alike = after._replace(covariances=before.covariances)
     try:
         start, end = (scene.plane(fiducials.numbered(numbers)) for fiducials in (before, alike))
     except UserError:  # those that both ends show lie in a row
-        return CameraMotion(shift, None)
+        return CameraMotion(shift, None, remains=shift)
     points = scene.workspace.points[common]
     poses = [
         pose_covariance(plane, points, fiducials.covariances[common])
@@ -101,4 +105,7 @@ def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDe
     squares = float((left**2 / variances).sum())
     chance = freedom < 1 or squares < chdtri(freedom, EXCESS)
     remains = 0.0 if chance else noise * np.sqrt(squares / freedom - 1)
+    if count < MANY and scene.camera is not None:  # a cubic correction is wrong by twice the zoom's share
+        lens = scene.camera.undistort(before.centres[common]) - before.centres[common]
+        remains = max(remains, 2 * abs(larger) * float(np.sqrt((lens**2).mean())))
     return CameraMotion(shift, (start, end), deviation, known, larger, remains)

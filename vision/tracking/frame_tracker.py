@@ -1,5 +1,6 @@
 """Tracking from frame to frame, by prediction, with a search around the finger for lost markers."""
 
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -68,6 +69,7 @@ class FrameTracker:
     def __init__(self, scene: FilmedScene, image: Image, *, live: bool = False) -> None:
         self._scene, self._period, self._number = scene, LIVE_PERIOD if live else 1, 0
         self.plane, self._fiducials = scene.first_plane(image)
+        self._hidden = int(np.isnan(self._fiducials.radii).sum())
         self._rest = self._places = scene.design.markers
         self._step = np.zeros_like(self._rest)
         self._reach = distance_from_base(scene.design.section, self._rest)
@@ -174,4 +176,12 @@ class FrameTracker:
         if len(found.radii):
             away = np.linalg.norm(old.centres[:, None] - found.centres, axis=2)
             discs[known] = np.where(away.min(axis=1) < old.radii, away.argmin(axis=1), -1)
-        return found.numbered(discs)
+        found = found.numbered(discs)
+        hidden = int(np.isnan(found.radii).sum())
+        if hidden > max(self._hidden, len(known) / 2):  # most at once: rather the camera was moved than they
+            with suppress(UserError):
+                anew = self._scene.find_fiducials(image)
+                if np.isnan(anew.radii).sum() < hidden:
+                    self._fiducials = found = anew
+        self._hidden = hidden
+        return found

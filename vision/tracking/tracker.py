@@ -185,16 +185,16 @@ def _warnings(
     if (hidden := int(np.isnan(after.radii).sum())) > 0:
         yield f"{hidden} of {len(after.radii)} fiducials were not seen"
     remains = motion.remains / tracking.plane.scales(tracking.expected).mean()
-    left = f" but for {remains:.2g} mm, which are in the standard deviations" if remains else ""
+    left = f"{remains:.2g} mm, which are in the standard deviations"
+    undone = f"which they undo but for {left}" if remains else "which they undo"
     if abs(motion.enlargement) > SCALE:
         size = "larger" if motion.enlargement > 0 else "smaller"
         yield (
             f"the fiducials were {abs(motion.enlargement):.2%} {size} at the end than at the start: the zoom "
-            f"changed, or the focus or distance of the camera, which they undo{left}; fix zoom, focus and "
-            "camera"
+            f"changed, or the focus or distance of the camera, {undone}; fix zoom, focus and camera"
         )
     elif motion.shift > SHAKE:
-        known = f"which they undo{left}" if motion.planes else "and too few of them are seen to undo it"
+        known = undone if motion.planes else f"and too few of them are seen to undo it: {left}"
         yield (
             f"the fiducials moved by {motion.shift:.2f} pixels between start and end: the camera was not at "
             f"rest, {known}"

@@ -94,9 +94,14 @@ def read_step(
             f"{turned.Volume() * unit**3:.5g} mm3; give the depth of the finger and its plane, such as "
             f'depth = {depth:.4g} and plane = "{cut.plane}"'
         )
+    faces = _united(cut.faces)
+    if len(faces) > 1:
+        raise UserError(
+            f"at {cut.plane} it is cut into {len(faces)} pieces; give a plane that cuts it into one"
+        )
     pieces = [
         piece
-        for face in _united(cut.faces)
+        for face in faces
         for wire in face.Wires()
         for edge in wire.Edges()
         for piece in _pieces(edge, unit)
@@ -145,12 +150,12 @@ def _across(solid: cq.Solid) -> tuple[cq.Shape, Cut]:
         low, high = _extent(turned)
         layer = max(_layers(turned, frame), key=lambda layer: layer.volume)
         cut = layer._replace(depth=high - low)
-        for offset in (low, high):  # a cap has the edges of the file
+        apart, shown = _apart(turned, cut), abs(layer.volume / solid.Volume() - 1)
+        for offset in (low, high) if apart <= SAME else ():  # a cap has the edges of the file
             cap = [face for face in turned.Faces() if np.abs(np.subtract(_extent(face), offset)).max() < 1e-6]
             if abs(sum(face.Area() for face in cap) - cut.area) < 1e-7 * cut.area:
                 cut = cut._replace(faces=cap, offset=offset)
                 break
-        apart, shown = _apart(turned, cut), abs(layer.volume / solid.Volume() - 1)
         found.append((round(apart, 7) if apart <= SAME else 1 + round(shown, 1), turned, cut))
     if not found:
         raise UserError('the solid has no flat face; give depth, and the plane, such as plane = "z = 6"')
@@ -169,13 +174,23 @@ def _apart(turned: cq.Shape, cut: Cut) -> float:
 
 
 def _layers(turned: cq.Shape, frame: cq.Location) -> list[Cut]:
-    """Sections half way between the faces that lie across z, each with the distance of these faces."""
+    """Sections half way between the faces that lie across z, each with the distance of these faces.
+
+    Where a hole across cuts the body in two there, the section is one beside it.
+    """
     extents = [_extent(face) for face in turned.Faces()]
     ends = [*_extent(turned), *(low for low, high in extents if high - low < 1e-5)]
     found = []
     for low, high in pairwise(sorted({round(height, 6) for height in ends})):
-        if high - low > 1e-4 and (faces := _section(turned, 0.5 * (low + high))):
-            found.append(Cut(faces, frame, 0.5 * (low + high), high - low))
+        cuts = list[Cut]()
+        for share in (0.5, 0.1, 0.9) if high - low > 1e-4 else ():
+            height = low + share * (high - low)
+            if faces := _section(turned, height):
+                cuts.append(Cut(faces, frame, height, high - low))
+            if len(faces) == 1:
+                break
+        if cuts:
+            found.append(min(cuts, key=lambda cut: len(cut.faces)))
     return found
 
 

@@ -2,7 +2,13 @@
 
 from pathlib import Path
 
+from rich.console import Console
+
 from pinnray.runtime.exits import shown
+from pinnray.runtime.tables import terminal_table
+
+MOST_COLUMNS = 6
+"""Of a table that is printed: a wider one is in the report."""
 
 
 def command(run: Path, *more: Path) -> int:
@@ -21,5 +27,8 @@ def command(run: Path, *more: Path) -> int:
         for answer in answers(Scores.read(folder)):
             said = [answer.question, f"  {answer.verdict}", *(f"  - {each}" for each in answer.sentences), ""]
             print(shown("\n".join(said)))
+            if (table := answer.table) and len(table.headings) <= MOST_COLUMNS:
+                left = [*table.headings[:1], *table.left]
+                Console().print(terminal_table(table.title, table.headings, table.rows, left=left))
         print(f"report: {folder / 'report.html'}")
     return 0

@@ -13,7 +13,7 @@ from pinnray.comparison.evaluation.certifier import with_certificates
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import FORMATS, draw_all, page_width
-from pinnray.comparison.figures.fields import QUANTITIES, draw_field
+from pinnray.comparison.figures.fields import QUANTITIES, draw_field, near_pairs
 from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
 from pinnray.comparison.figures.overlay import overlay_extent
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -84,7 +84,7 @@ def test_every_picture_is_told_in_numbers_to_those_who_cannot_see_it(drawings, c
 
 
 FIELDS = tuple(quantity.name for quantity in QUANTITIES if quantity.name not in LIKE_OTHERS)
-ALL = (*("overlay", "marker_errors", *FIELDS, "force_displacement", "design", "mesh"),)
+ALL = (*FIELDS, "overlay", "marker_errors", "force_displacement", "design", "mesh")
 
 
 def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawings, tmp_path, monkeypatch):
@@ -199,7 +199,7 @@ def area_of(colour: tuple[int, ...], path: Path) -> float:
 def test_a_field_of_half_the_size_has_the_colour_of_half_the_scale(fem, compared, tmp_path):
     whole = replace(fem, von_mises=np.full(len(fem.weights), 2.0))
     half = replace(fem, solver="half", von_mises=np.full(len(fem.weights), 1.0))
-    path = draw(compared(whole, half), "von_mises").figure.save(tmp_path / "field.png")
+    path = draw(compared(whole, half), "von_mises", ["half"]).figure.save(tmp_path / "field.png")
     viridis = mpl.colormaps["viridis"]
     full, middle = (viridis(share, bytes=True)[:3] for share in (1.0, 0.5))
     assert area_of(full, path) > 0.1
@@ -279,7 +279,7 @@ def test_words_and_marks_know_how_wide_the_page_is(width, fem, pinn, evaluate, c
 
 
 def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, compared, evaluate):
-    many = [replace(pinn, solver=f"solver-{n}", converged=n != 1) for n in range(14)]
+    many = [evaluate(f"solver-{n}", 1.1 + 0.1 * n, converged=n != 1) for n in range(14)]
     comparison = compared(fem, *many)
     drawing = draw(comparison, "von_mises")
     assert drawing.figure.get_size_inches()[1] <= 9
@@ -287,3 +287,21 @@ def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, c
     assert "solver-1 (not converged)" in drawing.caption.split("Not drawn")[1]
     chosen = page_of(draw(comparison, "von_mises", ["solver-13", "solver-12"]).figure)
     assert [word for word, _ in chosen.words if word.startswith("solver-")] == ["solver-12", "solver-13"]
+
+
+def test_one_of_two_near_fields_is_drawn_and_both_that_found_the_load(fem, pinn, evaluate, compared):
+    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(0.0, -0.1, 0.1), None)
+    near = evaluate("pinn-near", 1.001)
+    found = [replace(pinn, solver=name, in_sample=True, identified=force) for name in ("fem-id", "pinn-id")]
+    comparison = compared(fem, near, pinn, *found)
+    assert near_pairs(comparison) == {"pinn-near": ("fem", pytest.approx(0.001))}
+    drawing = draw(comparison, "von_mises")
+    assert "near another’s: pinn-near (0.10\N{NO-BREAK SPACE}% from fem)." in drawing.caption
+    text = page_of(drawing.figure).text
+    assert [name in text for name in ("pinn-near", "fem-id", "pinn-id", "pinn-std")] == [
+        False,
+        True,
+        True,
+        True,
+    ]
+    assert "pinn-near" in page_of(draw(comparison, "von_mises", ["pinn-near"]).figure).text

@@ -47,8 +47,9 @@ def test_a_run_gives_its_answers(folder: Path, capsys: pytest.CaptureFixture[str
     said = capsys.readouterr().out
     assert "May the network be trusted here?\n  Yes, as a solver" in said
     assert "gp was left out: too slow." in said
-    found = r"finds a force of 4\.\d+ N \(95 % interval 4\.00 to 5\.00\).* 80% of the variance of the force"
-    assert re.search(found, said)
+    assert "The force acts at x = 36.0 mm (35.0 to 37.5 mm) by fem-asm." in said
+    assert "80% of the variance of the force comes from the errors" in said
+    assert re.search(r"fem-asm +0\.700 +7\.3.% ", said)  # the table of the markers
     assert said.endswith(f"report: {folder / 'report.html'}\n")
     assert [path.name for path in folder.iterdir()] == ["metrics.json"]
 

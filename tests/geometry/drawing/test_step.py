@@ -205,7 +205,7 @@ def stepped(kind: str) -> cq.Shape:
             "foot",
             "z = 0 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm, and .* 19520 mm3; .* depth = 20",
         ),
-        ("foot flush", "z = -10 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm"),
+        ("foot flush", "z = 0 its section is 848 mm2 over 20 mm, 128 mm2 over 40 mm"),
         ("thin foot", "656 mm2 over 10 mm, 560 mm2 over 20 mm, and .* 12160 mm3; .* depth = 20"),
         ("boss", "720 mm2 over 20 mm, 80 mm2 over 25 mm"),
         ("step", "720 mm2 over 15 mm, 570 mm2 over 20 mm"),
@@ -218,10 +218,24 @@ def test_the_depth_of_a_solid_is_asked_for_unless_its_volume_is_area_times_depth
     with pytest.raises(UserError, match=f"a.step: the solid is not extruded: across .*{said}"):
         read_drawing(path)
     with pytest.raises(UserError, match="give the depth of the finger"):
-        read_drawing(path, plane="z = 1")
-    drawing = read_drawing(path, plane="z = 1", depth_known=True)
+        read_drawing(path, plane="z = 4")
+    drawing = read_drawing(path, plane="z = 4", depth_known=True)
     assert "cut, " in drawing.note
     assert f"of a solid of {stepped(kind).Volume():.5g} mm3" in drawing.note
+
+
+@pytest.mark.parametrize("diameter", [0.5, 6])
+def test_a_hole_across_the_middle_is_seen_from_beside_it(tmp_path, diameter):
+    bar = cq.Workplane("XY").box(60, 12, 20).cut(cq.Workplane("XY").box(40, 4, 20))
+    path = saved(tmp_path, bar.faces(">Y").workplane().hole(diameter).val())
+    settings: dict[str, object] = {}
+    if diameter == 6:
+        with pytest.raises(UserError, match="give the depth of the finger") as asked:
+            read_drawing(path)
+        settings = {"depth_known": True, "plane": str(asked.value).split('"')[1]}
+    assert area(path, **settings) == pytest.approx(560)
+    with pytest.raises(UserError, match="at z = 0 it is cut into 2 pieces; give a plane"):
+        read_drawing(path, plane="z = 0", depth_known=True)
 
 
 def test_markers_that_stand_out_do_not_make_the_finger_deeper(tmp_path):

@@ -9,8 +9,8 @@ from tests.solvers.contract.golden import JOBS, NUMBERS, golden
 TOLERANCES = {"fem-id": 1e-6, "statfem": 2e-5, "pinn-std": 3e-7, "pinn-asm": 1e-6}
 """Relative; about ten times the largest difference between Debian 12 and 13, one and two threads.
 
-`docs/reliability.md` has these differences. `fem-id` and `statfem` search for a least value, the
-networks' equations have large condition numbers.
+`docs/reliability.md` has the largest of these differences. `fem-id` and `statfem` search for a least value,
+the networks' equations have large condition numbers.
 """
 
 TIGHT = 5e-9

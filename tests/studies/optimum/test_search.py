@@ -3,9 +3,11 @@
 import html
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from json import loads
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,10 +24,12 @@ from pinnray.solvers.problem import Problem
 from pinnray.studies.optimum.designs import write_designs
 from pinnray.studies.optimum.page import front_sentences, front_table, page_tables
 from pinnray.studies.optimum.pictures import cylinder_at_end
+from pinnray.studies.optimum.proposals import APART
 from pinnray.studies.optimum.question import Limit, Question
 from pinnray.studies.optimum.search import Optimum, search_front
 from pinnray.studies.sweep.job import StudyJob, Task
-from pinnray.studies.sweep.measurement import Measurement, measured
+from pinnray.studies.sweep.measurement import Ending, Measurement, measured
+from pinnray.studies.sweep.sampling import places_of
 from pinnray.studies.sweep.store import Journal
 from pinnray.studies.sweep.study import physics_of
 
@@ -54,10 +58,17 @@ def judged(task: Task) -> dict[str, float]:
     return dict.fromkeys(QUANTITIES, 1.0) | {"force": force, "wrap": wrap, "von_mises": rib + 0.1 * count}
 
 
-def judge(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
+def judge(
+    tasks: Mapping[int, Task],
+    journal: Journal,
+    *_: object,
+    state: Callable[[int], Ending] = lambda number: "done",
+    said: Callable[[int], str] = lambda number: "",
+) -> None:
     """Stands for the workers."""
     for number in sorted(tasks.keys() - journal.numbers()):
-        journal.add(Measurement(number, "done", "", 0.0, judged(tasks[number])))
+        values = judged(tasks[number]) if state(number) == "done" else {}
+        journal.add(Measurement(number, state(number), said(number), 0.0, values))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -85,6 +96,13 @@ def test_the_known_front_is_found(found: Optimum) -> None:
     assert (gap >= -1e-9).all()
     assert np.median(gap) < 0.1  # of 8 at the ends of the range; the 14 samples have a median above 1
     assert all(each["von_mises"] <= 3.2 for each in values)
+
+
+def test_no_proposal_repeats_a_run(found: Optimum) -> None:
+    """Fingers are compared as they are made: the search knows numbers of ribs that are not whole."""
+    places = np.array([places_of(QUESTION, finger) for finger in found.samples])
+    apart = np.linalg.norm(places[:, None] - places[len(places) // 3 :], axis=2)
+    assert np.sort(apart, axis=0)[1].min() > APART
 
 
 def test_one_objective_with_limits_has_the_best_fingers_in_their_order(tmp_path, capsys, monkeypatch):
@@ -133,11 +151,12 @@ def test_a_search_that_was_stopped_goes_on_to_the_same_runs(found, tmp_path, mon
 def test_a_finger_that_goes_through_itself_is_not_on_the_front(found, tmp_path, monkeypatch):
     best = found.samples[found.front[0]]["rib_count"]
 
-    def strict(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
-        for number in sorted(tasks.keys() - journal.numbers()):
+    def strict(tasks: Mapping[int, Task], *rest: Any) -> None:
+        def said(number: int) -> str:
             crossed = tasks[number].definition["rib_count"] == best
-            said = f"{THROUGH_ITSELF}; converged" if crossed else ""
-            journal.add(Measurement(number, "done", said, 0.0, judged(tasks[number])))
+            return f"{THROUGH_ITSELF}; converged" if crossed else ""
+
+        judge(tasks, *rest, said=said)
 
     monkeypatch.setattr("pinnray.studies.optimum.search.finish", strict)
     other = search_front(StudyJob(QUESTION, Path(), tmp_path / "out", 1))
@@ -211,12 +230,7 @@ def test_thin_walls_are_not_refused_for_their_markers(tmp_path: Path) -> None:
 
 
 def test_a_search_with_few_converged_runs_takes_further_samples(tmp_path, monkeypatch):
-    def hard(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
-        for number in sorted(tasks.keys() - journal.numbers()):
-            state = "done" if number % 3 == 0 else "not converged"
-            values = judged(tasks[number]) if state == "done" else {}
-            journal.add(Measurement(number, state, "", 0.0, values))
-
+    hard = partial(judge, state=lambda number: "not converged" if number % 3 else "done")
     monkeypatch.setattr("pinnray.studies.optimum.search.finish", hard)
     asked = QUESTION.model_copy(update={"runs": 20, "samples": 12})
     found = search_front(StudyJob(asked, Path(), tmp_path / "out", 1))

@@ -58,6 +58,9 @@ def test_four_fiducials_undo_a_motion_and_three_do_not(hidden: tuple[int, ...]) 
         SCENE, discs_at(START, hidden=hidden[:1]), discs_at(moved(START), hidden=hidden[1:])
     )
     assert (motion.planes is None) == (len(hidden) == 3)
+    if len(hidden) == 3:  # the whole motion is in the deviations
+        stated = motion.undone(discs_at(BETWEEN, variance=0.0)).covariances
+        np.testing.assert_allclose(stated, np.tile(motion.shift**2 * np.eye(2), (3, 1, 1)))
 
 
 def test_a_motion_is_undone_exactly_where_there_is_no_noise() -> None:
@@ -156,6 +159,14 @@ def test_what_a_zoom_leaves_is_in_the_deviations(larger: float) -> None:
         else:
             assert error > 5 * noise
             assert 0.4 < error / stated < 2
+
+
+def test_four_fiducials_do_not_show_what_a_zoom_leaves_so_the_lens_says_it() -> None:
+    start, truth = (seen(points, CAMERA, POSE) for points in (WORKSPACE.points, DESIGN.markers))
+    ends = [discs_at(pixels, hidden=(1, 2, 5), variance=1e-6) for pixels in (start, zoomed(start, 1.01))]
+    motion = find_camera_motion(FilmedScene(DESIGN, WORKSPACE, CAMERA), *ends)
+    error = motion.undone(discs_at(zoomed(truth, 1.01))).centres - truth
+    assert 0.2 < np.sqrt((error**2).mean()) / motion.remains < 2
 
 
 def test_another_pose_leaves_nothing() -> None:

@@ -205,6 +205,15 @@ def test_fiducials_are_looked_for_in_every_frame_of_a_film_and_every_fifth_of_a_
     assert found(detections[10].fiducials) == [0, 1, 3, 4], "one was hidden in the first frame"
 
 
+def test_fiducials_are_found_anew_where_a_camera_that_is_knocked_shows_them(listed: ListedDiscs) -> None:
+    tracker, moved = FrameTracker(SCENE, shown(listed)), CORNERS + np.array([3.0, 0.5])
+    for _ in range(2):
+        seen = tracker.see(shown(listed, fiducials=moved)).fiducials
+        assert seen is not None
+        assert found(seen) == [0, 1, 2, 3, 4]
+        np.testing.assert_allclose(seen.centres, PLANE.pixels(moved))
+
+
 def test_a_fiducial_is_known_within_its_radius_of_where_it_was(listed: ListedDiscs) -> None:
     tracker = FrameTracker(SCENE, shown(listed))
     moved = CORNERS[::-1].copy()  # the order in which they are detected is of no account
