@@ -54,6 +54,12 @@ class Film(FilmSettings):
             raise ValueError("there is no such file")
         return file
 
+    @property
+    def live(self) -> bool:
+        """Whether the source is a camera or a pipe, which shows something else each time."""
+        camera = self.source.removeprefix("/dev/video").isdecimal() and not Path(self.source).is_dir()
+        return camera or self.source == "-"
+
     def scene(self, design: "Finger") -> "FilmedScene":
         """The filmed scene of a finger.
 

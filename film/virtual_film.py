@@ -1,7 +1,9 @@
 """A film of the virtual rig: the displacements that are filmed, and the files of the film."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 from pinnray.comparison.evaluation.truths import SLIDING, experiment_source, simulate
 from pinnray.film.filmed_force import LONGEST_STEP, filmed_course, true_forces
@@ -63,6 +65,7 @@ def film_finger(
     motion: Motion,
     codec: str = "ffv1",
     seed: int = 0,
+    options: Mapping[str, object] = MappingProxyType({}),
 ) -> None:
     """Render a film of a pressed finger into a folder, with its truth and photographs of a board.
 
@@ -76,6 +79,7 @@ def film_finger(
         motion: Numbers of frames at rest, moving and held.
         codec: Of the video.
         seed: Of the noise.
+        options: Of the command line, for `run.json`.
 
     Raises:
         UserError: If the finger cannot be filmed so.
@@ -106,5 +110,6 @@ def film_finger(
             with stages.stage("boards") as progress:
                 poses = board_poses(board, camera, rig.boards, seed=seed)
                 photograph(board_scene(board), poses, recording, folder / "boards", progress=progress)
-        made = {"versions": package_versions(), "machine": machine()}
-        write_run(folder, {"source": source, "rig": rig.model_dump(mode="json"), **made})
+        made: dict[str, object] = {"versions": package_versions(), "machine": machine()}
+        made |= {"options": dict(options), "rig": rig.model_dump(mode="json")}
+        write_run(folder, {"source": source, **made})

@@ -15,7 +15,7 @@ from pinnray.runtime.cache import Result, cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_version
-from pinnray.runtime.processes.worker import Task, run_task
+from pinnray.runtime.processes.worker import ChildCall, run_task
 
 TIMEOUT_S = 300.0
 """Time limit of a process that meshes, reads or writes."""
@@ -53,7 +53,7 @@ def finger_mesh(
         finger.check_materials()
     settings = settings or MeshSettings()
     sizes = settings.model_dump()
-    task = Task(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))
+    task = ChildCall(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))
     entry = (cache_dir or cache_folder()) / f"mesh-{cache_key(finger.digest, (sizes, across))}.npz"
     return _cached(entry, task, TriangleMesh.load, TriangleMesh.save if keep else None)
 
@@ -94,7 +94,9 @@ def drawn_finger(
     if not file.is_file():
         raise UserError(f"there is no drawing {file}")
     lines = description.model_dump(mode="json")
-    task = Task(f"reading {file.name}", _reader, (file.absolute(), lines))  # the child has its own folder
+    task = ChildCall(
+        f"reading {file.name}", _reader, (file.absolute(), lines)
+    )  # the child has its own folder
     entry = (cache_dir or cache_folder()) / f"drawing-{cache_key(file_digest(file), (file.name, lines))}.json"
     return _cached(entry, task, DrawnFinger.load, DrawnFinger.save)
 
@@ -122,7 +124,7 @@ def cad_files(
     if unknown:
         raise UserError(f"unknown CAD format {unknown[0]!r}; there are {', '.join(CAD_FORMATS)}")
     wanted = sorted(set(formats))
-    task = Task(f"CAD of design {finger.name!r}", _cad_writer, (finger.definition(), wanted))
+    task = ChildCall(f"CAD of design {finger.name!r}", _cad_writer, (finger.definition(), wanted))
     contents: dict[str, bytes] = run_task(task, TIMEOUT_S)
     for name, content in contents.items():
         write_bytes(folder / name, content)
@@ -138,7 +140,7 @@ def cache_key(digest: str, asked: object) -> str:
 
 def _cached(
     entry: Path,
-    task: Task,
+    task: ChildCall,
     load: Callable[[Path], Result],
     save: Callable[[Result, Path], None] | None,
 ) -> Result:

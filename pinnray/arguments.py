@@ -74,7 +74,7 @@ def read_job(
     if not isinstance(load, Load):
         if not isinstance(load, str | None):
             raise UserError(f"load must be a Load or one of {', '.join(get_args(LoadKind))}, not {load!r}")
-        load = Load(load or "mean", **words)
+        load = Physics(load=load or "mean", **words).parts[1]
     return read_finger(design, shape), material or Material(**constants), load
 
 
@@ -111,9 +111,9 @@ def read_solvers(given: object, preset: str | None = None) -> list[Solver]:
     Raises:
         UserError: If there is no such solver, or none that is named has the preset.
     """
-    several: list[Any] = (
-        list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
-    )
+    if isinstance(given, str):
+        given = [name.strip() for name in given.split(",")]
+    several: list[Any] = list(given) if isinstance(given, Sequence) else [given]
     for each in several:
         if not isinstance(each, str) and (isinstance(each, type) or not isinstance(each, Solver)):
             raise UserError(

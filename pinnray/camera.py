@@ -1,9 +1,10 @@
 """Functions of the front door for experimenters: calibrate, track, force from a film, and the virtual rig."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from pinnray.arguments import MATERIAL, mesh_settings, read_finger, read_job, read_solver, taken
@@ -162,6 +163,7 @@ def rig(
     material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     progress: bool | None = None,
+    options: Mapping[str, object] = MappingProxyType({}),
     **given: Any,
 ) -> Path:
     """Film a pressed finger with a virtual camera, and write the true markers and forces beside the film.
@@ -178,6 +180,7 @@ def rig(
         material: The elastic constants, or the name of a material.
         load: Motion of the indenter, or its kind alone.
         progress: Whether to show the stages; if None in a notebook only.
+        options: Of the command line, for `run.json`.
         given: Camera, markers and calibration boards by the words of
             `pinnray.film.rig_settings.RigSettings`, such as `frame`, `tilt`, `paint`, `boards`; parameters of
             finger, material and load, as for `solve`.
@@ -218,6 +221,7 @@ def rig(
             motion=motion or Motion(),
             codec=codec,
             seed=seed,
+            options=options,
         )
     return folder / FILES[codec]
 

@@ -144,8 +144,10 @@ def _typed(name: str, factory: Any, settings: Mapping[str, Any]) -> dict[str, An
     for key, value in settings.items():
         if key not in known:
             raise UserError(f"{name} has no setting {key!r}; it has {', '.join(known)}")
+        adapter = TypeAdapter(hints[key])
+        listed = isinstance(value, str) and value.startswith("[")
         try:
-            typed[key] = TypeAdapter(hints[key]).validate_python(value)
+            typed[key] = adapter.validate_json(value) if listed else adapter.validate_python(value)
         except ValidationError as error:
             raise UserError(f"{name}: {key} = {value!r}: {error.errors()[0]['msg'].lower()}") from None
     return typed

@@ -40,9 +40,9 @@ class UnsoundSolutionError(UserError):
 
 
 class SolverFailedError(UserError):
-    """A solver raised an exception, the cause of this one."""
+    """A solver raised an exception or called `sys.exit`, the cause of this one."""
 
-    def __init__(self, solver: "Solver", cause: Exception) -> None:
+    def __init__(self, solver: "Solver", cause: BaseException) -> None:
         call, *frames = traceback.extract_tb(cause.__traceback__)
         home = getattr(sys.modules.get(type(solver).__module__), "__file__", None)
         own = [each for each in frames if home and Path(each.filename).is_relative_to(Path(home).parent)]
@@ -232,7 +232,7 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
 
     Raises:
         UnsoundSolutionError: If it is no `Solution`, or an array in it has a wrong shape or is not finite.
-        SolverFailedError: If it raises anything but an error of the input or of the system.
+        SolverFailedError: If it raises anything but an error of the input or system, or calls `sys.exit`.
     """
     return _checked(solver, lambda: solver.solve(problem, progress), problem)
 
@@ -241,12 +241,12 @@ def _checked(solver: Solver, solve: Callable[[], Solution], problem: Problem) ->
     """The solution under its solver's name, or the errors of `solved`."""
     try:
         solution = solve()
+    except (SystemExit, FileNotFoundError) as error:  # such as of a file with its weights
+        raise SolverFailedError(solver, error) from error
     except (UserError, OSError):
         raise
     except Exception as error:
         raise SolverFailedError(solver, error) from error
-    except SystemExit as ended:
-        raise UserError(f"solver {solver.name} ended the program (exit code {ended.code!r})") from ended
     for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):
         if not isinstance(value, kind):
             said = f"{_named(value)} as its {kind.__name__}"

@@ -15,7 +15,7 @@ class Look(NamedTuple):
 
 LOOKS = {
     "fem": Look("#006ba1", "o"),
-    "fem-nonlinear": Look("#365e0d", "s"),
+    "fem-nonlinear": Look("#365e0d", ">"),
     "pinn-std": Look("#e46b28", "^"),
     "pinn-asm": Look("#1bbce4", "v"),
     "fem-asm": Look("#431b6b", "D"),
@@ -33,4 +33,4 @@ The least distance in CAM02-UCS is 22; it is 14, 13 and 12 with deuteranopia, pr
 
 def solver_look(solver: str) -> Look:
     """Colour and mark of a solver by its name; others than ours are grey."""
-    return LOOKS.get(solver) or Look(MUTED, "<>dH8*"[crc32(solver.encode()) % 6])
+    return LOOKS.get(solver) or Look(MUTED, "<dH8*"[crc32(solver.encode()) % 5])

@@ -90,12 +90,19 @@ def _figures(scores: Scores) -> RunAnswer | None:
     breaks = values.get("strain_over_break", nan)
     if isfinite(breaks):
         sentences.append(break_answer(breaks, values.get("peak_radius_mm", nan)))
+    intervals = "In brackets: 95 % intervals. "
     shown = [row for row in rows if any(cell not in (NONE, "0.00") for cell in row[1:])]
     return RunAnswer(
         "What does the finger do?",
         f"By {scores.label(name)} {said}." if said != NONE else f"{scores.label(name)} does not tell.",
         sentences,
-        TextTable("", ["", *columns], shown, FIGURES_NOTE, left=[""]),
+        TextTable(
+            "",
+            ["", *columns],
+            shown,
+            intervals * any("(" in cell for row in shown for cell in row[1:]) + FIGURES_NOTE,
+            left=[""],
+        ),
     )
 
 

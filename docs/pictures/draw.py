@@ -13,7 +13,7 @@ from matplotlib.path import Path as Outline
 import pinnray as pr
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.canvas import Extent
-from pinnray.comparison.figures.layout import arrow, axes_at
+from pinnray.comparison.figures.layout import HALO, arrow, axes_at
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
@@ -107,7 +107,9 @@ def draw_wrap() -> Figure:
         )
         low, high = (np.degrees(np.arctan2(way[1], way[0])) for way in (middle - base, tip - middle))
         axes.add_patch(Arc(tuple(middle), 32, 32, theta1=low, theta2=high, color=CONTACT, lw=1.2, zorder=5))
-        axes.annotate("wrap", middle + np.array([17, -3.5]), color=CONTACT, size=9, zorder=6)
+        axes.annotate(
+            "wrap", middle + np.array([17, -3.5]), color=CONTACT, size=9, zorder=6, path_effects=HALO
+        )
     return drawn
 
 

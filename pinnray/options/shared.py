@@ -329,11 +329,4 @@ def existing_table(path: Path | None) -> Path | None:
             f"--measurements {path}: this command takes a CSV file of displacements, and no film; "
             "`pinnray track` makes one from a film"
         )
-    return existing(path)
-
-
-def existing(path: Path | None) -> Path | None:
-    """The path, if it is None or a file; else a `UserError`."""
-    if path is not None and not path.is_file():
-        raise UserError(f"there is no file {path}")
     return path

@@ -13,8 +13,8 @@ from pinnray.runtime.processes.child import ProcessFailed
 from pinnray.runtime.processes.pool import Pool
 
 
-class Task(NamedTuple):
-    """A task for the worker; it must be picklable.
+class ChildCall(NamedTuple):
+    """A call of a function in the child process; it must be picklable.
 
     Attributes:
         what: Its description in messages, such as "meshing design 'default'".
@@ -28,7 +28,7 @@ class Task(NamedTuple):
     given: tuple[object, ...]
 
 
-def run_task(task: Task, timeout_s: float) -> Any:
+def run_task(task: ChildCall, timeout_s: float) -> Any:
     """Run a task in this process's worker, wait for it and return its result.
 
     Raises:
@@ -60,7 +60,7 @@ def _pool(parent: int) -> Pool:
     return pool
 
 
-def perform(limited: tuple[Task, float], _: object) -> Any:
+def perform(limited: tuple[ChildCall, float], _: object) -> Any:
     """Run a task with a limit of memory, GB, in this process.
 
     Returns:

@@ -12,7 +12,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.extrusion import ExtrudedSpace
-from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps, check_stops
 from pinnray.solvers.fem.finite_strain.nested_path import followed
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.problem import Problem
@@ -85,6 +85,7 @@ class Fem3dSolver(FieldSettings):
             raise UserError(
                 f"fem-3d has layers that get thinner outwards: 0 < grading <= 1, not {self.grading:g}"
             )
+        check_stops(self.name, self.stops)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the problem in three dimensions; see `Solver`."""

@@ -111,12 +111,12 @@ class FingerFigures:
         That is warned of; the `stops` of a solver are fractions of the stroke at which it is computed.
 
         Raises:
-            UserError: If the travel is longer than the load's, or the way to the end is not known.
+            UserError: If the travel is longer than the solver came, or the way to the end is not known.
         """
         travels, forces = np.array(self.curve).T
         if not 0 <= stroke <= travels[-1] * (1 + 1e-9):
             raise UserError(
-                f"the force is known from 0 to {travels[-1]:.4g} mm, not at {stroke:g} mm; change the stroke"
+                f"the force is known up to the last equilibrium, not at {stroke:g} mm; change the stroke"
             )
         if len(travels) == 1 and not np.isclose(stroke, travels[-1]):
             raise UserError(

@@ -13,7 +13,7 @@ from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.cache import cache_folder, check_writable, share_cache
 from pinnray.runtime.processes.pool import Pool, child_environment
-from pinnray.runtime.processes.worker import Task, perform
+from pinnray.runtime.processes.worker import ChildCall, perform
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
 
@@ -133,10 +133,10 @@ def test_a_full_cache_is_a_warning_and_the_mesh_is_there(tmp_path: Path, monkeyp
 @pytest.mark.parametrize(
     ("task", "end"),
     [
-        (Task("this", cache._mesher, ({}, COARSE.model_dump(), None)), ": File too large"),
+        (ChildCall("this", cache._mesher, ({}, COARSE.model_dump(), None)), ": File too large"),
         # OpenCASCADE writes a part and says nothing
         pytest.param(
-            Task("this", cache._cad_writer, ({}, ["step"])),
+            ChildCall("this", cache._cad_writer, ({}, ["step"])),
             "/finger.step: a part was not written; is the disk full?",
             marks=pytest.mark.slow,
         ),

@@ -9,7 +9,7 @@ import pytest
 
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.processes.pool import Pool
-from pinnray.runtime.processes.worker import Task, perform, run_task
+from pinnray.runtime.processes.worker import ChildCall, perform, run_task
 
 limited = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is limited on Linux only")
 
@@ -46,14 +46,14 @@ def crashing() -> Callable[[], None]:
 )
 def test_a_task_without_a_result_is_one_line(prepare, line) -> None:
     with pytest.raises(UserError, match=rf"^{line}$"):
-        run_task(Task("meshing", prepare, ()), 60)
+        run_task(ChildCall("meshing", prepare, ()), 60)
 
 
 @limited
 def test_a_task_that_needs_more_memory_than_is_free_is_one_line() -> None:
     """A task that takes a gigabyte, then one that takes a megabyte, with 0.5 GB free."""
     sizes = {"large": 10**9, "small": 10**6}
-    tasks = {name: (Task(name, filling, (size,)), 0.5) for name, size in sizes.items()}
+    tasks = {name: (ChildCall(name, filling, (size,)), 0.5) for name, size in sizes.items()}
     with Pool(1) as pool:
         answers = dict(pool.answers(perform, tasks))
     assert str(answers["large"]) == "large needs more than 0.5 GB, which is what is free; use larger elements"

@@ -7,7 +7,8 @@ from cyclopts import Group, Parameter
 from pydantic import Field
 
 from pinnray.film.rig_settings import RigSettings
-from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
+from pinnray.options.file import given_options, usual_options
+from pinnray.options.shared import OUTPUT, FingerOptions, OptionalOutputPath, PhysicsOptions, SolverOptions
 from pinnray.runtime.errors import UserError
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.motion import Motion
@@ -35,7 +36,7 @@ def command(
     exposure: Annotated[Exposure, EXPOSURE] = Exposure(),
     motion: Annotated[Motion, MOTION] = Motion(),
     codec: Annotated[str, Parameter(group=OUTPUT, show_default=True)] = "ffv1",
-    out: OutputPath = Path("out/rig"),
+    out: OptionalOutputPath = None,
 ) -> int:
     """Render a film of a pressed finger, and write the true marker positions beside it.
 
@@ -50,9 +51,10 @@ def command(
     Args:
         solver: Solver of the filmed displacements; default: the finite-strain simulation of `compare`.
         codec: ffv1 or png (lossless), mjpg or mp4v.
-        out: Output folder.
+        out: Output folder; default out/rig, unless that holds the finished run of another job.
     """
     from pinnray.camera import rig
+    from pinnray.runtime.output_folder import check_same_job
 
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
@@ -60,10 +62,14 @@ def command(
     if len(solvers) > 1:
         raise UserError("the rig films one finger; name one --solver")
     finger.check_cost(design, mesh, solvers, simulated=not solvers)
+    groups, folder = (finger, physics, options, scene, exposure, motion), out or Path("out/rig")
+    given = given_options(*groups, solver=solver, codec=codec)
+    if out is None:
+        check_same_job(folder, given, usual_options(*groups))
     rig(
         design,
         solvers[0] if solvers else None,
-        out=out,
+        out=folder,
         exposure=exposure,
         motion=motion,
         codec=codec,
@@ -72,8 +78,9 @@ def command(
         material=material,
         load=load,
         progress=True,
+        options=given,
         **dict(scene),
     )
-    for path in sorted(out.iterdir()):
+    for path in sorted(folder.iterdir()):
         print(path)
     return 0

@@ -1,5 +1,6 @@
 """Track markers through a video."""
 
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -7,13 +8,14 @@ from cyclopts import Group, Parameter
 from rich.console import Console
 
 from pinnray.film.film import FilmSettings
+from pinnray.options.file import given_options, usual_options
 from pinnray.options.shared import (
     FilmOptions,
     FingerOptions,
     Flag,
     MaterialOptions,
+    OptionalOutputPath,
     OutputFlag,
-    OutputPath,
 )
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
@@ -31,7 +33,7 @@ def command(
     live: Flag = False,
     publish: Flag = False,
     without_video: OutputFlag = False,
-    out: OutputPath = Path("out/track"),
+    out: OptionalOutputPath = None,
 ) -> int:
     """Measure marker displacements from a video that shows the finger at rest, pressed, and held.
 
@@ -52,14 +54,15 @@ def command(
         publish: As --live, and write a line of JSON for every frame, with the newest force if --force, to the
             standard output; tables then go to standard error.
         without_video: Write no annotated video.
-        out: Output folder.
+        out: Output folder; default out/track, unless that holds the finished run of another job, or any of a
+            camera or a pipe.
     """
     from pinnray.comparison.pipeline.shared_mesh import shared_mesh
     from pinnray.film.force_estimate import MESH, force_table, force_tracker, forces_of, write_forces
     from pinnray.film.live_force import LiveForce, frame_lines
     from pinnray.film.track_film import track_film, track_table
     from pinnray.runtime.machine import machine, package_versions
-    from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
+    from pinnray.runtime.output_folder import check_output, check_same_job, replaced_folder, write_run
     from pinnray.runtime.stages import Stages
     from pinnray.solvers.registry import make_solver
 
@@ -69,10 +72,16 @@ def command(
     film, material = options.of(source), elastic.made() if force else None
     if material:
         finger.check_cost(design, settings, [make_solver("fem-id")])
-    check_output(out)
+    groups, chosen = (finger, options, elastic), {"source": source, "force": force, "live": live or publish}
+    given, folder = given_options(*groups, **chosen), out or Path("out/track")
+    if film.live:
+        given["recorded"] = datetime.now().astimezone().isoformat()
+    if out is None:
+        check_same_job(folder, given, usual_options(*groups))
+    check_output(folder)
     console, live = Console(stderr=True), live or publish
     forces, passed_over = [], None
-    with replaced_folder(out) as folder:
+    with replaced_folder(folder) as partial:
         with Stages(console) as stages:
             mesh = shared_mesh(design, settings, stages)[0] if material else None
             following = tracker = None
@@ -82,7 +91,7 @@ def command(
             watch = frame_lines(following, publish=publish) if live else None
             with stages.stage("track") as report:
                 tracking, observations = track_film(
-                    film, design, folder, report, video=not without_video, watch=watch
+                    film, design, partial, report, video=not without_video, watch=watch
                 )
             if following is not None:
                 forces, passed_over = following.finished(), following.passed_over
@@ -90,22 +99,23 @@ def command(
                 with stages.stage("force") as report:
                     tracker = force_tracker(mesh, design, material, observations.points)
                     forces = forces_of(tracking, tracker, report)
-        provenance = {"design": design.definition(), "versions": package_versions(), "machine": machine()}
+        made = {"versions": package_versions(), "machine": machine()}
+        provenance = {"options": given, "design": design.definition(), **made}
         if tracker is not None and material:
-            write_forces(folder, forces, design.depth)
+            write_forces(partial, forces, design.depth)
             provenance["force"] = {
                 "material": material.model_dump() | {"law": tracker.law},
                 "mesh": settings and settings.model_dump(),
                 "frames": len(forces),
                 "passed_over": passed_over,
             }
-        write_run(folder, provenance | {"seconds": stages.seconds})
+        write_run(partial, provenance | {"seconds": stages.seconds})
     for warning in tracking.warnings:
         say(f"warning: {warning}")
     said = console if publish else Console()
     said.print(track_table(tracking, observations))
     if forces:
         said.print(force_table(forces, design.depth, passed_over))
-    for path in sorted(out.iterdir()):
+    for path in sorted(folder.iterdir()):
         print(path, file=said.file)
     return 0

@@ -27,7 +27,6 @@ from pinnray.options.shared import (
     PhysicsOptions,
     SolverOptions,
     comma_list,
-    existing,
     read_millimetres,
 )
 from pinnray.runtime.errors import UserError
@@ -179,4 +178,4 @@ def _measurements(source: str | None, options: FilmSettings) -> "Path | Measured
         from pinnray.film.measured_film import MeasuredFilm
 
         return None if source is None else MeasuredFilm(source=source, **options.model_dump())
-    return existing(Path(source))
+    return Path(source)

@@ -76,7 +76,8 @@ def command(
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
     (made,) = chosen_solvers
     if at_strokes and "stops" in made.settings():
-        made = make_solver(made.name, **made.settings() | {"stops": [each / travel for each in at_strokes]})
+        stops = [min(each / travel, 1.0) for each in at_strokes]
+        made = make_solver(made.name, **made.settings() | {"stops": stops})
     given = None
     if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)

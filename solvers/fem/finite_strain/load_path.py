@@ -1,12 +1,14 @@
 """The load path from rest to the full load, in adaptive steps."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import ContactRegion, CylinderContact
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
@@ -50,6 +52,12 @@ class LoadSteps:
     max_iterations: int = 12  # Newton iterations in one step
     # Fractions of the load at which a step ends; with any, all steps are on the given elements, and exact
     stops: tuple[float, ...] = ()
+
+
+def check_stops(solver: str, stops: Sequence[float]) -> None:
+    """Raise a `UserError` unless the `stops` of a solver are fractions of the load."""
+    if outside := [stop for stop in stops if not 0 <= stop <= 1]:
+        raise UserError(f"{solver}: stops are fractions of the stroke, 0 to 1, not {outside[0]:g}")
 
 
 class LoadPath:

@@ -11,7 +11,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
 from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps
+from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps, check_stops
 from pinnray.solvers.fem.finite_strain.nested_path import coarser, followed
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Problem
@@ -46,6 +46,7 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
             raise UserError("fem-nonlinear needs 0 < min_step <= first_step <= max_step <= 1")
         if not 0 < self.tolerance <= 1e-3:
             raise UserError(f"{self.name} needs 0 < tolerance <= 0.001, not {self.tolerance:g}")
+        check_stops(self.name, self.stops)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`."""

@@ -244,19 +244,21 @@ def test_other_measurements_are_assimilated_again(job, tmp_path):
 # Stopped halfway
 
 
-def test_a_run_goes_on_without_a_solver_that_raises(job):
+@pytest.mark.parametrize(
+    "end",
+    [RuntimeError("a fault\nof two lines"), SystemExit(3), FileNotFoundError("w.npz")],
+    ids=lambda end: type(end).__name__,
+)
+def test_a_run_goes_on_without_a_solver_that_raises(job, end):
     """The line names solver, exception and place; the traceback is kept, and so is the rest."""
-    found = compare(
-        job(Scripted("first"), Scripted("second", RuntimeError("a fault\nof two lines")), Scripted("third"))
-    )
+    found = compare(job(Scripted("first"), Scripted("second", end), Scripted("third")))
     assert [evaluation.solver for evaluation in found.evaluations] == ["first", "third"]
-    line = found.failed["second"]
-    raised = r"solver second raised RuntimeError: a fault of two lines \(.*test_pipeline\.py:\d+\); .*"
-    assert re.fullmatch(raised, line)
+    line, said = found.failed["second"], f"{type(end).__name__}: {' '.join(str(end).split())}"
+    assert re.fullmatch(rf"solver second raised {said} \(.*test_pipeline\.py:\d+\); .*", line)
     out = job().out
     trace = (out / "errors/second.txt").read_text()
     assert "raise self.end" in trace
-    assert "RuntimeError: a fault" in trace
+    assert f"{type(end).__name__}: {end}" in trace
     assert json.loads((out / "run.json").read_text())["failed"] == {"second": line}
     compare(job(Scripted("first"), Scripted("third"), resume=True))  # its file is one of the run's own
 
