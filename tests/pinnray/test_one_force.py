@@ -27,7 +27,8 @@ def test_tables_report_metrics_terminal_and_sweep_tell_one_force(tmp_path: Path,
     assert force == pytest.approx(-depth * own["reaction"][1])
     assert own["force_to_truth_rel"] == pytest.approx(force / truth - 1)
     assert short_table([figures_of("fem", own)]).split("|")[-2].split() == said.split()
-    assert said.removesuffix("%").strip() in re.findall(r"^ *fem .*", terminal, re.M)[-1].split()
+    (row,) = (line for line in re.findall(r"^ *fem  .*", terminal, re.M) if said.split()[0] in line.split())
+    assert by_size.split()[0] not in row.split()
     report = (out / "report.html").read_text(encoding="utf-8")
     assert f"the force is {number(force, 3)} N (truth {number(truth, 3)})" in report
     assert said in report
