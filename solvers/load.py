@@ -41,7 +41,7 @@ class Travel(CheckedModel):
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         if self.slide and self.direction:
-            raise ValueError("with slide the contact is free along the finger, so that direction says nothing")
+            raise ValueError("slide leaves the contact free along the finger, so that direction says nothing")
         return self
 
     @property
