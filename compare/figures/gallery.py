@@ -58,15 +58,15 @@ def _field(
 ) -> Illustration:
     drawn = drawn_solvers(comparison, solvers, page)
     reference = drawn[0].label
-    caption = f"Drawn as the {QUANTITIES[0].title}."
+    caption = "Drawn as the von Mises stress."
     if quantity is QUANTITIES[0]:
         caption = (
-            f"One scale holds {PERCENT:g} % of the area of {reference}; at sharp corners the largest value "
-            "grows with refinement."
+            f"One scale, which covers {PERCENT:g} % of the area in {reference}; at sharp corners the largest "
+            "value grows with refinement."
         )
         if len(comparison.shown_fields) > 1:
             where = "Below" if page < NARROW else "Right"
-            caption += f" {where}: the field minus that of {reference}, each on the scale above its panel."
+            caption += f" {where}: the field minus {reference}, each on the scale above its panel."
         caption += _absent(comparison.shown_fields, drawn, near_pairs(comparison))
     return Illustration(draw_field(comparison, quantity, solvers, page), quantity.title, caption)
 
@@ -154,7 +154,7 @@ def _absent(
     twins = [f"{name} ({percent(near[name][1], 2)} from {near[name][0]})" for name in absent if name in near]
     rest = [each.label for each in every if each.solver in absent and each.solver not in near]
     said = f" Not drawn, as their displacement is near another’s: {', '.join(twins)}." if twins else ""
-    return said + (f" Not drawn, for lack of room or by choice: {', '.join(rest)}." if rest else "")
+    return said + (f" Left out: {', '.join(rest)}." if rest else "")
 
 
 def _given(comparison: Results) -> str:
