@@ -307,6 +307,21 @@ def test_another_job_is_not_resumed_from(job, measured, monkeypatch, changes):
     assert first.calls == 2
 
 
+def test_what_an_interrupted_run_finished_is_taken_over_and_a_damaged_part_made_again(job):
+    stopped = job(
+        first := Scripted("first"), second := Scripted("second"), Scripted("third", KeyboardInterrupt())
+    )
+    with pytest.raises(KeyboardInterrupt):
+        compare(stopped)
+    kept = stopped.out.with_name(f"{stopped.out.name}.partial") / "solutions" / "first.npz"
+    kept.write_bytes(kept.read_bytes()[:1000])
+    with pytest.warns(RuntimeWarning, match="first.npz is damaged .* and is made again"):
+        found = compare(job(first, second, Scripted("third"), resume=True))
+    assert (first.calls, second.calls) == (2, 1)
+    alone = compare(job(Scripted("first"), Scripted("second"), Scripted("third")))
+    assert without_times(found.scores.content()) == without_times(alone.scores.content())
+
+
 def test_a_solver_that_was_typed_into_a_notebook_is_not_resumed(job, monkeypatch):
     """Its class has no source file, so that an edit would bring the old result back."""
     monkeypatch.setattr(Scripted, "__module__", "notebook")
