@@ -132,7 +132,8 @@ def truth_scores(truth: Evaluation | None, load: Load) -> FigureScores | None:
 
     Where that is inclined, the truth's own stroke, along y, is another one: forces on its way are not known.
     """
-    if truth is None or (found := figure_scores(truth)) is None or not load.displacement[0]:
+    found = figure_scores(truth)
+    if truth is None or found is None or not load.displacement[0]:
         return found
     own = float(np.linalg.norm(truth.reaction))
     depth = float(np.hypot(found.values["force_N"], found.values["tangential_force_N"])) / own

@@ -25,7 +25,7 @@ from tests.compare.tables import rows_of
 
 Rows = list[dict[str, str]]
 Comparing = Callable[..., Results]
-UNITS = ("_mm", "_MPa", "_1", "_N_mm_per_mm", "_N_per_mm", "_s", "_rel_l2", "_rel")
+UNITS = ("_mm", "_N", "_MPa", "_1", "_N_mm_per_mm", "_N_per_mm", "_s", "_rel_l2", "_rel")
 WITHOUT_UNIT = {"marker", "observations", "visible", "solver", "converged", "reference", "status"}
 WITHOUT_UNIT |= {"misses_energy", "in_sample"}
 WITHOUT_UNIT |= {f"{name}_{flag}" for name in ("fem", "pinn-std") for flag in ("converged", "in_sample")}
