@@ -12,7 +12,7 @@ from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.finger_figures import figures_at_rest
 from pinnray.solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalSolver, PinnStdSolver
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
+from pinnray.solvers.symmetric_factors import BlockMatrix
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.shared_work import SharedWork, shared
 from pinnray.solvers.statistics.statistical_fem import StatFemSolver

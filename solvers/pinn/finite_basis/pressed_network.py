@@ -19,7 +19,7 @@ from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION
 from pinnray.solvers.pinn.finite_basis.newton import Level, LoadStep, follow_load
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
+from pinnray.solvers.symmetric_factors import Factors
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Progress
 
