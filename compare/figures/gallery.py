@@ -149,8 +149,7 @@ def _mesh(comparison: Results, page: float) -> Illustration:
     return Illustration(
         draw_mesh(comparison.mesh, page),
         "Mesh",
-        f"{numbers['size']}, edges from {numbers['edges']}. Quality, twice the ratio of the inscribed to the "
-        f"circumscribed radius: {numbers['quality']}.",
+        "Quality: twice the ratio of the inscribed to the circumscribed radius.",
         f"{numbers['size']}, edges from {numbers['edges']}",
     )
 

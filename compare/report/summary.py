@@ -4,6 +4,7 @@ A question that they cannot answer is not asked.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from math import hypot, isfinite, nan
 from typing import NamedTuple
 
@@ -155,18 +156,19 @@ def _trust(scores: Scores) -> RunAnswer | None:
     judged = [name for name in networks if name in plain]
     reference = scores.label(scores.reference)
     listed = {scores.reference: scores[scores.reference], **plain}
+    heads = ["Solver", f"{reference}:\ndisplacement", f"{reference}:\nvon Mises"]
     table = TextTable(
-        f"Relative L² distance over the body, from {reference}"
-        + (" and from the truth, with the error of the force" if scores[scores.reference].to_truth else ""),
-        ["Solver", "displacement", "von Mises", *TRUTH_HEADS][
-            : 3 + 3 * bool(scores[scores.reference].to_truth)
-        ],
+        f"Relative L² distance over the body from {reference}",
+        heads,
         [
             [scores.label(name), *_from_reference(name, scores), *_to_truth(own)]
             for name, own in listed.items()
         ],
         f"±: error of {reference}, as it estimates it." if scores[scores.reference].uncertainty else "",
     )
+    if scores[scores.reference].to_truth:
+        title = f"{table.title} and from the truth, and error of the force"
+        table = replace(table, title=title, headings=[*heads, *TRUTH_HEADS])
     return RunAnswer(
         "May the network be trusted here?",
         " ".join(_verdict(name, scores) for name in judged),
@@ -279,7 +281,7 @@ def _who(better: Sequence[str], given: Collection[str]) -> str:
     if not better:
         return "no solver that was given markers is"
     if len(better) == len(given):
-        return f"all {len(given)} solvers that were given markers are"
+        return f"{_all(len(given))} solvers that were given markers are"
     return f"only {_listed(better)} {'is' if len(better) == 1 else 'are'}"
 
 
@@ -309,7 +311,7 @@ def _convergence(scores: Scores) -> RunAnswer:
         sentences += [f"{name} {what}: {message.rstrip('. ')}." for name, message in reasons.items()]
     bad = [*faulty, *scores.failed]
     count = len(scores.solvers) + len(scores.failed)
-    met = "the solver met its" if count == 1 else f"all {count} solvers met their"
+    met = "the solver met its" if count == 1 else f"{_all(count)} solvers met their"
     verdict = f"{len(bad)} of {count} solvers: {_listed(bad)}." if bad else f"Nothing: {met} own criterion."
     own = scores[scores.reference].uncertainty
     if own and not any(each.family == "neural network" for each in scores.solvers.values()):
@@ -318,6 +320,10 @@ def _convergence(scores: Scores) -> RunAnswer:
             f"{share(own.rel_l2_displacement)} in displacement and {share(own.rel_l2_von_mises)} in stress."
         )
     return RunAnswer("What is not converged?", verdict, sentences)
+
+
+def _all(count: int) -> str:
+    return "both" if count == 2 else f"all {count}"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, PathPatch
 from matplotlib.path import Path as Outline
@@ -13,7 +14,8 @@ from matplotlib.path import Path as Outline
 import pinnray as pr
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.canvas import Extent
-from pinnray.comparison.figures.layout import HALO, arrow, axes_at
+from pinnray.comparison.figures.layout import HALO, arrow, axes_at, write_heading
+from pinnray.comparison.figures.solver_colours import solver_look
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
@@ -132,7 +134,29 @@ def draw_fingers() -> Figure:
     return draw_front_fingers(Optimum(question, [{} for _ in runs], found, list(runs)[1:]), solved)
 
 
+def draw_growth() -> Figure:
+    """CPU time and memory over the number of unknowns, with lines through the largest three."""
+    table = pd.read_csv(HERE.parent / "growth.csv")
+    with figure(2.6, PAGE) as drawn:
+        write_heading(drawn, "Cost over the number of unknowns", "default finger, one core")
+        for side, (column, label) in enumerate({"seconds": "CPU time, s", "gigabytes": "memory, GB"}.items()):
+            axes = axes_at(drawn, (0.7 + side * PAGE / 2, 0.5, PAGE / 2 - 1.0, 1.6))
+            for solver, rows in table.groupby("solver"):
+                colour, mark = solver_look(str(solver))
+                x, y = rows["unknowns"].to_numpy(), rows[column].to_numpy()
+                slope, offset = np.polyfit(np.log(x[-3:]), np.log(y[-3:]), 1)
+                axes.plot(x, y, mark, color=colour, ms=5, label=solver)
+                axes.plot(x[-3:], np.exp(offset) * x[-3:] ** slope, color=colour, lw=1.2)
+            axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel=label, ylim=(0.05, 100))
+            axes.xaxis.set_major_formatter("{x:,.0f}")
+            axes.yaxis.set_major_formatter("{x:g}")
+            axes.grid()
+        axes.legend(loc="upper left")
+    return drawn
+
+
 PICTURES = {
+    "growth": draw_growth,
     "finger": draw_finger,
     "wrap": draw_wrap,
     "front-fingers": draw_fingers,

@@ -121,8 +121,8 @@ def cylinder_at_end(problem: Problem) -> Circle | None:
 def _said(optimum: Optimum, run: int) -> str:
     """The first quantities of the question, of a run."""
     values = optimum.measurements[run].values
-    names = optimum.study.names[:3]
-    return ", ".join(f"{name.replace('_', ' ')} {values[name]:.3g} {_unit(name)}" for name in names)
+    words = (f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.names[:3])
+    return ", ".join(words).replace("_", "\N{NO-BREAK SPACE}")
 
 
 def _place(run: Measurement, first: str, second: str) -> tuple[float, float]:
