@@ -23,8 +23,9 @@ class Observations:
         visible: Which markers were seen, shape (m,), all if None; none where no displacement is known.
         source: One sentence on the origin of the numbers, or on why there are none, shown with them.
         simulated: True if no camera was involved.
-        plane: Whether the markers move as in plane strain, as those of a plane simulation do, or on a side face
-            without traction, as those of a real finger; None where it is not known, as of a film of the rig.
+        plane: True if the markers move as in plane strain, as those of a plane simulation do; False if they
+            are on a side face without traction, as those of a real finger; None where it is not known, as of
+            a film of the rig.
         marker_radius: Radius of the markers' discs, over which their displacements are means, mm; the default
             design's, `design.marker_radius` is that of another one.
         pressed: Registration of the pressed picture with that at rest.

@@ -76,8 +76,8 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     Comment lines start with `#`. `# source: TEXT` names the origin of the numbers, `# simulated` means that
     no camera was involved. `# pressed picture: TEXT` says how well the pressed picture's frame is known in
     that at rest, and `# picture at rest: TEXT` how well that one's is in the drawing, in words of
-    `Registration.parse`. After `# simulated` may stand `in plane strain` or `on a side face`. Where nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose
-    points were `CLICKED`.
+    `Registration.parse`. Where nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose
+    points were `CLICKED`. After `# simulated` may stand `in plane strain` or `on a side face`.
 
     Raises:
         UserError: If the file cannot be read, a column is missing, a value is no number
@@ -86,7 +86,7 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     table = read_table(path, "measurements", *TITLES)
     sources = _said(table.comments, SOURCE_MARK)
     words = {f"{SIMULATED_MARK}{seen}": plane for plane, seen in SEEN.items()}
-    marks = [" ".join(comment.lower().replace("#", "# ").split()) for comment in table.comments]
+    marks = [re.sub(r"^#\s*", "# ", comment.lower()) for comment in table.comments]
     simulated = [words[mark] for mark in marks if mark in words]
     known = {picture: said[0] for picture, mark in PICTURES.items() if (said := _said(table.comments, mark))}
     return measurements_of(

@@ -9,6 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 import ufl
 
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.observations import Observations
@@ -34,6 +36,12 @@ from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import Cost, Family, Progress, check_problem, silent
+
+DEPTH_UNKNOWN = (
+    "the drawing has no depth: the finger was fitted in plane strain, whose force is up to a fifth too "
+    "large; give depth"
+)
+"""What is said of markers on the side face of a finger whose depth is not known."""
 
 
 class FemBody:
@@ -190,8 +198,9 @@ def _both_components(values: FloatArray) -> FloatArray:
 class FemIdSolver(IdentifyingSolver):
     """Finite elements whose contact, walls and law are found from the markers.
 
-    Markers of a real finger are on a side face, which bulges: there the last steps are those of a `ThickBody`,
-    on elements of 1 mm where the mesh has finer ones, and the field is that of the side face.
+    Markers of a real finger are on a side face, which bulges. For them the last steps are by a `ThickBody`,
+    on elements of 1 mm where the mesh has finer ones, and the field is that of the side face. A drawing of
+    which the depth is not known is fitted in plane strain.
     """
 
     degree: int = 2  # Of the elements, 1 or 2
@@ -238,14 +247,19 @@ class FemIdSolver(IdentifyingSolver):
                 "triangles": len(mesh.triangles),
                 "degree": self.degree,
             }
-            solved = replace(problem, mesh=mesh, observations=observations)
-            return found.solution(self.name, solved, stats)
+            solution = found.solution(
+                self.name, replace(problem, mesh=mesh, observations=observations), stats
+            )
+            if observations.plane is not False or _depth_known(problem.finger):
+                return solution
+            warnings = [*solution.status.warnings, DEPTH_UNKNOWN]
+            return replace(solution, status=replace(solution.status, warnings=warnings))
 
         return fitted
 
     def _search(self, problem: Problem) -> Identifier | NestedSearch:
         coarse, seen = coarser(problem), problem.observations
-        if problem.finger is not None and seen is not None and seen.plane is False:
+        if seen is not None and seen.plane is False and _depth_known(problem.finger):
             fine: Callable[[Unknowns], Body] = partial(ThickBody, degree=self.degree)
             coarse = problem = coarse or problem
         else:
@@ -256,6 +270,12 @@ class FemIdSolver(IdentifyingSolver):
         return NestedSearch(
             rough, Identifier(self, problem, fine, flexibility=rough.flexibility), _interpolated
         )
+
+
+def _depth_known(finger: Finger | None) -> bool:
+    """Whether a finger has a depth of its own, not one that was proposed for its drawing."""
+    proposed = isinstance(finger, DrawnFinger) and finger.sources.get("depth") == "proposed"
+    return finger is not None and not proposed
 
 
 def _interpolated(fit: Fit, model: ResponseModel) -> Response:

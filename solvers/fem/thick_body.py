@@ -4,21 +4,23 @@ Between the middle plane, z = 0, and a side face without traction, z = h, the di
 
     u, v = Σ_d f_d(z) c_d(x, y)  with f of 1, z² and cosh(z/ℓ)        w: with f of z and sinh(z/ℓ)
 
-even and odd in z: bending across the depth, and the layer below a side face, as thick as a wall. All f of u and
-v but the first one have the mean zero, so that their c_0 is the mean over the depth. With the derivatives
-t_m d = (f_d, f_d, f'_d) of the functions along x, y and z, integrals over z come first and leave the plane's:
-a tangent A_ijkl(x, y, z) gives for the functions d of component i and e of component k
+even and odd in z: bending across the depth, and the layer below a side face, as thick as a wall. All f of u
+and v but the first one have the mean zero, so that their c_0 is the mean over the depth. With the factors
+t_md = (f_d, f_d, f'_d) of the derivatives along x, y and z, integrals over z come first and leave the
+plane's: a tangent A_ijkl(x, y, z) gives for the functions d of component i and e of component k
 
     H_md,le(x, y) = ∫ t_md A_imkl t_le dz / h
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from itertools import product
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.special import roots_legendre
 
 from pinnray.geometry.mesh.boundary import mean_thickness
 from pinnray.geometry.mesh.point_location import LocatedPoints
@@ -26,16 +28,17 @@ from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import Lame, deformation_jacobian, energy_density_of, piola_stress_and_tangent
+from pinnray.solvers.fem.node_blocks import NodeBlocks
 from pinnray.solvers.identification.body import Linearised
 from pinnray.solvers.identification.unknowns import Unknowns
 from pinnray.solvers.lagrange import LagrangeSpace
-from pinnray.solvers.symmetric_factors import BlockMatrix, Factors
+from pinnray.solvers.symmetric_factors import Factors
 
 COMPONENT = np.array([0, 1, 0, 1, 0, 1, 2, 2])
 """Number of the component, u, v or w, of each of the D functions of z."""
 MEAN = np.array([1.0, 1.0, 0, 0, 0, 0, 0, 0])
 """Their means over the depth."""
-INNER, LAYER = np.polynomial.legendre.leggauss(3), np.polynomial.legendre.leggauss(4)
+INNER, LAYER = roots_legendre(3), roots_legendre(4)
 """Gauss' rules in the middle of the depth, and in the layer of four ℓ below a side face."""
 
 
@@ -75,8 +78,8 @@ class Strained(NamedTuple):
 class ThickBody:
     """Half of a finger's depth on Lagrange elements; see `pinnray.solvers.identification.body.Body`.
 
-    A state is the array of the coefficients c at the nodes, shape (N, D), mm. Forces are per depth, and act on
-    the mean over it; markers are on a side face.
+    A state is the array of the coefficients c at the nodes, shape (N, D), mm. Forces are per depth, and act
+    on the mean over it; markers are on a side face.
     """
 
     thick: ClassVar[bool] = True
@@ -103,7 +106,7 @@ class ThickBody:
         self._free = ~np.isin(np.arange(len(self.space.nodes)), base)
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
         self.feet[:, base, :2] = unknowns.feet.motions(self.space.nodes[base])
-        self._pattern = _Pattern.of(self.space)
+        self._blocks = NodeBlocks.of(self.space)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -189,13 +192,13 @@ class ThickBody:
         shapes = *self.space.shape_gradients(location), self.space.shape_functions(location)
         return np.array([_gradient(shapes, state, self._face)[:, 0] for state in states])
 
-    def _functions_at(self, points: FloatArray) -> FloatArray:
+    def _functions_at(self, points: FloatArray) -> csr_matrix:
         return self.space.shape_functions(self.space.mesh.locate(points))
 
     def _rows(self, values: FloatArray, shares: FloatArray) -> FloatArray:
         """Rows (r, 2, N, D) of u and v from rows (r, N) of a function, with the shares (D,) of c in them."""
         components = (np.arange(2)[:, None] == COMPONENT) * shares
-        return np.einsum("rn,id->rind", np.asarray(values), components)
+        return np.asarray(np.einsum("rn,id->rind", np.asarray(values), components))
 
     def _gradient(self, state: FloatArray) -> FloatArray:
         """∂u_i/∂X_j at the quadrature points, shape (q, z, 3, 3)."""
@@ -236,12 +239,10 @@ class ThickBody:
             )
         found *= (self._weights * there.volume[:, 0, 0, 0])[:, None, None, None, None]
         local = there.inverse.swapaxes(-1, -2)[:, 0] @ self._local  # derivatives after the walls' motion
-        blocks = self._pattern.blocks(
+        blocks = self._blocks.of_elements(
             local.reshape(self._elements, -1, *local.shape[1:]), found.reshape(self._elements, -1, size**2)
         )
-        return self._pattern.matrix(blocks.reshape(-1, size, size), self._free).factorised(
-            0.0, definite=False
-        )
+        return self._blocks.matrix(blocks.reshape(-1, size, size), self._free).factorised(0.0, definite=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +254,8 @@ class SideFace:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement in the face, shape (n, 2), mm."""
-        return self.body.displacements(self.state[None], location)[0]
+        (found,) = self.body.displacements(self.state[None], location)
+        return np.asarray(found)
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j in the face, shape (n, 2, 2)."""
@@ -261,10 +263,11 @@ class SideFace:
 
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 3, 3)."""
-        return self.body.gradients(self.state[None], location)[0]
+        (found,) = self.body.gradients(self.state[None], location)
+        return np.asarray(found)
 
 
-def _gradient(shapes: Sequence[FloatArray], state: FloatArray, across: Functions) -> FloatArray:
+def _gradient(shapes: Sequence[csr_matrix], state: FloatArray, across: Functions) -> FloatArray:
     """∂u_i/∂X_j (n, z, 3, 3) from matrices (n, N) of derivatives along x and y and of values."""
     dx, dy, own = (shape @ state for shape in shapes)
     parts = np.stack(
@@ -276,45 +279,3 @@ def _gradient(shapes: Sequence[FloatArray], state: FloatArray, across: Functions
         axis=-1,
     )
     return np.stack([parts[:, :, i == COMPONENT].sum(axis=2) for i in range(3)], axis=2)
-
-
-class _Pattern(NamedTuple):
-    """Where the blocks of the elements' pairs of nodes (a, b), a <= b, go in the matrix's upper half."""
-
-    pairs: tuple[FloatArray, FloatArray]
-    swapped: FloatArray  # Mask of the element's pairs whose second node comes first, (t p,)
-    order: FloatArray  # The pairs by the matrix's blocks, (t p,)
-    starts: FloatArray  # First pair of each block in that order, (k,)
-    rows: FloatArray
-    columns: FloatArray
-    nodes: int
-
-    @classmethod
-    def of(cls, space: LagrangeSpace) -> "_Pattern":
-        pairs = np.triu_indices(space.cell_nodes.shape[1])
-        first, second = (space.cell_nodes[:, each].ravel() for each in pairs)
-        key = np.minimum(first, second) * len(space.nodes) + np.maximum(first, second)
-        order = np.argsort(key, kind="stable")
-        unique, starts = np.unique(key[order], return_index=True)
-        return cls(
-            pairs, first > second, order, starts, *np.divmod(unique, len(space.nodes)), len(space.nodes)
-        )
-
-    def blocks(self, local: FloatArray, tangent: FloatArray) -> FloatArray:
-        """Blocks (t p, D²) of the elements' pairs.
-
-        Args:
-            local: Derivatives and values of an element's n functions at its q points, shape (t, q, 3, n).
-            tangent: H at them, shape (t, 9 q, D²).
-        """
-        first, second = (local[..., each] for each in self.pairs)
-        products = (first[:, :, :, None] * second[:, :, None]).reshape(*tangent.shape[:2], -1)
-        return (products.swapaxes(1, 2) @ tangent).reshape(-1, tangent.shape[-1])
-
-    def matrix(self, blocks: FloatArray, free: FloatArray) -> BlockMatrix:
-        """The matrix of blocks (t p, D, D), with those of nodes that are held replaced by the unit matrix."""
-        blocks[self.swapped] = blocks[self.swapped].swapaxes(-1, -2)
-        found = np.add.reduceat(blocks[self.order], self.starts, axis=0)
-        found[~(free[self.rows] & free[self.columns])] = 0.0
-        found[~free[self.rows] & (self.rows == self.columns)] = np.eye(blocks.shape[-1])
-        return BlockMatrix(self.nodes, self.rows, self.columns, found)

@@ -86,5 +86,5 @@ class Body(Protocol):
         ...
 
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
-        """Displacement gradients (s, n, d, d) of states (s, *shape) at points: d = 3 on a side face, else 2."""
+        """Displacement gradients (s, n, d, d) of states (s, *shape): d is 3 on a side face, else 2."""
         ...

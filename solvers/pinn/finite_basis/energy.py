@@ -13,9 +13,9 @@ from scipy.sparse import csr_matrix
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.elasticity import Lame, LawName, energy_density_of, piola_stress_and_tangent
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
-from pinnray.solvers.symmetric_factors import BlockMatrix, Factors
 from pinnray.solvers.pinn.threading import boxes_around, imap_in_threads
 from pinnray.solvers.problem import Material
+from pinnray.solvers.symmetric_factors import BlockMatrix, Factors
 
 REGULARISATION = 1e-12
 """Added to the unit diagonal of the scaled Hessian, against nearly dependent basis functions."""

@@ -28,9 +28,9 @@ from pinnray.solvers.pinn.finite_basis.energy import (
 )
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
 from pinnray.solvers.pinn.finite_basis.solver import FiniteBasisSolver
-from pinnray.solvers.symmetric_factors import Factors
 from pinnray.solvers.pinn.threading import pool
 from pinnray.solvers.problem import Problem
+from pinnray.solvers.symmetric_factors import Factors
 
 TOLERANCE = 1e-2
 """Relative error of a solve in the energy norm, and so of a Newton step."""
