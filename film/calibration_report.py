@@ -9,6 +9,7 @@ from matplotlib.patches import Polygon
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from pinnray.comparison.figures.body import round_length
 from pinnray.comparison.figures.layout import axes_at, write_heading
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import COLUMN, INK, MEASURED, Figure, figure
@@ -43,7 +44,7 @@ def draw_calibration(calibration: Calibration) -> Figure:
     wide = COLUMN - 2 * MARGIN
     high = wide * camera.height / camera.width
     longest = np.nanquantile(np.linalg.norm(_all(calibration.residuals.values()), axis=1), 0.95)
-    factor = _round(LONGEST * camera.width / max(longest, 1e-9))
+    factor = round_length(LONGEST * camera.width / max(longest, 1e-9))
     with figure(HEAD + high + MARGIN, COLUMN) as drawn:
         write_heading(
             drawn,
@@ -72,9 +73,3 @@ def _residuals(axes: Axes, calibration: Calibration, factor: float) -> None:
 
 def _all(arrays: Iterable[FloatArray]) -> FloatArray:
     return np.concatenate(list(arrays))
-
-
-def _round(factor: float) -> float:
-    """The factor rounded down to 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(factor))
-    return float(power * max(digit for digit in (1, 2, 5) if digit * power <= factor))

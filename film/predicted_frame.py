@@ -12,7 +12,6 @@ from matplotlib.lines import Line2D
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
-from pinnray.comparison.figures.gallery import each_of
 from pinnray.comparison.figures.layout import axes_at, legend_below_heading, write_heading
 from pinnray.comparison.figures.overlay import errors_note
 from pinnray.geometry.picture_frame import nearest_similarity
@@ -47,11 +46,6 @@ def predicted_frame(folder: Path, comparison: Results, tracking: Tracking, image
         f"The {camera} last frame, and in it (yellow) the outline that each solver predicts, mapped through "
         "the plane that the film gave: the paper’s Fig. 5. Circles: the markers as they were tracked. "
         "Crosses: the solver’s.",
-        each_of(
-            "Mean of |Δu| + |Δv| at the markers, mm",
-            comparison.evaluations,
-            lambda each: comparison.scores[each.solver].markers.mae_sum,
-        ),
     )
 
 

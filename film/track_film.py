@@ -172,7 +172,6 @@ def track_table(tracking: Tracking, observations: Observations) -> Table:
 def track_figures(folder: Path, tracking: Tracking) -> list[Picture]:
     """The annotated pictures of a track, for a report."""
     measured = "tracked in a simulated film" if tracking.simulated else "measured"
-    moved = np.hypot(*np.diff(tracking.rest_positions, axis=0)[0][tracking.visible].T)
     seen, count = int(tracking.visible.sum()), len(tracking.visible)
     camera = "virtual camera" if tracking.simulated else "camera"
     remarks = " ".join(f"{warning[:1].upper()}{warning[1:]}." for warning in tracking.warnings)
@@ -181,12 +180,10 @@ def track_figures(folder: Path, tracking: Tracking) -> list[Picture]:
             folder / "initial.png",
             f"The finger at rest, as the {camera} saw it",
             "Green: the markers with their numbers; blue: the fiducials that give the plane.",
-            f"{int(np.isfinite(tracking.initial.radii).sum())} of {count} markers were detected.",
         ),
         Picture(
             folder / "final.png",
             f"The finger pressed, as the {camera} saw it",
             f"Magenta: the marker trajectories. {seen} of {count} markers are {measured}. {remarks}".strip(),
-            f"The markers moved by {moved.min():.3g} to {moved.max():.3g} mm.",
         ),
     ]

@@ -49,7 +49,7 @@ def read_job(
         design: A finger, the name of a preset, or a file.
         material: The elastic constants, if they are not among the words, or the name of a known material.
         load: The load, or its kind if its numbers are among the words.
-        given: Parameters of the finger, the material and the travel, by name or symbol.
+        given: Parameters of the finger, the material and the stroke, by name or symbol.
         besides: Further words of the function, for the message on an unknown one.
         allowed: Words of material and load that the function takes.
 

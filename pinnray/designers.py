@@ -133,7 +133,7 @@ def predict_field(sweep: str | Path, finger: Mapping[str, object], stroke: float
     Args:
         sweep: Folder of a sweep, whose study has `strokes`.
         finger: Values of every parameter that the sweep varies.
-        stroke: Travel of the indenter, mm.
+        stroke: Stroke of the indenter, mm.
 
     Raises:
         UserError: If the sweep has no fields or too few, or the finger or stroke is outside its ranges.

@@ -1,6 +1,6 @@
 """Functions of the front door: mesh, solve, compare, cross-validate.
 
-Parameters of the finger, the material and the indenter's travel are keywords of each, with the names of the
+Parameters of the finger, the material and the indenter's stroke are keywords of each, with the names of the
 [tables of parameters](../parameters.md): `solve("default", rib_count=6, young=5, stroke=8)`.
 """
 

@@ -36,6 +36,8 @@ DPI = 300
 NOTEBOOK_DPI = 150
 LEFT, RIGHT, TITLE, BELOW = 0.55, 0.12, 0.3, 0.45
 """Margins of the axes of `body_figure`, inches."""
+TALLEST = 0.8
+"""Largest height of its axes over their width."""
 
 INK = "#1a1a1a"
 MUTED = "#767676"
@@ -127,7 +129,7 @@ def figure(height: float, width: float = WIDTH) -> Iterator[Figure]:
 def body_figure(
     points: FloatArray, title: str, *, foot: float = 0.0, page: float = COLUMN
 ) -> Iterator[tuple[Figure, Axes]]:
-    """A figure with axes in mm, of equal scale, around points of shape (n, 2), mm.
+    """A figure with axes in mm, of equal scale, around points of shape (n, 2), mm; wider than a tall body.
 
     Args:
         points: What must be visible.
@@ -137,6 +139,8 @@ def body_figure(
     """
     margin = 0.03 * float(np.ptp(points[:, 0]))
     (left, bottom), (right, top) = points.min(axis=0) - margin, points.max(axis=0) + margin
+    beside = max(0.0, (top - bottom) / TALLEST - (right - left)) / 2
+    left, right = left - beside, right + beside
     width = page - LEFT - RIGHT
     height = width * (top - bottom) / (right - left)
     lines = wrap(title, int(12.5 * width))

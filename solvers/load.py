@@ -26,22 +26,22 @@ LEAST_TRAVEL = 1e-9
 
 
 class Travel(CheckedModel):
-    """Travel of an indenter that presses.
+    """Stroke and direction of an indenter that presses.
 
     Raises:
         UserError: If it does not press, or slides and has a direction.
     """
 
-    stroke: float = bounded(10.0, 1e-6, 1e4, "mm", "", "Travel of the indenter")
+    stroke: float = bounded(10.0, 1e-6, 1e4, "mm", "", "Stroke of the indenter")
     direction: float = bounded(
-        0.0, -89, 89, "deg", "", "Direction of the travel: 0 into the finger, 90 along it to the tip"
+        0.0, -89, 89, "deg", "", "Direction of the stroke: 0 into the finger, 90 along it to the tip"
     )
     slide: bool = Field(default=False, description="Let the contact slide along the finger: u is free")
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         if self.slide and self.direction:
-            raise ValueError("slide leaves the travel along the finger free, so that direction says nothing")
+            raise ValueError("slide leaves the contact free along the finger, so that direction says nothing")
         return self
 
     @property

@@ -9,7 +9,7 @@ import pytest
 from pinnray.runtime.content_hash import packages_behind
 from tests.program import SOURCES, module_name
 
-DIGESTS = ("sources_digest", "job_definition", "job.definition")
+DIGESTS = ("sources_digest", "job.definition")
 
 
 @pytest.fixture(scope="module")

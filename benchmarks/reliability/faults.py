@@ -162,7 +162,7 @@ def filled(folder: Path) -> Iterator[Path]:
     from pinnray.comparison.figures import gallery
     from pinnray.runtime.figure import Figure
 
-    blank = gallery.Illustration(Figure(1.0), "Blank", "Blank.", "Blank.")
+    blank = gallery.Illustration(Figure(1.0), "Blank", "Blank.")
     drawings = {name: (what, lambda *_: blank) for name, (what, _) in gallery.GALLERY.items()}
     # The same files with blank pictures, in a tenth of the time.
     with patch.object(gallery, "GALLERY", drawings), patch("pinnray.runtime.figure.DPI", 20):

@@ -1,4 +1,4 @@
-"""Checks a finger's walls, and measured marker displacements against finger, indenter's travel and `fem`.
+"""Checks a finger's walls, and measured marker displacements against finger, indenter's stroke and `fem`.
 
 What is impossible is refused, what is unlikely warned of, with what was read and what was expected.
 """

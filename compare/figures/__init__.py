@@ -47,7 +47,6 @@ class Picture:
     path: Path
     title: str  # its subject, in a few words
     caption: str  # what a reader must know to read it, in sentences
-    alt: str  # what it shows, in numbers, for those who cannot see it
 
 
 def draw_all(
@@ -72,7 +71,7 @@ def draw_all(
             progress(number / len(GALLERY), what)
             if drawing := draw(comparison, page):
                 path = drawing.figure.save(folder / f"{name}.png", formats)
-                pictures.append(Picture(path, drawing.title, drawing.caption, drawing.alt))
+                pictures.append(Picture(path, drawing.title, drawing.caption))
     finally:
         gc.unfreeze()
     progress(1.0, "pictures drawn")

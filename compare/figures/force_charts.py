@@ -11,6 +11,7 @@ from pinnray.comparison.figures.layout import axes_at, legend_above, legend_heig
 from pinnray.comparison.figures.solver_colours import solver_look
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import COLUMN, CONTACT, INK, MEASURED, WIDTH, Figure, figure
+from pinnray.runtime.tables import number
 
 
 def draw_force_displacement(
@@ -27,14 +28,14 @@ def draw_force_displacement(
     simulated finger's curve ends in a cross. A force that was identified from the markers, by the number of
     its solver in the run, is a square with its interval of 95 % at the end of the stroke.
     """
-    labels = [_end_label(curve, curve.evaluation.label) for curve in curves]
-    true_label = [_end_label(truth, "truth, simulated")] if truth else []
+    labels = [_end_label(curve.evaluation.label, curve.force[-1] * depth) for curve in curves]
+    true_label = [_end_label("truth, simulated", truth.force[-1] * depth)] if truth else []
     found = {
         number: (each, each.identified.force)
         for number, each in (identified or {}).items()
         if each.identified is not None
     }
-    more = [f"{each.label}, {force.value:.3g} N/mm, identified" for each, force in found.values()]
+    more = [f"{_end_label(each.label, force.value * depth)}, identified" for each, force in found.values()]
     top, height, left = 0.3 + legend_height([*labels, *true_label, *more], page), 2.4, 0.75  # inches
     apart = 0.08 / (page - left - 0.65)  # the room of a mark, as a share of the axes' width
     with figure(top + height + 0.45, page) as drawn:
@@ -92,8 +93,8 @@ def draw_force_displacement(
     return drawn
 
 
-def _end_label(curve: ForceCurve, name: str) -> str:
-    return f"{name}, {curve.force[-1]:.3g} N/mm"
+def _end_label(name: str, force: float) -> str:
+    return f"{name}, {number(force, 3)} N"
 
 
 def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, *, depth: float) -> Figure:

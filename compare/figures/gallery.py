@@ -1,11 +1,9 @@
 """The pictures of a comparison by name, in the order of the report, with their captions."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
-
-import numpy as np
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import IN_SAMPLE, Evaluation
@@ -19,7 +17,6 @@ from pinnray.comparison.figures.fields import (
     near_pairs,
 )
 from pinnray.comparison.figures.force_charts import draw_force_displacement
-from pinnray.comparison.figures.mesh_drawing import draw_mesh, mesh_numbers
 from pinnray.comparison.figures.overlay import Panels, draw_overlay
 from pinnray.comparison.figures.solver_charts import draw_losses, draw_marker_errors
 from pinnray.runtime.errors import UserError
@@ -33,7 +30,6 @@ class Illustration(NamedTuple):
     figure: Figure
     title: str
     caption: str
-    alt: str
 
 
 def _overlay(comparison: Results, page: float) -> Illustration:
@@ -42,11 +38,6 @@ def _overlay(comparison: Results, page: float) -> Illustration:
         "Deformed finger",
         "Displacement magnitude on one scale, not exaggerated."
         f"{_absent(comparison.evaluations, Panels.on(comparison, page).solvers)}",
-        each_of(
-            "Largest displacement, mm",
-            comparison.evaluations,
-            lambda each: float(np.hypot(*each.node_displacement.T).max()),
-        ),
     )
 
 
@@ -59,11 +50,6 @@ def _marker_errors(comparison: Results, page: float) -> Illustration | None:
         draw_marker_errors(comparison, page),
         "Errors at the markers",
         f"On one logarithmic scale, numbered as in the design.{unseen}",
-        each_of(
-            "Mean of |Δu| + |Δv| at held-out markers, mm",
-            comparison.evaluations,
-            lambda each: getattr(comparison.scores[each.solver].held_out, "mae_sum", float("nan")),
-        ),
     )
 
 
@@ -72,26 +58,17 @@ def _field(
 ) -> Illustration:
     drawn = drawn_solvers(comparison, solvers, page)
     reference = drawn[0].label
-    caption = f"Drawn as the {QUANTITIES[0].title}."
+    caption = "Drawn as the von Mises stress."
     if quantity is QUANTITIES[0]:
         caption = (
-            f"One scale holds {PERCENT:g} % of the area of {reference}; at sharp corners the largest value "
-            "grows with refinement."
+            f"One scale, which covers {PERCENT:g} % of the area in {reference}; at sharp corners the largest "
+            "value grows with refinement."
         )
         if len(comparison.shown_fields) > 1:
             where = "Below" if page < NARROW else "Right"
-            caption += f" {where}: the field minus that of {reference}, each on the scale above its panel."
+            caption += f" {where}: the field minus {reference}, each on the scale above its panel."
         caption += _absent(comparison.shown_fields, drawn, near_pairs(comparison))
-    return Illustration(
-        draw_field(comparison, quantity, solvers, page),
-        quantity.title,
-        caption,
-        each_of(
-            f"Mean size over the body, {quantity.unit}",
-            comparison.shown_fields,
-            lambda each: float(np.average(np.abs(quantity.values(each)), weights=each.weights)),
-        ),
-    )
+    return Illustration(draw_field(comparison, quantity, solvers, page), quantity.title, caption)
 
 
 def _force_displacement(comparison: Results, page: float) -> Illustration | None:
@@ -109,11 +86,6 @@ def _force_displacement(comparison: Results, page: float) -> Illustration | None
         "Force over displacement",
         "Points: equilibria that a solver found as the load grew. Dashed: straight by the linear law."
         f"{cross}{squares}",
-        each_of(
-            f"Force at the end of the stroke of {curves[0].stroke[-1]:g} mm, N per mm",
-            [curve.evaluation for curve in curves],
-            lambda each: ForceCurve.of(each, comparison.load).force[-1],
-        ),
     )
 
 
@@ -126,32 +98,16 @@ def _losses(comparison: Results, page: float) -> Illustration | None:
         f"As Fig. 7 of the paper. L_PDE is the mean energy density, whose least value is not zero: markers "
         f"cannot lower it at convergence, and the lower one is not the more accurate. A curve that still "
         f"falls is a training that has not ended.{_given(comparison)}",
-        each_of(
-            "Last L_PDE",
-            [each for each in comparison.evaluations if "PDE" in each.history],
-            lambda each: float(each.history["PDE"][-1]),
-        ),
     )
 
 
 def _design(comparison: Results, page: float) -> Illustration:
-    finger = comparison.design
-    return Illustration(
-        finger.plot(page),
-        "Design",
-        "To scale: clamped base (hatched), contact (orange), numbered markers.",
-        "; ".join(f"{name} {value}" for name, _, value in finger.facts()),
-    )
+    said = "To scale: clamped base (hatched), contact (orange), numbered markers."
+    return Illustration(comparison.design.plot(page), "Design", said)
 
 
 def _mesh(comparison: Results, page: float) -> Illustration:
-    numbers = mesh_numbers(comparison.mesh)
-    return Illustration(
-        draw_mesh(comparison.mesh, page),
-        "Mesh",
-        "Quality: twice the ratio of the inscribed to the circumscribed radius.",
-        f"{numbers['size']}, edges from {numbers['edges']}",
-    )
+    return Illustration(comparison.mesh.plot(page), "Mesh", "Shared by every solver.")
 
 
 CHOOSING = tuple(each.name for each in QUANTITIES)
@@ -187,11 +143,6 @@ def draw(comparison: Results, name: str, solvers: Collection[str] = (), page: fl
     return drawing
 
 
-def each_of(quantity: str, evaluations: Iterable[Evaluation], value: Callable[[Evaluation], float]) -> str:
-    """A quantity of every evaluation in words."""
-    return f"{quantity}: {', '.join(f'{each.label} {value(each):.3g}' for each in evaluations)}."
-
-
 def _absent(
     every: Sequence[Evaluation],
     drawn: Sequence[Evaluation],
@@ -203,7 +154,7 @@ def _absent(
     twins = [f"{name} ({percent(near[name][1], 2)} from {near[name][0]})" for name in absent if name in near]
     rest = [each.label for each in every if each.solver in absent and each.solver not in near]
     said = f" Not drawn, as their displacement is near another’s: {', '.join(twins)}." if twins else ""
-    return said + (f" Not drawn, for lack of room or by choice: {', '.join(rest)}." if rest else "")
+    return said + (f" Left out: {', '.join(rest)}." if rest else "")
 
 
 def _given(comparison: Results) -> str:

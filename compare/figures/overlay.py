@@ -28,6 +28,7 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import INK, MEASURED, MUTED, NARROW, SMALL, WIDTH, Figure, figure
+from pinnray.solvers.problem import Problem, contact_ends, front_points
 
 MARGIN = 0.12
 PANEL_TITLE, FOOT = 0.27, 0.48
@@ -200,11 +201,7 @@ def contact_motion(comparison: Results, evaluation: Evaluation) -> tuple[FloatAr
     if load.radius is None:
         start = mesh.points[nodes].mean(axis=0)
         return start, start + evaluation.node_displacement[nodes].mean(axis=0)
-    x = (mesh.points[nodes, 0].min() + mesh.points[nodes, 0].max()) / 2
-    front = mesh.points[np.unique(mesh.boundary("front"))]
-    front = front[front[:, 0].argsort()]
-    x = x if load.position is None else load.position
-    start = np.array([x, np.interp(x, *front.T)])
+    start = front_points(mesh, np.array([np.mean(contact_ends(Problem(mesh, load=load)))]))[0]
     return start, start + load.values
 
 

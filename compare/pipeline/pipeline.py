@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pinnray.comparison.evaluation.branches import with_branches
 from pinnray.comparison.evaluation.comparison import Results, pick_reference, supported_solvers
 from pinnray.comparison.evaluation.deformed_body import with_body_checks
 from pinnray.comparison.evaluation.evaluation import Evaluation
@@ -97,7 +96,6 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
     outcome = solve_all(job, solvers, problem, observations, folder, stages, pool)
     with stages.stage("checks"):
         evaluations, impossible = with_body_checks(list(outcome.evaluations.values()), mesh, truth)
-        evaluations, branches = with_branches(evaluations, problem)
     return Comparison(
         design=job.design,
         mesh=mesh,
@@ -119,7 +117,7 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
         warnings=[
             *(f"{each.solver}: {text}" for each in evaluations for text in each.warnings),
             *(*problem_remarks(problem), *remarks, *_unframed(evaluations, observations)),
-            *(*impossible, *branches),
+            *impossible,
         ],
     )
 

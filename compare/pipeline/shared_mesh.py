@@ -7,7 +7,6 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.exits import say
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import Cell, write_csv
 from pinnray.solvers.fem.adaptive_refinement import Adaptation, check_adaptable
@@ -22,9 +21,9 @@ def shared_mesh(
     stages: Stages,
     *,
     tolerance: float | None = None,
-    material: Material = Material(),
-    load: Load = Load(),
-    solvers: Sequence[Solver] = (),
+    material: Material,
+    load: Load,
+    solvers: Sequence[Solver],
     check: Callable[[TriangleMesh], None] | None = None,
 ) -> tuple[TriangleMesh, Adaptation | None]:
     """Mesh a finger, and refine until `fem` knows the markers to a tolerance if one is given.
@@ -76,11 +75,3 @@ def write_rounds(path: Path, adaptation: Adaptation) -> None:
         for number, step in enumerate(adaptation.rounds)
     ]
     write_csv(path, rows)
-
-
-def tolerance_reached(adaptation: Adaptation | None) -> bool:
-    """True unless a tolerance was missed, on which a line goes to standard error."""
-    if adaptation is None or adaptation.reached:
-        return True
-    say(f"error: {adaptation.message}")
-    return False

@@ -143,8 +143,8 @@ def marker_table(comparison: Results) -> Table:
     markers = f"{count} marker{'s' * (count > 1)}" if seen == count else f"{seen} of {count} markers"
     caption = (
         "given: at markers that the solver was given, a training error.\n"
-        "held out: at markers that it was not given; one that is given markers has\n"
-        "all but the one that it predicts.\n"
+        "held out: at markers that it was not given; a solver that takes markers\n"
+        "predicts each from the others.\n"
         "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) (its Table I)."
         + ("\npaper: as it prints them, of its own experiment and not of this run." if printed else "")
     )

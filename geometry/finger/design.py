@@ -75,7 +75,7 @@ class Design(Parameters):
             if name == "marker_diameter" and self.small_markers:
                 words += f", as {self.small_markers}"
             rows.append((meaning, symbol, words))
-        return [*rows, ("Abscissa of the contact's middle", "", _in_words(self.contact_abscissa, "mm"))]
+        return [*rows, ("Middle of the contact, from the base", "", _in_words(self.contact_abscissa, "mm"))]
 
     def plot(self, width: float | None = None) -> "Figure":
         """The section with clamp, contact and numbered markers, as a matplotlib figure."""

@@ -137,7 +137,7 @@ class Parameters(CheckedModel):
         0.0, 0, 20, "mm", "", "Radius of the cavities' corners; 0 leaves them sharp"
     )
     contact_position: float | None = bounded(
-        None, 0, 500, "mm", "", "Abscissa of the contact's middle; none means (height - tip_length) / 2"
+        None, 0, 500, "mm", "", "Middle of the contact, from the base; none means (height - tip_length) / 2"
     )
     contact_width: float = bounded(2.0, 0.1, 100, "mm", "", "Length of front face that the indenter touches")
     marker_layout: Literal["front", "joints"] = Field(

@@ -41,7 +41,7 @@ def plot_finger(
     contact = finger.section.front_point(finger.contact_abscissa)
     tip, tail = place(np.stack([contact, contact + np.array([0.0, 0.09 * extent])]))
     hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
-    shown = _not_tall(np.concatenate([hatched, tip[None], tail[None]]))
+    shown = np.concatenate([hatched, tip[None], tail[None]])
     parameters = [
         f"{SYMBOLS[symbol].replace('_', ' ')} {value}" for _, symbol, value in finger.facts() if symbol
     ]
@@ -83,11 +83,3 @@ def draw_section(axes: Axes, shape: Section) -> None:
     paths = [Outline(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings]
     whole = Outline.make_compound_path(*paths)
     axes.add_patch(PathPatch(whole, fc=BODY, ec=INK, lw=0.9, zorder=1))
-
-
-def _not_tall(points: FloatArray) -> FloatArray:
-    """Points (n, 2) with two more that make their extent at most 0.8 times as high as wide."""
-    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
-    half = max(right - left, (top - bottom) / 0.8) / 2
-    middle = 0.5 * (left + right)
-    return np.concatenate([points, [[middle - half, bottom], [middle + half, top]]])

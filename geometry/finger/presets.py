@@ -65,18 +65,29 @@ def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
         UserError: If a text is no assignment, or names an unknown parameter or one twice.
     """
     overrides: dict[str, Any] = {}
-    for setting in settings:
-        key, equals, value = (part.strip() for part in setting.partition("="))
-        name = SYMBOLS.get(key, key)
-        if not (equals and key and value):
-            raise UserError(f"cannot read {setting!r}; write parameter=value, such as rib_count=6")
+    for name, value in assignments(settings).items():
         if name not in Parameters.model_fields:
-            raise UserError(unknown_parameter(key, Parameters))
-        if name in overrides:
-            raise UserError(f"{with_symbol(name)} is set twice; set it once")
+            raise UserError(unknown_parameter(name, Parameters))
         optional = Parameters.model_fields[name].default is None
         overrides[name] = None if optional and value.lower() == "none" else value
     return overrides
+
+
+def assignments(settings: Sequence[str]) -> dict[str, str]:
+    """Values by the names of parameters, from texts such as `rib_count=6` or `N=6`.
+
+    Raises:
+        UserError: If a text is no assignment, or names a parameter twice.
+    """
+    found: dict[str, str] = {}
+    for setting in settings:
+        key, equals, value = (part.strip() for part in setting.partition("="))
+        if not (equals and key and value):
+            raise UserError(f"cannot read {setting!r}; write parameter=value, such as rib_count=6")
+        if (name := SYMBOLS.get(key, key)) in found:
+            raise UserError(f"{with_symbol(name)} is set twice; set it once")
+        found[name] = value
+    return found
 
 
 def _path_of(name_or_path: str | Path) -> Path:

@@ -102,6 +102,11 @@ class TriangleMesh:
         numbers = np.unique(first * len(self.points) + second)  # many times faster than unique pairs
         return np.stack(np.divmod(numbers, len(self.points)), axis=1)
 
+    @property
+    def edge_lengths(self) -> FloatArray:
+        """Length of every edge, shape (e,), mm."""
+        return np.asarray(np.linalg.norm(np.diff(self.points[self.edges], axis=1)[:, 0], axis=1))
+
     @cached_property
     def boundary_edges(self) -> IntArray:
         """The edges of the whole boundary, shape (k, 2), with the body on their left."""
@@ -186,14 +191,22 @@ class TriangleMesh:
         numbers = self.marker_nodes, self.contact_node, self.depth, self.moduli
         return TriangleMesh, (self.points, self.triangles, dict(self.boundaries), *numbers)
 
-    def plot(self) -> "Figure":
-        """Every triangle, the contact and the markers, as a matplotlib figure."""
-        from pinnray.runtime.figure import CONTACT, INK, MEASURED, body_figure
+    def plot(self, width: float | None = None) -> "Figure":
+        """Every triangle, the contact and the markers, as a matplotlib figure.
 
-        title = f"Mesh, {len(self.points)} nodes, {len(self.triangles)} triangles"
+        Args:
+            width: Of the figure, inches; a journal's column if None.
+        """
+        from pinnray.runtime.figure import COLUMN, CONTACT, INK, MEASURED, body_figure
+
+        lengths = self.edge_lengths
+        title = (
+            f"Mesh, {len(self.points)} nodes, {len(self.triangles)} triangles, edges of {lengths.min():.3g} "
+            f"to {lengths.max():.3g} mm"
+        )
         touched = self.points[np.unique(self.boundary("contact"))]
-        with body_figure(self.points, title) as (drawn, axes):
-            axes.triplot(*self.points.T, self.triangles, color=INK, lw=0.2)
+        with body_figure(self.points, title, page=width or COLUMN) as (drawn, axes):
+            axes.triplot(*self.points.T, self.triangles, color=INK, lw=0.15)
             axes.plot(*touched.T, color=CONTACT, lw=2.5, label="contact")
             axes.plot(*self.markers.T, "o", ms=3, color=MEASURED, label="markers")
             axes.legend(loc="lower right")
@@ -201,7 +214,7 @@ class TriangleMesh:
 
     def _repr_html_(self) -> str:
         """Counts, sizes and the picture, in a notebook."""
-        lengths = np.linalg.norm(np.diff(self.points[self.edges], axis=1)[:, 0], axis=1)
+        lengths = self.edge_lengths
         facts = {
             "nodes": len(self.points),
             "triangles": len(self.triangles),

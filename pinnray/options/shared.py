@@ -38,7 +38,6 @@ FilmOptions = Annotated[FilmSettings, Parameter(name="*", group=Group("Camera", 
 OutputFlag = Annotated[bool, Parameter(group=OUTPUT)]
 OutputPath = Annotated[Path, Parameter(group=OUTPUT, show_default=True)]
 OptionalOutputPath = Annotated[Path | None, Parameter(group=OUTPUT)]
-Adapt = Annotated[float | None, Parameter(group=FINGER)]
 
 
 @Parameter(name="*", group=FINGER)

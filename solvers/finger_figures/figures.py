@@ -111,7 +111,7 @@ class FingerFigures:
         That is warned of; the `stops` of a solver are fractions of the stroke at which it is computed.
 
         Raises:
-            UserError: If the travel is longer than the solver came, or the way to the end is not known.
+            UserError: If the solver did not come so far, or knows the force at the end of the stroke alone.
         """
         travels, forces = np.array(self.curve).T
         if not 0 <= stroke <= travels[-1] * (1 + 1e-9):

@@ -24,7 +24,7 @@ NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
 SOURCES = {
     "third dimension": "the third dimension, which plane strain leaves out: take fem-id and give the depth, "
-    "or weigh one press; the ratio of its force to that found here holds for other presses of the finger",
+    "or weigh one press, and multiply the forces of other presses by the ratio of weighed to found",
     "markers": "the errors of the markers: film nearer or sharper, or use more markers",
     "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
     "contact": "place, width and pressure of the contact: put markers nearer to it",

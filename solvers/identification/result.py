@@ -84,7 +84,7 @@ class Identified:
             self._mean([fit.component(across) for fit in self.fits]),
             self._mean(places) if places else None,
             shares,
-            f"{share:.0%} of the variance of the force comes from {SOURCES[first]}.",
+            f"{100 * share:.0f} % of the variance of the force comes from {SOURCES[first]}.",
         )
 
     def _mean(self, found: Sequence[tuple[float, float]]) -> Estimated:

@@ -16,7 +16,7 @@ Methods Appl. Mech. Engrg. 375 (2021) 113533: the model of the data, its conditi
 likelihood. There the source term is random; here it is the prescribed displacement.
 
 At finite strain u is linearised about the nominal load: the shape of its largest component is the
-secant from rest, the other is the tangent. Under the linear law the travel of a cylinder is the mean
+secant from rest, the other is the tangent. Under the linear law the stroke of a cylinder is the mean
 displacement of the contact.
 """
 

@@ -7,7 +7,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from pinnray.comparison.evaluation.definition import job_definition
 from pinnray.comparison.evaluation.truths import EVERY_TRUTH, SLIDING, TRUTHS, Truth, check_truths
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.design import Design
@@ -16,8 +15,9 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Registration
 from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.content_hash import sources_digest
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.machine import cores
+from pinnray.runtime.machine import cores, package_versions
 from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, check_law, check_load, check_name, with_law
@@ -207,7 +207,14 @@ class CrossvalStudy:
     def definition(self, given: Observations | None) -> dict[str, Any]:
         """Everything that finished folds depend on but the solvers' settings, which are kept with them."""
         arrays = given and (given.points, given.displacements, given.standard_deviations)
-        return job_definition(self.design, self.mesh, self.material, self.load, __name__) | {
+        return {
+            "schema": 1,
+            "design": self.design.definition(),
+            "mesh": self.mesh and self.mesh.model_dump(),
+            "material": self.material.model_dump(),
+            "load": self.load.model_dump(mode="json"),
+            "versions": package_versions(),
+            "program_sha256": sources_digest(__name__),
             "noise_mm": None if given else self.noise,
             "frame": str(given.pressed if given else self.frame),
             "measurements": arrays and [values.tolist() for values in arrays],

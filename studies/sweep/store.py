@@ -18,9 +18,6 @@ from pinnray.studies.sweep.measurement import Measurement
 
 JOURNAL = "journal.sqlite"
 
-_NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")
-"""End of a rollback journal that names another file. Source: SQLite, pager.c, `aJournalMagic`."""
-
 _TABLE = """
 create table if not exists samples (
     number primary key, -- or a name
@@ -97,7 +94,6 @@ def opened(file: Path) -> Iterator[Journal]:
     Raises:
         UserError: If the file is no journal or cannot be written.
     """
-    _check_rollback(file.with_name(f"{file.name}-journal"))
     try:
         with closing(sqlite3.connect(file)) as connection:
             yield Journal(connection)
@@ -106,14 +102,3 @@ def opened(file: Path) -> Iterator[Journal]:
             f"cannot use {file}: {error}; free some space if the disk is full, else remove the file to run "
             "every sample again"
         ) from None
-
-
-def _check_rollback(journal: Path) -> None:
-    """Refuse the rollback journal of a transaction over several files: SQLite removes the file that it names.
-
-    A sweep that is killed leaves one of its own file alone; another one comes from somebody else.
-    """
-    if journal.is_file() and journal.read_bytes().endswith(_NAMES_A_FILE):
-        raise UserError(
-            f"{journal} names another file, which SQLite would remove; no sweep leaves such a one: remove it"
-        )

@@ -21,7 +21,7 @@
     { name: "young", symbol: "E", meaning: "Young's modulus", unit: "MPa", low: 0.1, high: 1000, value: manifest.fixed.young, log: true },
     { name: "depth", meaning: "Depth of the finger", unit: "mm", low: 1, high: 100, value: manifest.fixed.depth, log: true },
   ].filter(({ name }) => !manifest.parameters.some((each) => each.name === name));
-  const stroke = { name: "stroke", meaning: "Travel of the indenter", unit: "mm", low: manifest.stroke / 200, high: manifest.stroke, value: manifest.stroke };
+  const stroke = { name: "stroke", meaning: "Stroke of the indenter", unit: "mm", low: manifest.stroke / 200, high: manifest.stroke, value: manifest.stroke };
   const controls = [stroke, ...manifest.parameters, ...factors];
   const STEPS = 1000;
   const toStep = ({ low, high, log }, value) => STEPS * (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low));

@@ -38,6 +38,6 @@ def test_the_pictures_show_themselves(names, name):
 
 
 def test_the_picture_on_the_page_is_the_field(names, tmp_path: Path):
-    (tmp_path / "field.png").write_bytes(names["field"]._repr_png_())
+    names["field"].save(tmp_path / "field.png")
     with Image.open(tmp_path / "field.png") as drawn, Image.open(DOCS / "pictures" / "notebook.png") as shown:
         assert drawn.size == shown.size

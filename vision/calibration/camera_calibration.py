@@ -8,20 +8,21 @@ Units: pixels, mm.
 
 import math
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+import cv2
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.calibration.board_views import FEWEST_VIEWS, coverage, find_views, unusable
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.calibration.camera_fit import fit_camera, held_out_rms, rms
 from pinnray.vision.calibration.chessboard import Board
 from pinnray.vision.frames.frame import GreyImage
 
+FEWEST_VIEWS = 4
 LEAST_COVERAGE = 0.6
 """Share of the image below which the distortion near its edges is extrapolated."""
 OUTLIER = 3.0
@@ -75,7 +76,7 @@ def calibrate_camera(
         UserError: If the sizes differ, fewer than 4 photographs show the board, or they do not determine the
             camera.
     """
-    views, size, left_out = find_views(images, board)
+    views, size, left_out = _find_views(images, board)
     return calibrate_views(views, board, size, k3=k3, left_out=left_out)
 
 
@@ -102,7 +103,11 @@ def calibrate_views(
         UserError: If there are fewer than 4 views, or they do not determine the camera.
     """
     able = {name: view for name, view in views.items() if board.determines_pose(np.isfinite(view[:, 0]))}
-    weak = {name: unusable(view) for name, view in views.items() if name not in able}
+    weak = {
+        name: f"the {int(np.isfinite(view[:, 0]).sum())} corners that are seen are too few or lie on a line"
+        for name, view in views.items()
+        if name not in able
+    }
     views, left_out = able, {**left_out, **weak}
     _check_enough(views, left_out, board)
     corners = list(views.values())
@@ -113,11 +118,42 @@ def calibrate_views(
         views=views,
         residuals=dict(zip(views, fitted.residuals, strict=True)),
         held_out_rms=held_out_rms(corners, board, fitted.camera, k3=k3),
-        coverage=coverage(corners, size),
+        coverage=_coverage(corners, size),
         left_out=left_out,
     )
     _warn(calibration)
     return calibration
+
+
+def _find_views(
+    images: Iterable[tuple[str, GreyImage]], board: Board
+) -> tuple[dict[str, FloatArray], tuple[int, int], dict[str, str]]:
+    """The corners of a board by photograph, (width, height) of all, and why others show none, by name."""
+    views: dict[str, FloatArray] = {}
+    left_out: dict[str, str] = {}
+    size, first = (0, 0), ""
+    for name, image in images:
+        width, height = image.shape[::-1]
+        size, first = (size, first) if first else ((width, height), name)
+        if size != (width, height):
+            raise UserError(
+                f"photographs for one calibration must have one size: {first} has {size[0]}x{size[1]} "
+                f"pixels, {name} {width}x{height}; leave out those of the other size"
+            )
+        if (corners := board.find(image)) is None:
+            left_out[name] = f"no board of {board} was found"
+        else:
+            views[name] = corners
+    return views, size, left_out
+
+
+def _coverage(views: Sequence[FloatArray], size: tuple[int, int]) -> float:
+    """Share of the pixels within the convex hull of the corners of at least one view."""
+    covered = np.zeros(size[::-1], dtype=np.uint8)
+    for view in views:
+        seen = view[np.isfinite(view).all(axis=1)]
+        cv2.fillConvexPoly(covered, cv2.convexHull(np.rint(seen).astype(np.int32)), [1])
+    return float(covered.mean())
 
 
 def _check_enough(views: Mapping[str, FloatArray], left_out: Mapping[str, str], board: Board) -> None:

@@ -10,9 +10,13 @@ import numpy as np
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.machine import package_version
 from pinnray.runtime.text_files import read_json
 from pinnray.vision.calibration.camera import INTRINSICS, Camera
 from pinnray.vision.calibration.camera_calibration import Calibration
+
+PACKAGES = ("pinn-ray", "numpy", "scipy", "opencv-python-headless")
+"""Those that make a calibration."""
 
 
 def save_camera(path: Path, camera: Camera) -> None:
@@ -25,7 +29,7 @@ def save_camera(path: Path, camera: Camera) -> None:
     write_json(path, _content(camera))
 
 
-def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str, str] | None = None) -> None:
+def save_calibration(path: Path, calibration: Calibration) -> None:
     """Write a camera with its errors, coverage, board and the versions of the programs that made it.
 
     Raises:
@@ -47,7 +51,7 @@ def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str
             "board_width": board.columns,
             "board_height": board.rows,
             "square_size": board.square,
-            "versions": [f"{name} {version}" for name, version in (versions or {}).items()],
+            "versions": [f"{name} {package_version(name)}" for name in PACKAGES],
         },
     )
 

@@ -22,6 +22,8 @@ LOWEST: Lab = (0.0, -128.0, -128.0)
 HIGHEST: Lab = (100.0, 127.0, 127.0)
 HALF = 0.45
 """Threshold over the greatest darkness nearby: about at a blurred edge, and darker than a grey wall."""
+CONTRAST = 15.0
+"""Least difference in L* of a dark disc from its surroundings."""
 
 
 class Colour(Protocol):
@@ -61,21 +63,15 @@ class ColourRange:
 
 @dataclass(frozen=True)
 class Darker:
-    """Darker than the surroundings by `contrast` in L*, and about half as dark as the darkest pixel nearby.
+    """Darker than the surroundings, and about half as dark as the darkest pixel nearby.
 
     A morphological closing estimates the brightness of the surroundings, so the light may be uneven: the
     black-hat transform (F. Meyer, "Iterative image transformations for an automatic screening of cervical
     smears", J. Histochem. Cytochem. 27, 1979).
     """
 
-    contrast: float = 15.0
-
-    def __post_init__(self) -> None:
-        if not 0 < self.contrast <= 100:
-            raise UserError(f"a contrast of {self.contrast:g} in L*; it must be above 0 and at most 100")
-
     def __str__(self) -> str:
-        return "dark" if self == DARK else f"dark:{self.contrast:g}"
+        return "dark"
 
     def mask(self, image: Image, radius: float = 25.0) -> Image:
         """255 where a dark disc of at most `radius` pixels may be, 0 elsewhere, shape (h, w)."""
@@ -84,7 +80,7 @@ class Darker:
         box = cv2.getStructuringElement(cv2.MORPH_RECT, (side, side))
         darker = cv2.morphologyEx(lightness, cv2.MORPH_BLACKHAT, box)
         half = cv2.convertScaleAbs(cv2.dilate(darker, box), alpha=HALF)
-        threshold = cv2.max(half, np.rint(2.55 * self.contrast))
+        threshold = cv2.max(half, np.rint(2.55 * CONTRAST))
         return np.asarray(cv2.compare(darker, threshold, cv2.CMP_GT), dtype=np.uint8)
 
 
@@ -92,25 +88,23 @@ DARK = Darker()
 
 
 def read_colour(text: str) -> Colour:
-    """The colour of a text: "dark", "dark:CONTRAST", or L*, a* and b* such as "20,60:40,80:-10,30".
+    """The colour of a text: "dark", or L*, a* and b* such as "20,60:40,80:-10,30".
 
     Of the ranges, a* and b* may be left out. `str` of a colour gives its text.
 
     Raises:
         UserError: If it is none of these.
     """
-    kind, _, rest = text.strip().lower().partition(":")
     number = r"[-+]?\d+(?:\.\d*)?"
-    if kind == "dark" and (not rest or re.fullmatch(number, rest)):
-        return Darker(float(rest)) if rest else DARK
+    if text.strip().lower() == "dark":
+        return DARK
     if re.fullmatch(rf"{number},{number}(:{number},{number}){{0,2}}", text.strip()):
         pairs = [tuple(map(float, pair.split(","))) for pair in text.strip().split(":")]
         pairs += list(zip(LOWEST, HIGHEST, strict=True))[len(pairs) :]
         (dark, light), (low_a, high_a), (low_b, high_b) = pairs
         return ColourRange((dark, low_a, low_b), (light, high_a, high_b))
     raise UserError(
-        f"cannot read the colour {text!r}; give dark, dark:CONTRAST or ranges of L*, a* and b* such as "
-        "20,60:40,80:-10,30"
+        f"cannot read the colour {text!r}; give dark, or ranges of L*, a* and b* such as 20,60:40,80:-10,30"
     )
 
 

@@ -7,9 +7,6 @@ from rich.console import Console
 from pinnray.options.shared import Flag, OutputPath
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
-from pinnray.runtime.machine import package_versions
-
-VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
 
 
 def command(
@@ -33,19 +30,14 @@ def command(
         k3: Fit the third radial coefficient too.
         out: Camera file, .json.
     """
+    from pinnray.camera import calibrate
     from pinnray.film.calibration_report import calibration_table, draw_calibration
-    from pinnray.vision.calibration.camera_calibration import calibrate_camera
-    from pinnray.vision.calibration.camera_file import check_format, save_calibration
-    from pinnray.vision.calibration.charuco import parse_board
-    from pinnray.vision.frames.sources import photographs
 
-    check_format(out)
     if not images:
         raise UserError("no photograph was given; name at least 4 that show the board")
-    chosen = parse_board(board, square, marker=marker, dictionary=dictionary)
-    calibration = calibrate_camera(photographs(images), chosen, k3=k3)
-    versions = package_versions()
-    save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})
+    calibration = calibrate(
+        images, board, square=square, marker=marker, dictionary=dictionary, k3=k3, out=out
+    )
     picture = out.with_suffix(".png")
     draw_calibration(calibration).save(picture)
     for reason in dict.fromkeys(calibration.left_out.values()):

@@ -57,10 +57,10 @@ def command(
         out: Output folder; default out/track, unless that holds the finished run of another job, or any of a
             camera or a pipe.
     """
-    from pinnray.comparison.pipeline.shared_mesh import shared_mesh
     from pinnray.film.force_estimate import MESH, force_table, force_tracker, forces_of, write_forces
     from pinnray.film.live_force import LiveForce, frame_lines
     from pinnray.film.track_film import track_film, track_table
+    from pinnray.geometry.cache import finger_mesh
     from pinnray.runtime.machine import machine, package_versions
     from pinnray.runtime.output_folder import check_output, check_same_job, replaced_folder, write_run
     from pinnray.runtime.stages import Stages
@@ -83,8 +83,10 @@ def command(
     forces, passed_over = [], None
     with replaced_folder(folder) as partial:
         with Stages(console) as stages:
-            mesh = shared_mesh(design, settings, stages)[0] if material else None
-            following = tracker = None
+            mesh = following = tracker = None
+            if material:
+                with stages.stage("mesh"):
+                    mesh = finger_mesh(design, settings=settings)
             if mesh is not None and material and live:
                 tracker = force_tracker(mesh, design, material, design.markers)
                 following = LiveForce(tracker, design.depth)

@@ -18,8 +18,8 @@ from pinnray.options.file import (
     usual_options,
 )
 from pinnray.options.shared import (
+    FINGER,
     OUTPUT,
-    Adapt,
     FilmOptions,
     FingerOptions,
     OptionalOutputPath,
@@ -42,7 +42,7 @@ def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    adapt: Adapt = None,
+    adapt: Annotated[float | None, Parameter(group=FINGER)] = None,
     solvers: str | None = None,
     measurements: str | None = None,
     truth: str | None = None,

@@ -1,12 +1,10 @@
 """Solve one finger with one solver."""
 
-from functools import partial
 from math import hypot, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pinnray.options.shared import (
-    Adapt,
     FingerOptions,
     OutputPath,
     PhysicsOptions,
@@ -27,7 +25,6 @@ def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    adapt: Adapt = None,
     measurements: Path | None = None,
     strokes: str | None = None,
     out: OutputPath = Path("out/solution.vtu"),
@@ -36,7 +33,6 @@ def command(
 
     Args:
         solver: Name of a solver; `pinnray solvers` lists them.
-        adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
         measurements: CSV file of marker displacements, for an assimilating solver.
         strokes: Strokes at which to print the force, mm, separated by commas; default: the full one.
         out: VTU file of the fields.
@@ -51,9 +47,9 @@ def command(
         problem_remarks,
     )
     from pinnray.comparison.figures.force_charts import draw_force_displacement
-    from pinnray.comparison.pipeline.shared_mesh import shared_mesh, tolerance_reached
     from pinnray.comparison.report.figures_table import figures_lines
     from pinnray.comparison.report.output_files import write_vtu
+    from pinnray.geometry.cache import finger_mesh
     from pinnray.runtime.stages import Stages
     from pinnray.solvers.finger_figures import break_answer
     from pinnray.solvers.problem import Problem
@@ -84,16 +80,10 @@ def command(
     check_asked(made, material, given)
     finger.check_cost(chosen, settings, [made])
     with Stages() as stages:
-        triangles, adaptation = shared_mesh(
-            chosen,
-            settings,
-            stages,
-            tolerance=adapt,
-            material=material,
-            load=load,
-            solvers=[made],
-            check=partial(check_positions, given) if given else None,
-        )
+        with stages.stage("mesh"):
+            triangles = finger_mesh(chosen, settings=settings)
+            if given:
+                check_positions(given, triangles)
         with stages.stage(made.name) as progress:
             problem = Problem(triangles, with_law(material, made), load, given, chosen)
             measured = displacement_remarks(given, problem) if given else []
@@ -123,7 +113,7 @@ def command(
     for path in written:
         print(path)
     whole = all(isfinite(force) for _, force in forces)
-    return 0 if evaluation.converged and whole and tolerance_reached(adaptation) else NOT_CONVERGED
+    return 0 if evaluation.converged and whole else NOT_CONVERGED
 
 
 def _stroke(text: str, travel: float) -> float:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from pinnray.options.shared import Repeated
-from pinnray.runtime.errors import UserError
 
 if TYPE_CHECKING:
     from pinnray.studies.emulator.emulator import Emulator, Predictions
@@ -22,29 +21,15 @@ def command(sweep: Path, *, set: Repeated = ()) -> int:
         sweep: Folder of `pinnray sweep`.
         set: A parameter that the sweep varies, such as rib_count=6 or N=6; give every one.
     """
+    from pinnray.geometry.finger.presets import assignments
     from pinnray.runtime.stages import Stages
     from pinnray.studies.emulator.store import emulator_of
 
-    given = finger_given(set)
+    given = assignments(set)
     with Stages() as stages:
         emulator = emulator_of(sweep, stages)
     print_table(emulator, emulator.predict([emulator.inputs.finger(given)]))
     return 0
-
-
-def finger_given(settings: tuple[str, ...]) -> dict[str, str]:
-    """The finger of the option --set."""
-    from pinnray.geometry.finger.parameters import SYMBOLS
-
-    found: dict[str, str] = {}
-    for setting in settings:
-        key, equals, value = (part.strip() for part in setting.partition("="))
-        if not (equals and key and value):
-            raise UserError(f"cannot read {setting!r}; write parameter=value, such as rib_count=6")
-        if (name := SYMBOLS.get(key, key)) in found:
-            raise UserError(f"{name} is set twice; set it once")
-        found[name] = value
-    return found
 
 
 def print_table(emulator: "Emulator", found: "Predictions") -> None:

@@ -81,7 +81,7 @@ class NestedPath:
     @property
     def phrase(self) -> str:
         """The steps taken, in words."""
-        coarse, fine = f"on elements of {COARSE:g} mm", "on the given ones"
+        coarse, fine = f"on elements of {COARSE:g} mm", "on the mesh itself"
         if isinstance(self._path.space, ExtrudedSpace):
             coarse, fine = "in plane strain", "in three dimensions"
         return f"{self._way.phrase}, {coarse}; {self._path.stats['newton_iterations']} more {fine}"

@@ -106,5 +106,5 @@ def test_the_solution_of_fem_has_no_excess_but_rounding():
 
 def test_a_result_that_misses_energy_says_so(pinn):
     missing = with_certificate(pinn, replace(GOOD, missed=0.1))
-    assert "reports 2.50\xa0% less energy" in missed_energy(missing)
+    assert "reports 2.5\xa0% less energy" in missed_energy(missing)
     assert missed_energy(with_certificate(pinn, replace(GOOD, missed=0.01))) == ""

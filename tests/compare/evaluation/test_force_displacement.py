@@ -67,8 +67,8 @@ def test_file_has_the_forces_for_the_depth(followed, tmp_path):
 def test_picture_has_both_scales_and_the_end_of_every_curve(followed, fem):
     stopped = replace(followed, converged=False)
     page = page_of(draw_force_displacement(force_curves([fem, stopped], Load()), depth=20.0))
-    assert "fem, 0.5 N/mm" in page.text
-    assert "fem-nonlinear (not converged), 3 N/mm" in page.text
+    assert "fem, 10.0 N" in page.text
+    assert "fem-nonlinear (not converged), 60.0 N" in page.text
     assert "force for 20 mm of depth, N" in page.text
     assert "truth" not in page.text
     left, right = page.figure.axes[0], page.figure.axes[0].child_axes[0]
@@ -78,7 +78,7 @@ def test_picture_has_both_scales_and_the_end_of_every_curve(followed, fem):
 def test_the_force_on_the_simulated_finger_is_a_cross(followed, fem):
     (curve,) = force_curves([followed], Load())
     page = page_of(draw_force_displacement([curve], depth=20.0, truth=ForceCurve.of(fem, Load())))
-    assert "truth, simulated, 0.5 N/mm" in page.text
+    assert "truth, simulated, 10.0 N" in page.text
     (cross,) = [line for line in page.figure.axes[0].lines if line.get_marker() == "x"]
     assert (cross.get_xdata(), cross.get_ydata()) == (pytest.approx([10.0]), pytest.approx([0.5]))
 
@@ -94,7 +94,7 @@ def test_the_whole_curve_of_the_simulated_finger_and_an_identified_force_are_dra
     axes = page.figure.axes[0]
     pink = [line for line in axes.lines if line.get_color() == MEASURED and line.get_marker() == "None"]
     np.testing.assert_allclose(pink[0].get_ydata(), 3.0 * STEPS**2)
-    assert "fem-id, 0.6 N/mm, identified" in page.text
+    assert "fem-id, 12.0 N, identified" in page.text
     (interval,) = axes.containers[0].lines[2]  # type: ignore[attr-defined]
     np.testing.assert_allclose(interval.get_segments()[0][:, 1], [0.5, 0.8])
     assert (page.cut_off(), page.overlaps()) == ([], [])

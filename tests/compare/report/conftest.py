@@ -47,6 +47,6 @@ def written(estimated, pinn, followed, evaluate, truth, compared, tmp_path_facto
     for name in TITLES:
         drawing = draw(comparison, name)
         picture = drawing.figure.save(folder / f"{name}.png")
-        pictures.append(Picture(picture, drawing.title, drawing.caption, drawing.alt))
+        pictures.append(Picture(picture, drawing.title, drawing.caption))
     write_report(folder / "report.html", comparison, pictures, {"seed": 17})
     return folder / "report.html"

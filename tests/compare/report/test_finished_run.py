@@ -26,7 +26,7 @@ def folder(compared, estimated, evaluate, finished, tmp_path) -> Path:
         Estimated(0.1, 0.0, 0.2),
         Estimated(36.0, 35.0, 37.5),
         {"markers": 0.8, "contact": 0.2},
-        "80% of the variance of the force comes from the errors of the markers.",
+        "80 % of the variance of the force comes from the errors of the markers.",
     )
     given = replace(given, in_sample=True, left_out=estimated.marker_displacement, identified=force)
     network = evaluate("pinn-asm", 1.01)
@@ -48,7 +48,7 @@ def test_a_run_gives_its_answers(folder: Path, capsys: pytest.CaptureFixture[str
     assert "May the network be trusted here?\n  Yes, as a solver" in said
     assert "gp was left out: too slow." in said
     assert "The force acts at x = 36.0 mm (35.0 to 37.5 mm) by fem-asm." in said
-    assert "80% of the variance of the force comes from the errors" in said
+    assert "80 % of the variance of the force comes from the errors" in said
     assert re.search(r"fem-asm +0\.700 +7\.3.% ", said)  # the table of the markers
     assert said.endswith(f"report: {folder / 'report.html'}\n")
     assert [path.name for path in folder.iterdir()] == ["metrics.json"]

@@ -63,7 +63,7 @@ def hostile(fem, pinn, observe, compared) -> Results:
 def test_the_report_escapes_every_text_of_others(hostile: Results, tmp_path: Path) -> None:
     path = tmp_path / 'a <b> & "c".png'
     path.write_bytes(PNG)
-    picture = Picture(path, HOSTILE, HOSTILE, HOSTILE)
+    picture = Picture(path, HOSTILE, HOSTILE)
     page = report_html(hostile, [picture], {HOSTILE: HOSTILE, "group": {HOSTILE: HOSTILE}})
     found, plain = Elements(page), Elements(report_html(hostile, [], {}))
     assert "x-evil" not in found.names

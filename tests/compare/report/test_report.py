@@ -77,7 +77,7 @@ def page_of(comparison: Results, **changes: object) -> Page:
 
 def test_it_asks_for_nothing_from_outside(content: Results, tmp_path: Path) -> None:
     Image.new("RGB", (4, 3), "red").save(tmp_path / "overlay.png")
-    html = render(content, [Picture(tmp_path / "overlay.png", "Deformed finger", "Two fingers.", "An alt.")])
+    html = render(content, [Picture(tmp_path / "overlay.png", "Deformed finger", "Two fingers.")])
     assert "<link" not in html
     packed = r'(?<=id="viewer-data">)[^<]*'
     assert re.findall(r"url\(|@import|https?://", re.sub(packed, "", html)) == []

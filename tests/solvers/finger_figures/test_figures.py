@@ -127,7 +127,7 @@ def test_a_recorded_path_gives_the_force_on_the_way() -> None:
     with pytest.warns(UserWarning, match="at 6 mm is interpolated between steps at 5 and 10 mm"):
         assert found.force_at(6.0) == pytest.approx(depth * (4 + 16 / 5))
     assert found.force_at(5.0) == 4 * depth
-    with pytest.raises(ValueError, match="known from 0 to 10 mm, not at 11 mm"):
+    with pytest.raises(ValueError, match="known up to the last equilibrium, not at 11 mm"):
         found.force_at(11.0)
     alone = figures_of(affine([[0, 0], [0, 0]], nonlinear), rest={})
     assert np.isnan(alone.force_50)

@@ -2,8 +2,6 @@
 
 import shutil
 import sqlite3
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -182,29 +180,6 @@ def test_another_study_in_the_folder_is_refused(swept, tmp_path, capsys):
     path.write_text(STUDY.format(samples=6).replace("mesh_size = 2.0", "mesh_size = 1.9"), encoding="utf-8")
     assert main(["sweep", str(path), "--out", str(swept / "out")]) == 2
     assert "holds a sweep with other settings (study.mesh_size)" in capsys.readouterr().err
-
-
-def test_a_journal_of_others_removes_no_file(tmp_path: Path) -> None:
-    """A rollback journal of an unfinished transaction may name a file, which SQLite removes after it."""
-    mine, journal, rollback = (tmp_path / name for name in ("thesis.tex", "a.sqlite", "a.sqlite-journal"))
-    mine.write_text("mine")
-    left = (  # a killed process leaves both files
-        "import os, signal, sqlite3, sys\n"
-        "sqlite3.connect(sys.argv[1]).executescript('create table samples (number integer)')\n"
-        "open_one = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
-        "open_one.executescript('pragma cache_size = 1; begin immediate')\n"
-        "for n in range(20000): open_one.execute('insert into samples values (?)', (n,))\n"
-        "os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    subprocess.run([sys.executable, "-c", left, str(journal)], check=False)
-    name = bytes(mine)
-    sizes = (0x40000000 // 4096 + 1, len(name), sum(name))
-    first, *last = (size.to_bytes(4, "big") for size in sizes)
-    with rollback.open("ab") as file:
-        file.write(first + name + b"".join(last) + bytes.fromhex("d9d505f920a163d7"))
-    with pytest.raises(UserError, match=r"a\.sqlite-journal names another file"), opened(journal) as content:
-        content.numbers()
-    assert mine.read_text() == "mine"
 
 
 def test_material_and_load_of_a_drawn_finger_are_varied(tmp_path: Path) -> None:
