@@ -16,7 +16,7 @@ from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.machine import cores
+from pinnray.runtime.machine import process_count
 from pinnray.runtime.text_files import as_path
 from pinnray.solvers.load import Physics
 
@@ -87,7 +87,7 @@ def sweep(
             raise UserError(f"{said} is said by the study in {file}; change it there")
         read, folder = Study.load(file), file.parent
     with _kept(out) as where, shown_stages(progress) as stages:
-        job = StudyJob(read, folder, where, _processes(processes), finger=finger)
+        job = StudyJob(read, folder, where, process_count(processes, "processes ="), finger=finger)
         done = run_sweep(job, stages)
     for remark in done.remarks:
         warnings.warn(remark, stacklevel=2)
@@ -176,7 +176,7 @@ def optimise(
         file = as_path(question, "the question")
         read, folder = Question.load(file), file.parent
     with _kept(out) as where, shown_stages(progress) as stages:
-        return search_front(StudyJob(read, folder, where, _processes(processes)), stages)
+        return search_front(StudyJob(read, folder, where, process_count(processes, "processes =")), stages)
 
 
 def _study(
@@ -212,14 +212,6 @@ def _range(name: str, values: object) -> Mapping[str, Any]:
             f"{name}: give a list of values, such as [4, 6], or {{'from': LOW, 'to': HIGH}}, not {values!r}"
         )
     return {"values": [each.item() if hasattr(each, "item") else each for each in values]}
-
-
-def _processes(given: int | None) -> int:
-    if given is None:
-        return cores()
-    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
-        raise UserError(f"processes = {given!r}: give a whole number from 1")
-    return given
 
 
 @contextmanager

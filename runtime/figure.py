@@ -96,13 +96,14 @@ class Figure(MplFigure):
         with mpl.rc_context(SETTINGS):
             super().draw(renderer)
 
-    def save(self, path: Path, formats: Collection[str] = ()) -> Path:
+    def save(self, path: str | Path, formats: Collection[str] = ()) -> Path:
         """Write the figure atomically, and return the path.
 
         Args:
             path: Where to write, in the format of its suffix.
             formats: Others in which it is written beside it: `svg` or `pdf`.
         """
+        path = Path(path)
         with mpl.rc_context(SETTINGS):
             for file in (path, *(path.with_suffix(f".{name}") for name in formats)):
                 buffer = BytesIO()

@@ -8,6 +8,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from pinnray.runtime.errors import UserError
+
 PACKAGES = (
     *("pinn-ray", "numpy", "scipy", "scikit-learn", "torch", "fenics-dolfinx", "fenics-ufl", "petsc4py"),
     *("mpi4py", "gmsh", "cadquery", "pyvista", "vtk", "opencv-python-headless"),
@@ -44,6 +46,15 @@ def machine() -> dict[str, str | int]:
 def cores() -> int:
     """Number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def process_count(given: int | None, name: str) -> int:
+    """Processes at a time: as many as there are cores if None; other than a whole number, a `UserError`."""
+    if given is None:
+        return cores()
+    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+        raise UserError(f"{name} {given!r}: give a whole number from 1")
+    return given
 
 
 def free_memory_gb() -> float:

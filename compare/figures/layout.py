@@ -42,10 +42,13 @@ def fitting(
 ) -> list[Evaluation]:
     """The evaluations that a page has room for: the reference, then those that converged, then others.
 
-    `chosen` are the names of those to choose from, all if empty.
+    Of these, first those that found the load. `chosen` are the names of those to choose from, all if empty.
     """
     found = [each for each in evaluations if not chosen or each.solver in chosen]
-    first = sorted(found, key=lambda each: (each.solver != reference.solver, not each.converged))
+    first = sorted(
+        found,
+        key=lambda each: (each.solver != reference.solver, not each.converged, each.identified is None),
+    )
     return [each for each in found if each in first[: max(room, 1)]]
 
 

@@ -122,7 +122,7 @@ def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
         word = f"load path of {len(path) - 1} equilibria that the solver found"
         return np.asarray(fractions)[chosen].tolist(), path[chosen], word
     word = (
-        "scaled in proportion to the load, as the linear law has it"
+        "scaled in proportion to the load, as the linear law implies"
         if evaluation.law == "linear"
         else "end state scaled for the eye: this solver records no load path"
     )

@@ -15,7 +15,7 @@ from pinnray.film.film import FilmSettings
 from pinnray.geometry.finger.parameters import CheckedModel
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import errors_of_interruption, say
-from pinnray.runtime.machine import cores
+from pinnray.runtime.machine import process_count
 from pinnray.solvers.load import LoadKind, Physics
 from pinnray.solvers.material import Material
 
@@ -277,7 +277,7 @@ class StudyOptions(CheckedModel):
         from pinnray.studies.sweep.job import StudyJob
 
         out = self.out or Path("out") / f"{kind}-{study.name}"
-        return StudyJob(study, file.parent, out, read_processes(self.processes))
+        return StudyJob(study, file.parent, out, process_count(self.processes, "--processes"))
 
 
 @contextmanager
@@ -311,14 +311,6 @@ def read_millimetres(text: str | None) -> float | None:
     if given is None:
         raise UserError(f"--width {text}: give a number in mm, cm or in, such as 85mm")
     return float(given[1]) * {"cm": 10.0, "in": 25.4}.get(given[2], 1.0)
-
-
-def read_processes(processes: int | None) -> int:
-    """Processes at a time: as many as there are cores if None."""
-    count = cores() if processes is None else processes
-    if count < 1:
-        raise UserError(f"--processes {count}: give a whole number from 1")
-    return count
 
 
 def existing_table(path: Path | None) -> Path | None:

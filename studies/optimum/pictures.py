@@ -11,6 +11,7 @@ from pinnray.comparison.figures.layout import HALO, axes_at, wrapped, write_head
 from pinnray.comparison.figures.solver_colours import solver_look
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.runtime.figure import CONTACT, MUTED, NARROW, SMALL, WIDTH, Figure, figure
+from pinnray.runtime.tables import number
 from pinnray.solvers.finger_figures import QUANTITIES
 from pinnray.solvers.problem import Problem, contact_ends, front_points
 from pinnray.solvers.solution import Solution
@@ -121,8 +122,9 @@ def cylinder_at_end(problem: Problem) -> Circle | None:
 def _said(optimum: Optimum, run: int) -> str:
     """The first quantities of the question, of a run."""
     values = optimum.measurements[run].values
-    words = (f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.study.names[:3])
-    return ", ".join(words).replace("_", "\N{NO-BREAK SPACE}")
+    words = (f"{name} {number(values[name], 3)} {_unit(name)}" for name in optimum.study.names[:3])
+    said = ", ".join(words).replace("mises", "Mises").replace(" °", "°")
+    return said.replace("_", "\N{NO-BREAK SPACE}")
 
 
 def _place(run: Measurement, first: str, second: str) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Solve one finger with one solver."""
 
-from math import hypot, isfinite, nan
+from math import hypot, isfinite, isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,7 +47,6 @@ def command(
         problem_remarks,
     )
     from pinnray.comparison.figures.force_charts import draw_force_displacement
-    from pinnray.comparison.report.figures_table import figures_lines
     from pinnray.comparison.report.output_files import write_vtu
     from pinnray.geometry.cache import finger_mesh
     from pinnray.runtime.stages import Stages
@@ -106,7 +105,7 @@ def command(
     print(f"{evaluation.label}: {evaluation.message}")
     print(f"energy {solution.energy:.6g} N mm/mm")
     if figures:
-        print("\n".join(figures_lines(figures, forces)))
+        print("\n".join(_lines(figures, forces)))
         print(break_answer(figures.strain_over_break, figures.peak_radius))
     if solution.identified:
         print(solution.identified.advice)
@@ -136,3 +135,14 @@ def _force(figures: "FingerFigures", stroke: float) -> float:
     except UserError as error:
         say(f"warning: {error}")
         return nan
+
+
+def _lines(figures: "FingerFigures", forces: list[tuple[float, float]]) -> list[str]:
+    """One solver's figures, a line each, after the forces, N, at some strokes, mm."""
+    rows = [
+        ("force", "not known" if isnan(force) else f"{force:.4g} N", f"at {stroke:g} mm")
+        for stroke, force in forces
+    ]
+    rows += figures.rows()
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    return [f"{name:<{widths[0]}}  {value:<{widths[1]}}  {remark}".rstrip() for name, value, remark in rows]

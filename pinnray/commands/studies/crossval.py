@@ -14,9 +14,9 @@ from pinnray.options.shared import (
     comma_list,
     existing_table,
     going_on_from,
-    read_processes,
 )
 from pinnray.runtime.exits import NOT_CONVERGED, say
+from pinnray.runtime.machine import process_count
 
 if TYPE_CHECKING:
     from pinnray.solvers.material import Material
@@ -90,7 +90,7 @@ def command(
         frame=Registration.parse(frame),
         measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
         out=out or Path("out") / f"crossval-{design.name}",
-        processes=read_processes(processes),
+        processes=process_count(processes, "--processes"),
     )
     made = [variant.solver for variant in study.variants]
     finger.check_cost(design, mesh, made, simulated=True)

@@ -54,7 +54,7 @@ def test_the_body_moves_along_the_path_that_the_solver_found(viewer: Page) -> No
         )
         assert np.nanmedian(shares) == pytest.approx(share, abs=1e-2)
     viewer.select_option("#viewer-solver", index=0)
-    expect(viewer.locator("#viewer-note")).to_contain_text("as the linear law has it")
+    expect(viewer.locator("#viewer-note")).to_contain_text("as the linear law implies")
     viewer.select_option("#viewer-solver", index=2)
     expect(viewer.locator("#viewer-note")).to_contain_text("load path of 2 equilibria")
 
