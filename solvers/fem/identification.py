@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import ufl
@@ -204,6 +204,8 @@ class FemIdSolver(IdentifyingSolver):
     """
 
     degree: int = 2  # Of the elements, 1 or 2
+    # Side faces that are "held" do not move along z: the markers are those of a body in plane strain
+    sides: Literal["free", "held"] = "free"
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
@@ -236,6 +238,8 @@ class FemIdSolver(IdentifyingSolver):
         kept: dict[tuple[Registration, Registration], Identifier | NestedSearch] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
+            if self.sides == "held":
+                observations = replace(observations, plane=True)
             started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
             if frames not in kept:
                 kept[frames] = self._search(replace(problem, observations=observations))
