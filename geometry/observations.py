@@ -23,9 +23,6 @@ class Observations:
         visible: Which markers were seen, shape (m,), all if None; none where no displacement is known.
         source: One sentence on the origin of the numbers, or on why there are none, shown with them.
         simulated: True if no camera was involved.
-        plane: True if the markers move as in plane strain, as those of a plane simulation do; False if they
-            are on a side face without traction, as those of a real finger; None where it is not known, as of
-            a film of the rig.
         marker_radius: Radius of the markers' discs, over which their displacements are means, mm; the default
             design's, `design.marker_radius` is that of another one.
         pressed: Registration of the pressed picture with that at rest.
@@ -42,7 +39,6 @@ class Observations:
     visible: BoolArray
     source: str
     simulated: bool
-    plane: bool | None
     marker_radius: float
     pressed: Registration
     drawn: Registration
@@ -58,7 +54,6 @@ class Observations:
         marker_radius: float = 0.8,
         pressed: Registration = FIXED,
         drawn: Registration = FIXED,
-        plane: bool | None = None,
     ) -> None:
         (count, *_) = (*np.shape(np.asarray(points, dtype=object)), 1)
         if np.ndim(np.asarray(standard_deviations, dtype=object)) == 0:
@@ -71,12 +66,7 @@ class Observations:
         ):
             object.__setattr__(self, name, frozen_array(values, dtype=dtype, shape=shape, name=name))
         self.__dict__.update(
-            source=source,
-            simulated=simulated,
-            plane=False if plane is None and not simulated else plane,
-            marker_radius=marker_radius,
-            pressed=pressed,
-            drawn=drawn,
+            source=source, simulated=simulated, marker_radius=marker_radius, pressed=pressed, drawn=drawn
         )
         self._check()
 

@@ -31,8 +31,6 @@ SMALLEST_DISTANCE = 1e-3
 LARGEST = 1e6
 """Size of a coordinate or displacement that cannot be of a finger, mm."""
 SIMULATED_MARK = "# simulated"
-SEEN = {True: " in plane strain", False: " on a side face", None: ""}
-"""What follows the mark, by `Observations.plane`."""
 SOURCE_MARK = "# source: "
 PICTURES = {"pressed": "# pressed picture: ", "drawn": "# picture at rest: "}
 """Marks of the comments that say how well the pictures' frames are known."""
@@ -45,7 +43,7 @@ def write_measurements(path: Path, observations: Observations) -> None:
     """
     with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         if observations.simulated:
-            file.write(f"{SIMULATED_MARK}{SEEN[observations.plane]}\n")
+            file.write(f"{SIMULATED_MARK}\n")
         file.write(f"{SOURCE_MARK}{' '.join(observations.source.split())}\n")
         for picture, mark in PICTURES.items():
             known = getattr(observations, picture)
@@ -77,7 +75,7 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     no camera was involved. `# pressed picture: TEXT` says how well the pressed picture's frame is known in
     that at rest, and `# picture at rest: TEXT` how well that one's is in the drawing, in words of
     `Registration.parse`. Where nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose
-    points were `CLICKED`. After `# simulated` may stand `in plane strain` or `on a side face`.
+    points were `CLICKED`.
 
     Raises:
         UserError: If the file cannot be read, a column is missing, a value is no number
@@ -85,17 +83,14 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     """
     table = read_table(path, "measurements", *TITLES)
     sources = _said(table.comments, SOURCE_MARK)
-    words = {f"{SIMULATED_MARK}{seen}": plane for plane, seen in SEEN.items()}
-    marks = [re.sub(r"^#\s*", "# ", comment.lower()) for comment in table.comments]
-    simulated = [words[mark] for mark in marks if mark in words]
+    simulated = any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in table.comments)
     known = {picture: said[0] for picture, mark in PICTURES.items() if (said := _said(table.comments, mark))}
     return measurements_of(
         [(f"line {line}", cells) for line, cells in table.rows],
         marker_radius=marker_radius,
         table=str(path),
         source=sources[0] if sources else f"measurements from {path.name}",
-        simulated=bool(simulated),
-        plane=simulated[0] if simulated else None,
+        simulated=simulated,
         pictures=known,
     )
 
@@ -107,7 +102,6 @@ def measurements_of(
     table: str,
     source: str,
     simulated: bool = False,
-    plane: bool | None = None,
     pictures: Mapping[str, str] = MappingProxyType({}),
 ) -> Observations:
     """Observations from a table; columns and defaults as in `read_measurements`.
@@ -118,7 +112,6 @@ def measurements_of(
         table: Name of the table in messages.
         source: One sentence on the origin of the numbers.
         simulated: True if no camera was involved.
-        plane: As in `Observations`.
         pictures: How well the frames of the pictures of `PICTURES` are known, in words.
 
     Raises:
@@ -151,7 +144,6 @@ def measurements_of(
             visible=seen,
             source=source,
             simulated=simulated,
-            plane=plane,
             marker_radius=marker_radius,
             **known,
         )

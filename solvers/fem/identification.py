@@ -37,12 +37,6 @@ from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import Cost, Family, Progress, check_problem, silent
 
-DEPTH_UNKNOWN = (
-    "the drawing has no depth: the finger was fitted in plane strain, whose force is up to a fifth too "
-    "large; give depth"
-)
-"""What is said of markers on the side face of a finger whose depth is not known."""
-
 
 class FemBody:
     """Lagrange elements of degree 1 or 2 on the drawn mesh; see `pinnray.solvers.identification.body.Body`.
@@ -198,14 +192,13 @@ def _both_components(values: FloatArray) -> FloatArray:
 class FemIdSolver(IdentifyingSolver):
     """Finite elements whose contact, walls and law are found from the markers.
 
-    Markers of a real finger are on a side face, which bulges. For them the last steps are by a `ThickBody`,
-    on elements of 1 mm where the mesh has finer ones, and the field is that of the side face. A drawing of
-    which the depth is not known is fitted in plane strain.
+    Markers of a real finger are on a side face, which bulges. With `sides="free"` the last steps are by a
+    `ThickBody`, on elements of 1 mm where the mesh has finer ones, and the field is that of the side face.
+    Else they are in plane strain, and intervals have the doubt of that.
     """
 
     degree: int = 2  # Of the elements, 1 or 2
-    # Side faces that are "held" do not move along z: the markers are those of a body in plane strain
-    sides: Literal["free", "held"] = "free"
+    sides: Literal["unknown", "free"] = "unknown"  # "free": a side face without traction shows the markers
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
@@ -238,8 +231,6 @@ class FemIdSolver(IdentifyingSolver):
         kept: dict[tuple[Registration, Registration], Identifier | NestedSearch] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
-            if self.sides == "held":
-                observations = replace(observations, plane=True)
             started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
             if frames not in kept:
                 kept[frames] = self._search(replace(problem, observations=observations))
@@ -251,19 +242,14 @@ class FemIdSolver(IdentifyingSolver):
                 "triangles": len(mesh.triangles),
                 "degree": self.degree,
             }
-            solution = found.solution(
-                self.name, replace(problem, mesh=mesh, observations=observations), stats
-            )
-            if observations.plane is not False or _depth_known(problem.finger):
-                return solution
-            warnings = [*solution.status.warnings, DEPTH_UNKNOWN]
-            return replace(solution, status=replace(solution.status, warnings=warnings))
+            return found.solution(self.name, replace(problem, observations=observations), stats)
 
         return fitted
 
     def _search(self, problem: Problem) -> Identifier | NestedSearch:
-        coarse, seen = coarser(problem), problem.observations
-        if seen is not None and seen.plane is False and _depth_known(problem.finger):
+        coarse = coarser(problem)
+        if self.sides == "free":
+            _check_depth(problem.finger)
             fine: Callable[[Unknowns], Body] = partial(ThickBody, degree=self.degree)
             coarse = problem = coarse or problem
         else:
@@ -276,10 +262,10 @@ class FemIdSolver(IdentifyingSolver):
         )
 
 
-def _depth_known(finger: Finger | None) -> bool:
-    """Whether a finger has a depth of its own, not one that was proposed for its drawing."""
-    proposed = isinstance(finger, DrawnFinger) and finger.sources.get("depth") == "proposed"
-    return finger is not None and not proposed
+def _check_depth(finger: Finger | None) -> None:
+    """Refuse a finger without a depth of its own."""
+    if finger is None or (isinstance(finger, DrawnFinger) and finger.sources.get("depth") == "proposed"):
+        raise UserError("fem-id.sides=free: the drawing has no depth; give depth, mm")
 
 
 def _interpolated(fit: Fit, model: ResponseModel) -> Response:

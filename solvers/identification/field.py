@@ -150,8 +150,25 @@ class IdentifiedField(Snapshot):
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedSideFace(IdentifiedField):
-    """That of a side face; it is a `SolidField`."""
+    """That of a side face, whose body may be on a coarser mesh than the problem; it is a `SolidField`."""
+
+    def displacement(self, location: LocatedPoints) -> FloatArray:
+        """See `Snapshot`."""
+        return super().displacement(self._located(location))
+
+    def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
+        """See `Snapshot`."""
+        return super().displacement_in_space(self._located(location))
+
+    def gradient(self, location: LocatedPoints) -> FloatArray:
+        """See `Snapshot`."""
+        return self.solid_gradient(location)[:, :2, :2]
 
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Gradient of the displacement by the place before the load, shape (n, 3, 3)."""
-        return self._gradient(self.body.gradients(self.state[None], location)[0], location)
+        own = self._located(location)
+        return self._gradient(self.body.gradients(self.state[None], own)[0], own)
+
+    def _located(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
+        places = points.points if isinstance(points, LocatedPoints) else points
+        return self.problem.mesh.locate_on(self.walls.mesh, places)

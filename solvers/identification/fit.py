@@ -23,7 +23,7 @@ from pinnray.solvers.identification.unknowns import CONTACT, LAW_ODDS, SHARE, Un
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
 SOURCES = {
-    "third dimension": "the third dimension, which plane strain leaves out: take fem-id and give the depth, "
+    "third dimension": "the third dimension, which plane strain leaves out: take fem-id.sides=free, "
     "or weigh one press, and multiply the forces of other presses by the ratio of weighed to found",
     "markers": "the errors of the markers: film nearer or sharper, or use more markers",
     "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",

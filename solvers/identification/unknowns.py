@@ -45,9 +45,7 @@ def doubt_of_the_plane(problem: Problem, thick: bool) -> float:
     Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger is
     in neither state, and its markers do not tell. A body that is only a plane has none, nor a thick one.
     """
-    seen = problem.observations
-    plane = problem.finger is None or (seen is not None and seen.plane is True)
-    return 0.0 if plane or thick else 0.5 * problem.material.poisson**2
+    return 0.0 if problem.finger is None or thick else 0.5 * problem.material.poisson**2
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,16 +37,6 @@ def read(folder: Path, content: str | bytes) -> Observations:
     return read_measurements(path, marker_radius=0.6)
 
 
-@pytest.mark.parametrize(
-    ("simulated", "plane", "kept"),
-    [(True, True, True), (True, False, False), (True, None, None), (False, None, False)],
-)
-def test_it_is_kept_whether_markers_move_in_plane_strain(tmp_path, simulated, plane, kept):
-    path = tmp_path / "markers.csv"
-    write_measurements(path, Observations([[1, 2]], [[0, 1]], simulated=simulated, plane=plane))
-    assert read_measurements(path, marker_radius=0.8).plane is kept
-
-
 @pytest.mark.parametrize("simulated", [True, False])
 @pytest.mark.parametrize(
     "source",

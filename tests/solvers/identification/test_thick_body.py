@@ -9,15 +9,15 @@ import pytest
 from pinnray import load_drawing
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.errors import UserError
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.elasticity import lame_constants
 from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions
-from pinnray.solvers.fem.identification import DEPTH_UNKNOWN, FemIdSolver
+from pinnray.solvers.fem.identification import FemIdSolver
 from pinnray.solvers.fem.solid import FaceField, Fem3dSolver
 from pinnray.solvers.fem.thick_body import MEAN, ThickBody
 from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
 from pinnray.solvers.problem import Load, Material, Problem
-from pinnray.solvers.solution import SolidField
 from tests.solvers.identification.test_network_body import slope
 
 LAME = lame_constants(11.4, 0.4, "strain")
@@ -130,33 +130,28 @@ def test_the_force_is_found_from_markers_on_a_side_face(coarse_mesh):
     pressed = Problem(coarse_mesh, Material(law="neo-hookean"), load, finger=Design())
     true = Fem3dSolver(layers=3).solve(pressed)
     moved = true.displacement(coarse_mesh.markers)
-    found = {}
-    for plane in (False, None):
-        seen = Observations(coarse_mesh.markers, moved, 0.005, simulated=plane is None, plane=plane)
-        solution = FemIdSolver(law="given").solve(replace(pressed, observations=seen))
+    seen, found = Observations(coarse_mesh.markers, moved, 0.005), {}
+    for sides in ("free", "unknown"):
+        solution = FemIdSolver(law="given", sides=sides).solve(replace(pressed, observations=seen))
         assert solution.status.converged
-        found[plane] = solution
+        found[sides] = solution
     force = -true.reaction[1]
-    assert found[False].identified.force.value == pytest.approx(force, rel=0.03)
-    assert found[None].identified.force.value > 1.04 * force
-    low, high = found[False].identified.force[1:]
+    assert found["free"].identified.force.value == pytest.approx(force, rel=0.03)
+    assert found["unknown"].identified.force.value > 1.04 * force
+    low, high = found["free"].identified.force[1:]
     assert low < force < high
     assert high - low < 0.3 * force
     there = coarse_mesh.at_centroids()
-    stress, deviation = true.state(there).von_mises, found[False].uncertainty.von_mises(there)
+    stress, deviation = true.state(there).von_mises, found["free"].uncertainty.von_mises(there)
     errors = [np.abs(each.state(there).von_mises - stress) for each in found.values()]
     assert errors[0] @ coarse_mesh.areas < 0.5 * errors[1] @ coarse_mesh.areas
     assert np.average(errors[0] < 2 * deviation + 0.02 * stress.max(), weights=coarse_mesh.areas) > 0.9
 
 
-def test_a_drawing_without_a_depth_stays_plane_and_says_so(coarse_mesh):
+def test_a_drawing_without_a_depth_is_refused(coarse_mesh):
     drawn = load_drawing(Path(__file__).parents[2] / "data" / "compliant-finray" / "Finray_8.stp")
-    load = Load("patch", displacement=(0.0, -1.0))
+    finger = replace(drawn, sources={**drawn.sources, "depth": "proposed"})
     seen = Observations(coarse_mesh.markers, np.tile([0.0, -0.1], (9, 1)), 0.01)
-    told = {}
-    for source in ("drawn", "proposed"):
-        finger = replace(drawn, sources={**drawn.sources, "depth": source})
-        problem = Problem(coarse_mesh, Material(law="neo-hookean"), load, seen, finger)
-        solution = FemIdSolver(law="given", parameters="position,normal_force").solve(problem)
-        told[source] = DEPTH_UNKNOWN in solution.status.warnings, isinstance(solution.field, SolidField)
-    assert told == {"drawn": (False, True), "proposed": (True, False)}
+    problem = Problem(coarse_mesh, Material(law="neo-hookean"), Load(), seen, finger)
+    with pytest.raises(UserError, match="the drawing has no depth; give depth"):
+        FemIdSolver(sides="free").solve(problem)
