@@ -273,7 +273,7 @@ def terminal_table(
         pad_edge=not narrow,
     )
     for heading in headings:
-        table.add_column(shown(heading), justify="left" if heading in left else "right", no_wrap=True)
+        table.add_column(shown(heading), justify="left" if heading in left else "right")
     for row in rows:
         table.add_row(*map(shown, row))
     return table

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pinnray.comparison.evaluation.evaluation import Evaluation
-from pinnray.comparison.evaluation.metrics import figure_scores, solver_scores
+from pinnray.comparison.evaluation.metrics import solver_scores, truth_scores
 from pinnray.comparison.evaluation.scores import Measurements, Scores
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -62,7 +62,7 @@ class Results:
             left_out=self.unsupported,
             failed=self.failed,
             reference=self.reference.solver,
-            truth=figure_scores(self.truth),
+            truth=truth_scores(self.truth, self.load),
             solvers={
                 each.solver: solver_scores(each, given, self.reference, self.truth, self.load)
                 for each in self.evaluations

@@ -125,3 +125,18 @@ def _uncertainty(evaluation: Evaluation) -> UncertaintyScores | None:
         markers_u=markers[:, 0].tolist(),
         markers_v=markers[:, 1].tolist(),
     )
+
+
+def truth_scores(truth: Evaluation | None, load: Load) -> FigureScores | None:
+    """What the simulated finger does, if there is one, with its force along the stroke of a load.
+
+    Where that is inclined, the truth's own stroke, along y, is another one: forces on its way are not known.
+    """
+    if truth is None or (found := figure_scores(truth)) is None or not load.displacement[0]:
+        return found
+    own = float(np.linalg.norm(truth.reaction))
+    depth = float(np.hypot(found.values["force_N"], found.values["tangential_force_N"])) / own
+    force, across = depth * indenter_forces(load, truth.reaction, None)
+    unknown = dict.fromkeys(("force_25_N", "force_50_N", "force_75_N", "lift_kg"), nan)
+    values = {**found.values, **unknown, "force_N": force, "tangential_force_N": across}
+    return FigureScores(values=values, places=found.places)

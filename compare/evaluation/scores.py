@@ -249,6 +249,8 @@ class Scores(Numbers):
         row |= dict(_columns(uncertainty, to.reference_uncertainty)) if to.reference_uncertainty else {}
         for field in TruthDifferences.model_fields:
             row[f"to_truth_{field}_rel_l2"] = getattr(getattr(own.to_truth, field, None), "rel_l2", nan)
+        does = own.figures.values if own.figures else {}
+        row |= {name: does.get(name, nan) for name in FORCES}
         row |= {"to_truth_force_rel": own.force_to_truth_rel, "energy_N_mm_per_mm": own.energy}
         for column, attribute in CERTIFICATE_COLUMNS.items():
             row[column] = getattr(own.certificate, attribute, nan)
@@ -258,6 +260,8 @@ class Scores(Numbers):
         return row | {"seconds_s": own.seconds, "status": own.message}
 
 
+FORCES = ("force_N", "force_low_N", "force_high_N", "tangential_force_N")
+"""Columns of the forces in a table, of the figures."""
 CERTIFICATE_COLUMNS = {
     "excess_rel": "rel_excess",
     "violation_rel": "rel_violation",

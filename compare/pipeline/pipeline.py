@@ -33,6 +33,11 @@ from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Solver, Traits
 from pinnray.vision.measurements import write_measurements
 
+TRUTH_IS_STRAIGHT = (
+    "the simulated finger is pressed along y, by the stroke's part along y, and not along the inclined "
+    "stroke: errors from it are also those of another load; take measurements"
+)
+
 
 def run(job: Job, stages: Stages, pool: Pool | None = None) -> Comparison:
     """Make the comparison and write its output folder.
@@ -89,6 +94,7 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
             radius = job.design.marker_radius
             try:
                 observations, truth = virtual_experiment(problem, radius, progress, job.simulated)
+                remarks += [TRUTH_IS_STRAIGHT] if job.load.displacement[0] else []
             except UnfinishedExperimentError as error:
                 solvers, without = _without_markers(solvers, job.spare, error)
                 unsupported |= without

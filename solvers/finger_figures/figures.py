@@ -76,7 +76,9 @@ class FingerFigures:
     tip_u: float = _figure("mm", "displacement of the front's tip along the finger")
     tip_v: float = _figure("mm", "displacement of the front's tip across it, positive toward the indenter")
     wrap: float = _figure("deg", "wrap angle: how far the front face folds around the indenter")
-    contact_angle: float = _figure("deg", "angle of the cylinder over which it is touched", always=False)
+    contact_angle: float = _figure(
+        "deg", "angle of the cylinder between the ends of its contact", always=False
+    )
     contact_length: float = _figure("mm", "length of the front that touches the cylinder", always=False)
     compliance_along: float = _figure(
         "mm/N", "displacement of the contact along the finger per force, at rest"

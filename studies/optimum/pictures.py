@@ -53,7 +53,7 @@ def draw_front(optimum: Optimum, shown: Sequence[int], page: float = WIDTH) -> F
         for name, limit in ((first, axes.axvline), (second, axes.axhline)):
             for end in question.constraints[name].ends if name in question.constraints else ():
                 limit(end, color=MUTED, lw=0.8, ls="--")
-        for run in shown:
+        for run in shown[:1] if question.single else shown:  # the best of one objective lie side by side
             axes.annotate(
                 str(optimum.place(run)),
                 _place(optimum.measurements[run], first, second),
