@@ -124,6 +124,72 @@ def stress_of(law: LawName, gradient: FloatArray, lame: Lame) -> tuple[FloatArra
     return stress, across if len(unit) == 2 else stress[:, 2, 2]
 
 
+def piola_stress_and_tangent(
+    law: LawName, gradient: Field, lame: Lame, library: Any = np
+) -> tuple[Field, Field]:
+    """First Piola-Kirchhoff stress P = dψ/dH and tangent A = dP/dH at gradients H, (..., d, d), MPa.
+
+    With G = F^-T, the neo-Hookean law has P = μ (F - G) + λ ln(J) G and, as dG = -G dF^T G,
+
+        A_ijkl = μ δ_ik δ_jl + (μ - λ ln J) G_il G_kj + λ G_ij G_kl
+
+    Gent's has m = μ / (1 - (2 tr E - 2 ln J) / I_m) in the place of μ, which changes by dm = 2 m^2 / (μ I_m)
+    (F - G) : dF. The St Venant-Kirchhoff law has P = F S with S = λ tr(E) I + 2 μ E and
+
+        A_ijkl = δ_ik S_jl + λ F_ij F_kl + μ ((F F^T)_ik δ_jl + F_il F_kj)
+
+    Hooke's law has their tangent at H = 0, whatever H. `library` is NumPy or torch.
+
+    Returns:
+        P, shape (..., d, d), not a number where a finite deformation turns the material inside out, and A,
+        shape (..., d, d, d, d).
+
+    Raises:
+        UserError: If there is no such law.
+    """
+    check_known("law", law, get_args(LawName))
+    λ, μ, einsum = lame.λ, lame.μ, library.einsum
+    one = library.eye(_dimension(gradient), dtype=gradient.dtype)
+    same, swapped = einsum("ik,jl->ijkl", one, one), einsum("il,kj->ijkl", one, one)
+    if law == "linear":
+        tangent = λ * einsum("ij,kl->ijkl", one, one) + μ * (same + swapped)
+        stress = einsum("ijkl,...kl->...ij", tangent, gradient)
+        return stress, library.broadcast_to(tangent, (*gradient.shape, *one.shape))
+    deformation, jacobian = one + gradient, deformation_jacobian(gradient)[..., None, None]
+    if law == "st-venant-kirchhoff":
+        strain = 0.5 * (deformation.swapaxes(-1, -2) @ deformation - one)
+        second_piola = λ * einsum("...ii->...", strain)[..., None, None] * one + 2 * μ * strain
+        tangent = (
+            einsum("ik,...jl->...ijkl", one, second_piola)
+            + λ * einsum("...ij,...kl->...ijkl", deformation, deformation)
+            + μ * einsum("...ik,jl->...ijkl", deformation @ deformation.swapaxes(-1, -2), one)
+            + μ * einsum("...il,...kj->...ijkl", deformation, deformation)
+        )
+        return library.where(jacobian > 0, deformation @ second_piola, library.nan), tangent
+    log_j = library.log(jacobian)
+    if len(one) == 2:  # cofactors
+        inverse = library.flip(deformation, (-2, -1)) * (2 * one - 1) / jacobian
+    else:
+        inverse = library.linalg.inv(deformation).swapaxes(-1, -2)
+    stretched = deformation - inverse
+    if law == "gent":
+        squares = einsum("...ij,...ij->...", deformation, deformation)[..., None, None] - len(one)
+        left = 1 - (squares - 2 * log_j) / LIMIT
+        m = μ / left
+        stiffening = einsum("...ij,...kl->...ijkl", 2 / LIMIT * m / left * stretched, stretched)
+        shear = m[..., None, None] * same + stiffening
+    elif law == "neo-hookean":
+        m, shear = μ, μ * same
+    else:
+        assert_never(law)
+    tangent = (
+        shear
+        + einsum("...il,...kj->...ijkl", (m - λ * log_j) * inverse, inverse)
+        + λ * einsum("...ij,...kl->...ijkl", inverse, inverse)
+    )
+    return m * stretched + λ * log_j * inverse, tangent
+
+
 def piola_stress(law: LawName, gradient: FloatArray, stress: FloatArray) -> FloatArray:
     """First Piola-Kirchhoff stress J σ F^-T of plane states, (n, 2, 2), MPa; σ itself at small strain."""
     check_known("law", law, get_args(LawName))

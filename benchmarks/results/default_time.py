@@ -29,7 +29,7 @@ LIBRARIES = ("scipy.sparse.linalg", "dolfinx", "torch", "pyvista", "matplotlib.f
 NEEDED = {
     "factorisations": (
         "pinnray.solvers.fem.factorisation.Factorisation.update",
-        "pinnray.solvers.pinn.finite_basis.sparse_cholesky.BlockMatrix.factorised",
+        "pinnray.solvers.symmetric_factors.BlockMatrix.factorised",
     ),
     "products": ("pinnray.solvers.pinn.finite_basis.energy.NetworkEnergy.hessian",),
     "renders": ("pinnray.comparison.figures.canvas.Canvas._cover",),

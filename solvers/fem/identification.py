@@ -4,18 +4,19 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import ufl
 
+from pinnray.geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.estimation import COST_CHANGE
 from pinnray.solvers.elasticity import Lame, deformation_jacobian, energy_density_of
 from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions
 from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace, NodeFunction
@@ -23,7 +24,8 @@ from pinnray.solvers.fem.equilibrium import QUADRATURE_DEGREE
 from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
-from pinnray.solvers.identification.body import Linearised
+from pinnray.solvers.fem.thick_body import ThickBody
+from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
@@ -41,6 +43,8 @@ class FemBody:
 
     A state is the array of nodal displacements, shape (N, 2), mm.
     """
+
+    thick: ClassVar[bool] = False
 
     def __init__(self, unknowns: Unknowns, degree: int) -> None:
         problem, motion = unknowns.problem, unknowns.motion
@@ -134,6 +138,8 @@ class FemBody:
         """From the shape functions; see `Body`."""
         return _both_components(weights @ self.space.shape_functions(self._located(points)))
 
+    traction_rows = displacement_rows
+
     def gradient_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """From the derivatives of the shape functions; see `Body`."""
         along = self.space.shape_gradients(self._located(points))
@@ -184,9 +190,15 @@ def _both_components(values: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True)
 class FemIdSolver(IdentifyingSolver):
-    """Finite elements whose contact, walls and law are found from the markers."""
+    """Finite elements whose contact, walls and law are found from the markers.
+
+    Markers of a real finger are on a side face, which bulges. With `sides="free"` the last steps are by a
+    `ThickBody`, on elements of 1 mm where the mesh has finer ones, and the field is that of the side face.
+    Else they are in plane strain, and intervals have the doubt of that.
+    """
 
     degree: int = 2  # Of the elements, 1 or 2
+    sides: Literal["unknown", "free"] = "unknown"  # "free": a side face without traction shows the markers
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
@@ -223,10 +235,11 @@ class FemIdSolver(IdentifyingSolver):
             if frames not in kept:
                 kept[frames] = self._search(replace(problem, observations=observations))
             found = kept[frames].identify(observations, progress)
+            mesh = found.best.model.unknowns.problem.mesh
             stats = {
                 "seconds": time.perf_counter() - started,
                 "unknowns": found.best.response.state.size,
-                "triangles": len(problem.mesh.triangles),
+                "triangles": len(mesh.triangles),
                 "degree": self.degree,
             }
             return found.solution(self.name, replace(problem, observations=observations), stats)
@@ -234,24 +247,34 @@ class FemIdSolver(IdentifyingSolver):
         return fitted
 
     def _search(self, problem: Problem) -> Identifier | NestedSearch:
-        if (coarse := coarser(problem)) is None:
-            return self._identifier(problem)
-        rough = self._identifier(coarse, cost_change=ROUGHLY)
-        fine = self._identifier(problem, flexibility=rough.flexibility)
-        return NestedSearch(rough, fine, _interpolated)
+        coarse = coarser(problem)
+        if self.sides == "free":
+            _check_depth(problem.finger)
+            fine: Callable[[Unknowns], Body] = partial(ThickBody, degree=self.degree)
+            coarse = problem = coarse or problem
+        else:
+            fine = partial(FemBody, degree=self.degree)
+        if coarse is None:
+            return Identifier(self, problem, fine)
+        rough = Identifier(self, coarse, partial(FemBody, degree=self.degree), cost_change=ROUGHLY)
+        return NestedSearch(
+            rough, Identifier(self, problem, fine, flexibility=rough.flexibility), _interpolated
+        )
 
-    def _identifier(
-        self, problem: Problem, cost_change: float = COST_CHANGE, flexibility: float | None = None
-    ) -> Identifier:
-        body = partial(FemBody, degree=self.degree)
-        return Identifier(self, problem, body, cost_change=cost_change, flexibility=flexibility)
+
+def _check_depth(finger: Finger | None) -> None:
+    """Refuse a finger without a depth of its own."""
+    if finger is None or (isinstance(finger, DrawnFinger) and finger.sources.get("depth") == "proposed"):
+        raise UserError("fem-id.sides=free: the drawing has no depth; give depth, mm")
 
 
 def _interpolated(fit: Fit, model: ResponseModel) -> Response:
     """The response of a coarse fit at the nodes of a fine model."""
     here, there = fit.model.body, model.body
-    if not (isinstance(here, FemBody) and isinstance(there, FemBody)):
+    if not (isinstance(here, FemBody) and isinstance(there, FemBody | ThickBody)):
         raise TypeError("the bodies of fem-id are finite elements")
     weights = here.space.shape_functions(there.space.mesh.locate_on(here.space.mesh, there.space.nodes))
-    slopes = np.stack([weights @ slope for slope in fit.response.slopes])
-    return replace(fit.response, state=weights @ fit.response.state, slopes=slopes)
+    known = np.stack([weights @ values for values in (fit.response.state, *fit.response.slopes)])
+    states = np.zeros((len(known), *there.shape))
+    states[..., :2] = known
+    return replace(fit.response, state=states[0], slopes=states[1:])

@@ -9,7 +9,7 @@ motion. F is the derivative of E by the rest of c.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray
@@ -31,6 +31,8 @@ class Body(Protocol):
 
     Arguments are a state of shape `shape`, Lamé constants, MPa, and changes of the k walls' thickness, mm.
     """
+
+    thick: ClassVar[bool]  # Whether it has a depth with free side faces, or is in plane strain
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -63,6 +65,10 @@ class Body(Protocol):
         """Rows (r, 2, *shape) of Σ_q w_rq u(P_q), for points (q, 2), mm, and weights (r, q)."""
         ...
 
+    def traction_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """As `displacement_rows`, of the mean over the depth, on which a traction does work."""
+        ...
+
     def gradient_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Rows (r, 2, *shape) of Σ_qj w_rqj ∂u/∂X_j(P_q), for points (q, 2), mm, and weights (r, q, 2)."""
         ...
@@ -80,5 +86,5 @@ class Body(Protocol):
         ...
 
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
-        """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
+        """Displacement gradients (s, n, d, d) of states (s, *shape): d is 3 on a side face, else 2."""
         ...

@@ -51,12 +51,14 @@ class Snapshot:
         return self._gradient(self.body.field(self.state).gradient(location), location)
 
     def _gradient(self, drawn: FloatArray, location: LocatedPoints) -> FloatArray:
-        """`gradient` from the gradient by the drawn position without the clamp, both of shape (n, 2, 2)."""
+        """`gradient` from that by the drawn position without the clamp, both of shape (n, d, d)."""
         walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())
         cofactors = (1 + np.trace(walls, axis1=1, axis2=2))[:, None, None] * np.eye(2) - walls
-        inverse = cofactors / deformation_jacobian(walls)[:, None, None]
+        inverse, turned = (np.eye(drawn.shape[-1]) * np.ones((count, 1, 1)) for count in (len(walls), 1))
+        inverse[:, :2, :2] = cofactors / deformation_jacobian(walls)[:, None, None]
+        turned[:, :2, :2] = self.clamp.rotation
         gradient = drawn @ inverse[location.cells]
-        return np.asarray(self.clamp.rotation @ (np.eye(2) + gradient) - np.eye(2))
+        return np.asarray(turned @ (np.eye(len(turned[0])) + gradient) - np.eye(len(turned[0])))
 
 
 def displacements_in_space(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
@@ -71,7 +73,7 @@ def displacements_in_space(snapshots: Sequence[Snapshot], location: LocatedPoint
     )
     for each, (displacement, gradient) in zip(snapshots, drawn, strict=True):
         shift = each.walls.shifts(location, each.changes)
-        place = location.points + displacement - np.einsum("nij,nj->ni", gradient, shift)
+        place = location.points + displacement - np.einsum("nij,nj->ni", gradient[:, :2, :2], shift)
         found.append(each.clamp.moved(place) - location.points)
     return found
 
@@ -124,7 +126,7 @@ class IdentifiedField(Snapshot):
         """Standard deviation of the von Mises stress at points (n, 2), mm: shape (n,), MPa."""
         location = self._located(points)
         found = self._deviation(lambda them: von_mises_stresses(them, location))
-        if not (share := doubt_of_the_plane(self.problem)):
+        if not (share := doubt_of_the_plane(self.problem, self.body.thick)):
             return found
         (own,), mesh = von_mises_stresses([self], location), self.problem.mesh
         (all_over,) = von_mises_stresses([self], mesh.at_centroids())
@@ -144,3 +146,29 @@ class IdentifiedField(Snapshot):
             spread = sum(((step - own) / STEP) ** 2 for step in steps)
             variance = variance + member.probability * (spread + (own - best) ** 2)
         return np.sqrt(variance)
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedSideFace(IdentifiedField):
+    """That of a side face, whose body may be on a coarser mesh than the problem; it is a `SolidField`."""
+
+    def displacement(self, location: LocatedPoints) -> FloatArray:
+        """See `Snapshot`."""
+        return super().displacement(self._located(location))
+
+    def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
+        """See `Snapshot`."""
+        return super().displacement_in_space(self._located(location))
+
+    def gradient(self, location: LocatedPoints) -> FloatArray:
+        """See `Snapshot`."""
+        return self.solid_gradient(location)[:, :2, :2]
+
+    def solid_gradient(self, location: LocatedPoints) -> FloatArray:
+        """Gradient of the displacement by the place before the load, shape (n, 3, 3)."""
+        own = self._located(location)
+        return self._gradient(self.body.gradients(self.state[None], own)[0], own)
+
+    def _located(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
+        places = points.points if isinstance(points, LocatedPoints) else points
+        return self.problem.mesh.locate_on(self.walls.mesh, places)

@@ -18,13 +18,13 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, LAW_ODDS, SHARE, Unknowns, doubt_of_the_plane
+from pinnray.solvers.identification.unknowns import CONTACT, LAW_ODDS, SHARE, Unknowns
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
 SOURCES = {
-    "third dimension": "the third dimension, which markers do not show: weigh one press, and multiply "
-    "the forces of other presses by the ratio of weighed to found",
+    "third dimension": "the third dimension, which plane strain leaves out: take fem-id.sides=free, "
+    "or weigh one press, and multiply the forces of other presses by the ratio of weighed to found",
     "markers": "the errors of the markers: film nearer or sharper, or use more markers",
     "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
     "contact": "place, width and pressure of the contact: put markers nearer to it",
@@ -84,7 +84,7 @@ class Fit(NamedTuple):
 
     def component(self, direction: FloatArray) -> tuple[float, float]:
         """Component of the indenter's force in a direction, (2,), and its standard deviation, N/mm."""
-        return component_of(self.model.unknowns, self.response.values, self.standard_errors, direction)
+        return component_of(self.model, self.response.values, self.standard_errors, direction)
 
     def variances(self, direction: FloatArray) -> dict[str, float]:
         """Variance of that component, (N/mm)^2, by what it comes from: names of `SOURCES`.
@@ -98,7 +98,7 @@ class Fit(NamedTuple):
         noise, misfit = float(((found.sensitivities @ spread) ** 2).sum()), 1 - 1 / found.inflation**2
         value = float(self.response.hypothesis.force @ direction)
         parts = dict.fromkeys(SOURCES, 0.0)
-        parts["third dimension"] = (doubt_of_the_plane(unknowns.problem) * value) ** 2
+        parts["third dimension"] = (self.model.doubt * value) ** 2
         parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
         for name, part in zip(unknowns.names, spread.tolist(), strict=True):
             contact, frame = name in (*CONTACT, SHARE), name.startswith(("pressed", "drawn"))
@@ -107,16 +107,15 @@ class Fit(NamedTuple):
 
 
 def component_of(
-    unknowns: Unknowns, values: FloatArray, errors: FloatArray, direction: FloatArray
+    model: ResponseModel, values: FloatArray, errors: FloatArray, direction: FloatArray
 ) -> tuple[float, float]:
     """Component of the force in a direction, (2,), and its standard deviation, N/mm.
 
     It is for values, shape (p,), with independent errors, shape (p, k).
     """
-    component = float(unknowns.hypothesis(values).force @ direction)
-    slopes = unknowns.slopes(values).force @ direction
-    doubt = doubt_of_the_plane(unknowns.problem) * component
-    return component, float(np.hypot(np.linalg.norm(slopes @ errors), doubt))
+    component = float(model.unknowns.hypothesis(values).force @ direction)
+    slopes = model.unknowns.slopes(values).force @ direction
+    return component, float(np.hypot(np.linalg.norm(slopes @ errors), model.doubt * component))
 
 
 def place_of(unknowns: Unknowns, values: FloatArray, errors: FloatArray) -> tuple[float, float]:

@@ -26,7 +26,7 @@ from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
-from pinnray.solvers.identification.unknowns import Hypothesis, Unknowns
+from pinnray.solvers.identification.unknowns import Hypothesis, Unknowns, doubt_of_the_plane
 from pinnray.solvers.solver import NoSolutionError
 
 MAX_ITERATIONS, HALVINGS = 8, 4
@@ -57,6 +57,11 @@ class ResponseModel:
         self._last: Response | None = None
         self._marker_rows: dict[tuple[bytes, float], tuple[FloatArray, FloatArray]] = {}
         self.evaluations = 0
+
+    @property
+    def doubt(self) -> float:
+        """See `doubt_of_the_plane`."""
+        return doubt_of_the_plane(self.unknowns.problem, self.body.thick)
 
     def flexibility(self) -> float:
         """Displacement of the drawn contact into the finger under a unit force, mm per N/mm."""
@@ -238,7 +243,7 @@ class ResponseModel:
     def _traction(self, position: float, width: float) -> FloatArray:
         """Rows (5, 2, *shape) of the traction and its derivatives; see `FrontTraction.weights`."""
         front = self.unknowns.traction
-        return self.body.displacement_rows(front.points, front.weights(position, width))
+        return self.body.traction_rows(front.points, front.weights(position, width))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,13 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
-from pinnray.solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
+from pinnray.solvers.identification.field import (
+    STEP,
+    IdentifiedField,
+    IdentifiedSideFace,
+    Member,
+    Snapshot,
+)
 from pinnray.solvers.identification.fit import NORMAL, SOURCES, Fit
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import (
@@ -110,7 +116,8 @@ class Identified:
             for fit, probability in zip(self.fits, self.probabilities, strict=True)
             if fit is best or probability >= PROBABLE
         ]
-        field = IdentifiedField(**vars(members[0].found), members=members)
+        kind = IdentifiedSideFace if best.model.body.thick else IdentifiedField
+        field = kind(**vars(members[0].found), members=members)
         sentence, loose = self.sentence(missed), best.model.unknowns.unregistered
         contradicted = best.estimate.inflation > CONTRADICTED
         return Solution(

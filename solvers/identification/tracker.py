@@ -215,7 +215,7 @@ class ForceTracker:
         values, derivatives = values_of(self._parameters, found.z)
         errors = found.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(found.covariance)
         force, across = (
-            _estimated(*component_of(self._unknowns, values, errors, axis))
+            _estimated(*component_of(self._model, values, errors, axis))
             for axis in stroke_axes(self._unknowns.problem.load)
         )
         place, around = place_of(self._unknowns, values, errors)

@@ -39,13 +39,13 @@ are one there. With odds of 3 to 1, noise decided, and the force of a film was 1
 LAWS = tuple(LAW_ODDS)
 
 
-def doubt_of_the_plane(problem: Problem) -> float:
+def doubt_of_the_plane(problem: Problem, thick: bool) -> float:
     """Deviation of force and stress of a finger with a depth from those of the plane, as a share.
 
     Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger is
-    in neither state, and its markers do not tell. A body that is only a plane has none.
+    in neither state, and its markers do not tell. A body that is only a plane has none, nor a thick one.
     """
-    return 0.0 if problem.finger is None else 0.5 * problem.material.poisson**2
+    return 0.0 if problem.finger is None or thick else 0.5 * problem.material.poisson**2
 
 
 @dataclass(frozen=True, eq=False)

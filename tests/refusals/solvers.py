@@ -19,6 +19,7 @@ from pinnray.solvers.elasticity import (
     lame_constants,
     lame_derivatives,
     piola_stress,
+    piola_stress_and_tangent,
     strain_of,
     stress_of,
 )
@@ -27,7 +28,6 @@ from pinnray.solvers.finger_figures import figures_of
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.load import Physics
 from pinnray.solvers.materials import TensileTest, fitted, preset, read_tensile_test
-from pinnray.solvers.pinn.finite_basis.energy import piola_stress_and_tangent
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import solved

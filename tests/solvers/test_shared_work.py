@@ -12,10 +12,10 @@ from pinnray.solvers.fem.factorisation import Factorisation
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.finger_figures import figures_at_rest
 from pinnray.solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalSolver, PinnStdSolver
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.shared_work import SharedWork, shared
 from pinnray.solvers.statistics.statistical_fem import StatFemSolver
+from pinnray.solvers.symmetric_factors import BlockMatrix
 from tests.solvers.conftest import observed_at
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}

@@ -18,9 +18,9 @@ from pinnray.solvers.identification.model import ResponseModel
 from pinnray.solvers.identification.unknowns import Unknowns
 from pinnray.solvers.pinn.finite_basis import newton
 from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.stability import ShiftedStep, aside, descended
+from pinnray.solvers.symmetric_factors import BlockMatrix
 from tests.solvers.bodies import column, mesh_of
 
 HEIGHT, WIDTH, STROKE = 40.0, 2.0, 1.0

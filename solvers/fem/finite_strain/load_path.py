@@ -201,19 +201,6 @@ class LoadPath:
         self.equilibrium.constraints = constraints
         return state
 
-    def settled_from(self, guess: LoadState) -> LoadState | None:
-        """Equilibrium under the full load from a guess, as of a problem near; None if none is found.
-
-        Where Newton's method leaps away, the energy is followed down from there.
-        """
-        nodal = np.where(self.equilibrium.clamped, self.equilibrium.prescribed, guess.nodal)
-        start = replace(guess, fraction=1.0, nodal=nodal)
-        state, _ = self._found(start)
-        if state is not None or self.equilibrium.contact is not None:
-            return state
-        lower = descended(nodal, self.equilibrium.energy_with_springs(start), self.equilibrium.step_at(start))
-        return None if lower is None else self._settled(self._newton, replace(start, nodal=lower))
-
     def _stable(self, point: LoadState) -> LoadState:
         """The equilibrium or, if it is unstable, the lower of the stable ones to either side of it.
 

@@ -2,11 +2,10 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
@@ -20,8 +19,6 @@ from pinnray.solvers.solver import Cost, ElementSettings, Progress, check_proble
 
 MOST = 2 / 3
 """Coarse elements over the given ones up to which the load is followed on them."""
-ITERATIONS = 40
-"""Newton iterations from given displacements."""
 
 
 @dataclass(frozen=True)
@@ -114,38 +111,6 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
             error=error,
             contact=contact_of(problem, abscissa, regions[-1]),
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """An equilibrium under the full load, in elements of degree 2."""
-
-    nodal: FloatArray  # Displacements, shape (N, 2), mm
-    energy: float  # Elastic energy per depth, N mm / mm
-    unstable: int  # Number of directions in which the energy falls
-
-
-def equilibria_near(problem: Problem, starts: Sequence[FloatArray]) -> list[Equilibrium | None]:
-    """The equilibrium to which Newton's method leads from each start; None where it leads nowhere.
-
-    All are on one set of elements, so that their energies can be compared.
-
-    Args:
-        problem: With a law of finite strain and a load without a cylinder.
-        starts: Displacements of the nodes of a `LagrangeSpace` of degree 2, shape (N, 2), mm.
-    """
-    # Many iterations: from a displacement that is off by some percent the first steps are short.
-    path = FemNonlinearSolver(max_iterations=ITERATIONS).path(problem, LagrangeSpace(problem.mesh, 2))
-    found: list[Equilibrium | None] = []
-    for start in starts:
-        if (state := path.settled_from(replace(path.equilibrium.rest, nodal=start))) is None:
-            found.append(None)
-            continue
-        equilibrium = path.equilibrium
-        equilibrium.factorise(state)
-        found.append(Equilibrium(state.nodal, equilibrium.energy(state.nodal), equilibrium.unstable))
-    path.close()
-    return found
 
 
 def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:

@@ -1,8 +1,4 @@
-"""Elastic energy of a finite-basis network, with its gradient and Hessian in the output layer.
-
-Source of stress and tangent: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis,
-2nd ed., sections 6.4.3 (neo-Hookean, with d(F^-T) = -F^-T dF^T F^-T) and 6.4.1 (St Venant-Kirchhoff).
-"""
+"""Elastic energy of a finite-basis network, with its gradient and Hessian in the output layer."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import FloatArray, IntArray
-from pinnray.solvers.elasticity import Lame, LawName, check_known, deformation_jacobian, energy_density_of
+from pinnray.solvers.elasticity import Lame, LawName, energy_density_of, piola_stress_and_tangent
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix, Factors
 from pinnray.solvers.pinn.threading import boxes_around, imap_in_threads
 from pinnray.solvers.problem import Material
+from pinnray.solvers.symmetric_factors import BlockMatrix, Factors
 
 REGULARISATION = 1e-12
 """Added to the unit diagonal of the scaled Hessian, against nearly dependent basis functions."""
@@ -97,8 +93,7 @@ class NetworkEnergy:
 
     def total(self, output: torch.Tensor) -> float:
         """The energy per depth of an output layer (c, 2, m + 1), N mm / mm."""
-        gradient = self.gradients(output[None])[0]
-        return float(self.weights @ energy_density(gradient, self.material.lame, self.material.law))
+        return self._total(self.gradients(output[None])[0])
 
     def derivatives(self, output: torch.Tensor) -> tuple[torch.Tensor, BlockMatrix]:
         """Gradient and Hessian of the energy at an output layer (c, 2, m + 1).
@@ -107,15 +102,21 @@ class NetworkEnergy:
             The gradient, of the shape of `output`, N/mm, and the Hessian, N/mm^2.
         """
         gradient = self.gradients(output[None])[0]
-        stress, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
+        stress, tangent = self._stress_and_tangent(gradient)
         constant = self.material.law == "linear"
         return self.forces(stress[None])[0], self.hessian(tangent[:1] if constant else tangent)
 
     def gradient(self, output: torch.Tensor) -> torch.Tensor:
         """The gradient alone, N/mm: a twentieth of the time."""
         gradient = self.gradients(output[None])[0]
-        stress, _ = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
+        stress, _ = self._stress_and_tangent(gradient)
         return self.forces(stress[None])[0]
+
+    def _total(self, gradient: torch.Tensor) -> float:
+        return float(self.weights @ energy_density(gradient, self.material.lame, self.material.law))
+
+    def _stress_and_tangent(self, gradient: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        return piola_stress_and_tangent(self.material.law, gradient, self.material.lame, torch)
 
     @property
     def quadratic(self) -> bool:
@@ -126,7 +127,7 @@ class NetworkEnergy:
     def factors_at_rest(self) -> Factors:
         """Factors of the Hessian of a quadratic energy, kept for every load and set of markers."""
         rest = torch.zeros(1, 2, 2, dtype=torch.float64)
-        _, tangent = piola_stress_and_tangent(rest, self.material.lame, self.material.law)
+        _, tangent = self._stress_and_tangent(rest)
         return self.hessian(tangent).factorised(REGULARISATION)
 
     def gradients(self, outputs: torch.Tensor) -> torch.Tensor:
@@ -141,7 +142,7 @@ class NetworkEnergy:
         None if a point is turned inside out.
         """
         gradient = self._gradients_of(field)
-        _, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
+        _, tangent = self._stress_and_tangent(gradient)
         if not torch.isfinite(tangent).all():
             return None
         forces = self.forces(torch.einsum("nijkl,nkl->nij", tangent, gradient)[None])[0]
@@ -167,8 +168,8 @@ class NetworkEnergy:
 
     def with_neuron_slopes(self, output: torch.Tensor) -> tuple[float, torch.Tensor]:
         """The energy of an output layer (c, 2, m + 1), and its derivatives by the neurons, (3, m, c)."""
-        gradient, law = self.gradients(output[None])[0], (self.material.lame, self.material.law)
-        stress, _ = piola_stress_and_tangent(gradient, *law)
+        gradient = self.gradients(output[None])[0]
+        stress, _ = self._stress_and_tangent(gradient)
         weighted = self.weights[:, None, None] * stress
 
         def task(patch: QuadraturePatch) -> tuple[torch.Tensor, torch.Tensor]:
@@ -179,7 +180,7 @@ class NetworkEnergy:
         found = torch.zeros_like(self.basis.neurons)
         for near, here in imap_in_threads(task, self.patches):
             found.index_add_(2, near, here)
-        return float(self.weights @ energy_density(gradient, *law)), found
+        return self._total(gradient), found
 
     @cached_property
     def gradient_operator(self) -> csr_matrix:
@@ -297,59 +298,3 @@ def _with_constant_tangent(tangent: torch.Tensor, sums: torch.Tensor) -> torch.T
 def energy_density(gradient: torch.Tensor, lame: Lame, law: LawName) -> torch.Tensor:
     """ψ of a law at displacement gradients (n, 2, 2): (n,), MPa."""
     return torch.as_tensor(energy_density_of(law, gradient, lame, torch.log))
-
-
-def piola_stress_and_tangent(
-    gradient: torch.Tensor, lame: Lame, law: LawName
-) -> tuple[torch.Tensor, torch.Tensor]:
-    """P = dψ/dH and A = dP/dH of `LAWS`.
-
-    With G = F^-T, the neo-Hookean law has P = μ (F - G) + λ ln(J) G and
-
-        A_ijkl = μ δ_ik δ_jl + (μ - λ ln J) G_il G_kj + λ G_ij G_kl
-
-    The St Venant-Kirchhoff law has P = F S with S = λ tr(E) I + 2 μ E and
-
-        A_ijkl = δ_ik S_jl + λ F_ij F_kl + μ ((F F^T)_ik δ_jl + F_il F_kj)
-
-    Hooke's law has their tangent at H = 0, whatever H.
-
-    Args:
-        gradient: H[n, i, j] = du_i/dx_j, shape (n, 2, 2).
-        lame: Lamé constants of the plane law, MPa.
-        law: The law.
-
-    Returns:
-        P, shape (n, 2, 2), MPa, not a number where a finite deformation turns the material inside out, and
-        A, shape (n, 2, 2, 2, 2), MPa.
-
-    Raises:
-        UserError: If the law is another one.
-    """
-    check_known("law", law, LAWS)
-    λ, μ = lame.λ, lame.μ
-    one = torch.eye(2, dtype=gradient.dtype)
-    if law == "linear":
-        first, second = torch.einsum("ik,jl->ijkl", one, one), torch.einsum("il,kj->ijkl", one, one)
-        tangent = λ * torch.einsum("ij,kl->ijkl", one, one) + μ * (first + second)
-        return torch.einsum("ijkl,nkl->nij", tangent, gradient), tangent.expand(len(gradient), 2, 2, 2, 2)
-    deformation, jacobian = one + gradient, deformation_jacobian(gradient)[:, None, None]
-    if law == "st-venant-kirchhoff":
-        strain = 0.5 * (deformation.mT @ deformation - one)
-        trace = strain.diagonal(dim1=1, dim2=2).sum(dim=1)[:, None, None]
-        second_piola = λ * trace * one + 2 * μ * strain
-        tangent = (
-            torch.einsum("ik,njl->nijkl", one, second_piola)
-            + λ * torch.einsum("nij,nkl->nijkl", deformation, deformation)
-            + μ * torch.einsum("nik,jl->nijkl", deformation @ deformation.mT, one)
-            + μ * torch.einsum("nil,nkj->nijkl", deformation, deformation)
-        )
-        return (deformation @ second_piola).where(jacobian > 0, torch.nan), tangent
-    pressure = λ * jacobian.log()
-    inverse = deformation.flip(1, 2) * torch.tensor([[1.0, -1.0], [-1.0, 1.0]]).to(gradient) / jacobian
-    tangent = (
-        μ * torch.einsum("ik,jl->ijkl", one, one)
-        + torch.einsum("nil,nkj->nijkl", (μ - pressure) * inverse, inverse)
-        + λ * torch.einsum("nij,nkl->nijkl", inverse, inverse)
-    )
-    return μ * (deformation - inverse) + pressure * inverse, tangent

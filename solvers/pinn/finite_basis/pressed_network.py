@@ -19,9 +19,9 @@ from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION
 from pinnray.solvers.pinn.finite_basis.newton import Level, LoadStep, follow_load
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import Progress
+from pinnray.solvers.symmetric_factors import Factors
 
 STIFF, SOFT = 10.0, 0.3
 """k over Young's modulus, and the same with which the forces of a coarser network are taken over."""

@@ -11,7 +11,7 @@ for every derivative by X:
 """
 
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import torch
@@ -19,19 +19,18 @@ import torch
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.elasticity import Lame, deformation_jacobian
+from pinnray.solvers.elasticity import Lame, deformation_jacobian, piola_stress_and_tangent
 from pinnray.solvers.identification.body import Linearised
 from pinnray.solvers.pinn.finite_basis.energy import (
     REGULARISATION,
     NetworkEnergy,
     energy_density,
-    piola_stress_and_tangent,
 )
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
 from pinnray.solvers.pinn.finite_basis.solver import FiniteBasisSolver
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import Factors
 from pinnray.solvers.pinn.threading import pool
 from pinnray.solvers.problem import Problem
+from pinnray.solvers.symmetric_factors import Factors
 
 TOLERANCE = 1e-2
 """Relative error of a solve in the energy norm, and so of a Newton step."""
@@ -56,6 +55,8 @@ class NetworkBody:
         energy: The elastic energy of the drawn body.
         walls: Gradients of the walls' motions at the quadrature points, shape (k, q, 2, 2), 1/mm.
     """
+
+    thick: ClassVar[bool] = False
 
     def __init__(self, energy: NetworkEnergy, walls: FloatArray) -> None:
         self._energy, self._walls = energy, torch.from_numpy(walls)
@@ -99,7 +100,7 @@ class NetworkBody:
         with pool():
             if (gradient := self._strained(state, metric)) is None:
                 return None
-            stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
+            stress, tangent = piola_stress_and_tangent(self._law, gradient, lame, torch)
             force = self._energy.forces(_pulled_back(stress, metric)[None])[0]
         tangent = _tangent_pulled_back(tangent, metric)
         return Linearised(force.numpy(), partial(self._solved, tangent), partial(self._negative, tangent))
@@ -142,7 +143,7 @@ class NetworkBody:
         metric = self._metric(changes)
         with pool():
             gradient = self._gradient(state) @ metric.inverse
-            stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
+            stress, tangent = piola_stress_and_tangent(self._law, gradient, lame, torch)
             slopes = []
             for wall in self._walls:
                 moved = metric.inverse @ wall
@@ -151,7 +152,7 @@ class NetworkBody:
                 change += moved.diagonal(dim1=1, dim2=2).sum(dim=1)[:, None, None] * stress
                 slopes.append(_pulled_back(change - stress @ metric.inverse.mT @ wall.mT, metric))
             for moduli in (Lame(1.0, 0.0, 1.0), Lame(0.0, 1.0, 0.0)):  # every law is a sum of both
-                part, _ = piola_stress_and_tangent(gradient, moduli, self._law)
+                part, _ = piola_stress_and_tangent(self._law, gradient, moduli, torch)
                 slopes.append(_pulled_back(part, metric))
             found = self._energy.forces(torch.stack(slopes)).numpy()
         return found[:-2], found[-2:], self.feet
@@ -160,6 +161,8 @@ class NetworkBody:
         """Rows (r, 2, *shape) of the sums of weights (r, q) times the displacement at points (q, 2), mm."""
         used = weights.any(axis=0)  # a contact is a small part of the front
         return self._both_components(self._energy.basis.functionals(points[used], weights[:, used]))
+
+    traction_rows = displacement_rows
 
     def gradient_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Rows (r, 2, *shape) of Σ_qj w_rqj ∂u/∂X_j(P_q), with weights (r, q, 2), at points (q, 2), mm."""
@@ -201,7 +204,7 @@ class NetworkBody:
         with pool():
             first = given[0] @ metric.inverse
             first[deformation_jacobian(first) <= 0] = 0.0  # turned inside out between points of the elements
-            _, tangent = piola_stress_and_tangent(first, lame, self._law)
+            _, tangent = piola_stress_and_tangent(self._law, first, lame, torch)
             tangent = _tangent_pulled_back(tangent, metric)
             forces = self._energy.forces(torch.einsum("nijkl,snkl->snij", tangent, given))
             return _back_substituted(self._factorised(tangent), forces).numpy()

@@ -45,6 +45,9 @@ class PinnIdSolver(IdentifyingSolver):
     not, they are sought by the network. A law that is far less probable than the best one stays with the
     elements. Refits to other observations of the same markers are of first order.
 
+    It is in plane strain, also for markers on a side face, and has the doubt of that: functions of the depth
+    would quadruple its output layer, whose factors cost its third power.
+
     Attributes:
         spacing: Factor of the windows' spacings.
         seed: Of the random numbers.

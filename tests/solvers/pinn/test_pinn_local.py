@@ -23,11 +23,11 @@ from pinnray.solvers.pinn.finite_basis.point_spacing import (
     spread_points,
 )
 from pinnray.solvers.pinn.finite_basis.presets import PinnLocalSolver
-from pinnray.solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from pinnray.solvers.pinn.finite_basis.windows import ShepardWindows
 from pinnray.solvers.pinn.threading import PATCH, boxes_around, cut_into_patches
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import State
+from pinnray.solvers.symmetric_factors import BlockMatrix
 from tests.solvers.conftest import bar_mesh, distances
 
 OTHERS = ("linear", "st-venant-kirchhoff")
