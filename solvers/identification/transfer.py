@@ -59,7 +59,7 @@ def _response(model: ResponseModel, start: Response, share: float, shift: float)
     """
     names, into = model.unknowns.names, model.unknowns.directions[0]
     target = share * float(start.contact @ into)
-    force = np.isin(names, ("normal_force", "tangential_force", *model.unknowns.feet.names))
+    force = np.isin(names, ("normal_force", "shear_force", *model.unknowns.feet.names))
     direction, values = np.where(force, start.values, 0.0), np.where(force, 0.0, start.values)
     if "position" in names:
         values[names.index("position")] += shift

@@ -18,9 +18,9 @@ from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
 from pinnray.solvers.identification.boundary import Feet, FrontTraction
 from pinnray.solvers.problem import Material, Problem, contact_ends
 
-CONTACT = ("position", "width", "normal_force", "tangential_force", "eccentricity")
-SHARE = "tangential_share"
-"""Tangential over normal force: it takes the place of `tangential_force` where friction bounds it."""
+CONTACT = ("position", "width", "normal_force", "shear_force", "eccentricity")
+SHARE = "shear_share"
+"""Shear over normal force: it takes the place of `shear_force` where friction bounds it."""
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson", "feet")
 """What is found unless other names are given; the table of docs/how-to/force.md describes each. `feet` stands
@@ -97,7 +97,7 @@ class Unknowns:
         self._pictures = [] if seen is None else picture_parameters(seen)
         finger = [name for name in names if name not in (*WALLS, "feet") or name in self.motion.names]
         if problem.load.friction:
-            finger = [SHARE if name == "tangential_force" else name for name in finger]
+            finger = [SHARE if name == "shear_force" else name for name in finger]
         finger += self.feet.names
         self.names = (*finger, *(parameter.name for parameter in self._pictures))
 
@@ -135,7 +135,7 @@ class Unknowns:
             Parameter("position", "mm", middle, 0.05 * front.extent * prior, *front.ends),
             Parameter("width", "mm", width, log(2.5) * prior, narrowest, logarithmic=True),
             Parameter("normal_force", "N/mm", 0.0, size * prior),
-            Parameter("tangential_force", "N/mm", 0.0, size * prior),
+            Parameter("shear_force", "N/mm", 0.0, size * prior),
             Parameter("eccentricity", "mm", 0.0, 0.5 * width * prior),
             Parameter("base_compliance", "mm", 0.02, log(10) * prior, logarithmic=True),
             Parameter("poisson", "", material.poisson, 0.03 * prior, 0.0, 0.49),
@@ -157,7 +157,7 @@ class Unknowns:
         named, material = self._named(values), self.material(values)
         middle, width = self.place
         normal = named.get("normal_force", 0.0)
-        sizes = normal, named.get("tangential_force", 0.0) + named.get(SHARE, 0.0) * normal
+        sizes = normal, named.get("shear_force", 0.0) + named.get(SHARE, 0.0) * normal
         return Hypothesis(
             position=named.get("position", middle),
             width=named.get("width", width),
@@ -180,7 +180,7 @@ class Unknowns:
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
         normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
-        along = by["tangential_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
+        along = by["shear_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
 
         def stacked(names: Sequence[str]) -> FloatArray:
             """Derivatives (p, k) of k numbers, of which those that are no unknowns have none."""

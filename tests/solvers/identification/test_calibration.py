@@ -32,7 +32,7 @@ def test_truths_from_the_priors_are_where_the_intervals_say(coarse_mesh, pressed
         degree=1,
         law="given",
         prior=0.1,
-        parameters="position,normal_force,tangential_force,eccentricity,front_thickness,rib_thickness",
+        parameters="position,normal_force,shear_force,eccentricity,front_thickness,rib_thickness",
     )
     nothing = observed_at(coarse_mesh.markers, np.zeros_like(coarse_mesh.markers), NOISE)
     nothing = replace(nothing, pressed=pressed)

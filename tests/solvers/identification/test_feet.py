@@ -14,11 +14,11 @@ from tests.solvers.conftest import observed_at
 from tests.solvers.identification.test_model import check_taylor
 from tests.solvers.identification.twins import NOISE, model_of, sought, values_of
 
-NAMES = ("normal_force", "tangential_force", "position", "feet")
+NAMES = ("normal_force", "shear_force", "position", "feet")
 MARKERS = np.array(
     [(3, -3), (3, -21), (9, -3), (9, -21), (20, -12), (35, -3), (50, -3), (50, -10)], dtype=float
 )
-PRESSED = {"position": 40.0, "normal_force": 0.2, "tangential_force": 0.05}
+PRESSED = {"position": 40.0, "normal_force": 0.2, "shear_force": 0.05}
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def rubbed(problem):
 def test_friction_bounds_the_tangential_force_to_a_share_of_the_normal_one(rubbed):
     unknowns = Unknowns(rubbed, DEFAULT)
     assert SHARE in unknowns.names
-    assert "tangential_force" not in unknowns.names
+    assert "shear_force" not in unknowns.names
     bounded = unknowns.parameters(1.0)[unknowns.names.index(SHARE)]
     assert (bounded.low, bounded.high) == (-0.3, 0.3)
     values = values_of(unknowns, {"normal_force": 0.2, SHARE: -0.3})
@@ -124,7 +124,7 @@ def test_friction_bounds_the_tangential_force_to_a_share_of_the_normal_one(rubbe
 
 @pytest.mark.parametrize("name", ["normal_force", SHARE])
 def test_derivatives_with_a_bounded_tangential_force_pass_the_taylor_test(rubbed, name):
-    model = model_of(rubbed, ("normal_force", "tangential_force", "eccentricity"))
+    model = model_of(rubbed, ("normal_force", "shear_force", "eccentricity"))
     seen = observed_at(rubbed.mesh.markers, np.zeros((9, 2)), NOISE)
     markers = MarkerModel(model, MarkerData.of(rubbed.mesh, seen, None, None))
     check_taylor(model, markers, name, {"normal_force": 0.16, SHARE: 0.2, "eccentricity": 0.4})
@@ -132,13 +132,13 @@ def test_derivatives_with_a_bounded_tangential_force_pass_the_taylor_test(rubbed
 
 def test_markers_that_ask_for_more_than_friction_get_as_much_as_it_allows(rubbed):
     """The truth has a tangential force of half of the normal one, the friction is 0.1."""
-    free = model_of(replace(rubbed, load=Load()), ("normal_force", "tangential_force"))
+    free = model_of(replace(rubbed, load=Load()), ("normal_force", "shear_force"))
     seen = observed_at(rubbed.mesh.markers, np.zeros((9, 2)), NOISE)
     markers = MarkerModel(free, MarkerData.of(rubbed.mesh, seen, None, None))
     response = free.response(
-        values_of(free.unknowns, {"normal_force": 0.16, "tangential_force": -0.08}), EXACT
+        values_of(free.unknowns, {"normal_force": 0.16, "shear_force": -0.08}), EXACT
     )
     shown = observed_at(rubbed.mesh.markers, markers.predicted(response)[0].reshape(-1, 2), NOISE)
     slippery = replace(rubbed, load=rubbed.load.model_copy(update={"friction": 0.1}))
-    found = sought(slippery, shown, law="given", parameters="normal_force,tangential_force")
+    found = sought(slippery, shown, law="given", parameters="normal_force,shear_force")
     assert found.stats[SHARE] == pytest.approx(-0.1, abs=1e-3)

@@ -29,7 +29,7 @@ def marker_path(problem, shares, finger):
     drawn = {parameter.name: parameter.start for parameter in unknowns.parameters(1.0)}
     places, forces = [], []
     for share in shares:
-        forced = dict(zip(("normal_force", "tangential_force"), share * np.array(FORCE), strict=True))
+        forced = dict(zip(("normal_force", "shear_force"), share * np.array(FORCE), strict=True))
         changed = drawn | {"position": POSITION} | finger | forced
         response = model.response(np.array([changed[name] for name in unknowns.names]), EXACT)
         assert response is not None

@@ -19,7 +19,7 @@ from pinnray.solvers.problem import Load
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.twins import NOISE, TRUE, marked, model_of, sought, twin
 
-FORCE = "position,normal_force,tangential_force"
+FORCE = "position,normal_force,shear_force"
 
 
 def test_a_twin_is_found_with_its_law(identified):
@@ -198,7 +198,7 @@ def test_a_finger_is_carried_to_another_load(identified, problem):
     values = member.response.values.copy()
     share = np.linalg.norm(transferred.reaction) / np.linalg.norm(solution.reaction)
     assert 0.4 < share < 0.6
-    for name in ("normal_force", "tangential_force"):
+    for name in ("normal_force", "shear_force"):
         values[member.model.unknowns.names.index(name)] *= share
     response = member.model.response(values, EXACT)
     assert response is not None

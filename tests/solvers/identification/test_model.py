@@ -73,7 +73,7 @@ def test_a_force_holds_the_finger_where_a_prescribed_displacement_does(problem):
     model = model_of(problem, DEFAULT)
     left, right = problem.mesh.points[problem.mesh.boundary("contact").ravel(), 0][[0, -1]]
     contact = {"width": abs(right - left), "base_compliance": 1e-9}
-    force = {"normal_force": -moved.reaction[1], "tangential_force": moved.reaction[0]}
+    force = {"normal_force": -moved.reaction[1], "shear_force": moved.reaction[0]}
     response = model.response(values_of(model.unknowns, contact | force), EXACT)
     assert response is not None
     # Gauss points of the two differ in number, which is worth some 1e-4 of a contact two elements wide.

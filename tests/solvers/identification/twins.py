@@ -15,7 +15,7 @@ VALUES = {
     "position": 36.3,
     "width": 5.0,
     "normal_force": 0.16,
-    "tangential_force": 0.02,
+    "shear_force": 0.02,
     "eccentricity": 0.4,
     "front_thickness": 2.1,
     "back_thickness": 1.92,
@@ -59,4 +59,4 @@ def sought(problem, observed, **settings):
     return FemIdSolver(degree=1, **settings).solve(replace(problem, observations=observed))
 
 
-TRUE = {"position": 37.5, "normal_force": 0.18, "tangential_force": -0.02, "rib_thickness": 2.08}
+TRUE = {"position": 37.5, "normal_force": 0.18, "shear_force": -0.02, "rib_thickness": 2.08}
