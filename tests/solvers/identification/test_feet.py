@@ -135,9 +135,7 @@ def test_markers_that_ask_for_more_than_friction_get_as_much_as_it_allows(rubbed
     free = model_of(replace(rubbed, load=Load()), ("normal_force", "shear_force"))
     seen = observed_at(rubbed.mesh.markers, np.zeros((9, 2)), NOISE)
     markers = MarkerModel(free, MarkerData.of(rubbed.mesh, seen, None, None))
-    response = free.response(
-        values_of(free.unknowns, {"normal_force": 0.16, "shear_force": -0.08}), EXACT
-    )
+    response = free.response(values_of(free.unknowns, {"normal_force": 0.16, "shear_force": -0.08}), EXACT)
     shown = observed_at(rubbed.mesh.markers, markers.predicted(response)[0].reshape(-1, 2), NOISE)
     slippery = replace(rubbed, load=rubbed.load.model_copy(update={"friction": 0.1}))
     found = sought(slippery, shown, law="given", parameters="normal_force,shear_force")
