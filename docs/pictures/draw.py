@@ -48,7 +48,7 @@ def pressed() -> pr.Solution:
     return pr.solve("default", "fem-nonlinear", load="cylinder")
 
 
-def panel(drawn: Figure, left: float, width: float, title: str) -> Axes:
+def titled_axes(drawn: Figure, left: float, width: float, title: str) -> Axes:
     """Axes for a body, their left end and width in inches."""
     axes = axes_at(drawn, (left, HEAD, width, width * EXTENT.height / EXTENT.width))
     body.prepare(axes, EXTENT)
@@ -67,13 +67,13 @@ def draw_finger() -> Figure:
     """The default finger with its parts named, and pressed, with the force and the cylinder's stroke."""
     mesh, load, half = pressed().problem.mesh, pressed().problem.load, PAGE / 2
     with figure(HEAD + half * EXTENT.height / EXTENT.width, PAGE) as drawn:
-        axes = panel(drawn, 0.0, half, "At rest")
+        axes = titled_axes(drawn, 0.0, half, "At rest")
         draw_body(axes, mesh, mesh.points)
         axes.plot(*mesh.markers.T, "o", ms=3.6, mew=0, color=MEASURED, zorder=4)
         for name, place, end, colour in PARTS:
             line = {"arrowstyle": "-", "color": colour, "lw": 0.6, "shrinkA": 1, "shrinkB": 0}
             axes.annotate(name, end, place, arrowprops=line, color=colour, size=9, zorder=6)
-        axes = panel(drawn, half, half, "Pressed by a cylinder")
+        axes = titled_axes(drawn, half, half, "Pressed by a cylinder")
         draw_body(axes, mesh, mesh.points + pressed().displacement(mesh.points))
         axes.plot(*(mesh.markers + pressed().at_markers()).T, "o", ms=3.6, mew=0, color=MEASURED, zorder=4)
         outline = max(edge_paths(mesh.boundary_edges), key=len)
@@ -100,7 +100,7 @@ def draw_wrap() -> Figure:
     rest = front_points(mesh, np.array([0.0, contact(mesh)[0], mesh.points[:, 0].max()]))
     base, middle, tip = rest + pressed().displacement(rest)
     with figure(HEAD + COLUMN * EXTENT.height / EXTENT.width, COLUMN) as drawn:
-        axes = panel(drawn, 0.0, COLUMN, f"Wrap angle {pressed().figures.wrap:.1f}°")
+        axes = titled_axes(drawn, 0.0, COLUMN, f"Wrap angle {pressed().figures.wrap:.1f}°")
         draw_body(axes, mesh, mesh.points + pressed().displacement(mesh.points))
         axes.plot(*rest.T, color=MUTED, lw=1.0, ls="--")
         axes.plot(*np.array([base, middle, tip]).T, "o-", color=CONTACT, lw=1.6, ms=4, zorder=5)

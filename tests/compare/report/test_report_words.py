@@ -1,4 +1,4 @@
-"""How much a report says, and that it says no number in two roundings."""
+"""Words and roundings of a report: at most so many, and no number in two."""
 
 import re
 from collections.abc import Iterator
