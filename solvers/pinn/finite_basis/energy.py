@@ -272,8 +272,8 @@ def _tangent_products(along: torch.Tensor, tangent: torch.Tensor) -> tuple[torch
 def _blocks(left: torch.Tensor, right: torch.Tensor) -> torch.Tensor:
     """Products of the factors of windows (b, a) with a <= b, row by row: (w (w + 1) / 2, x y).
 
-    NumPy's matrix product was measured to take 0.6 of the time of torch's on AMD's processors, and products of
-    `TOGETHER` windows a to take 0.6 to 0.8 of that of products of one.
+    NumPy's matrix product was measured to take 0.6 of the time of torch's on AMD's processors, and that of
+    `TOGETHER` windows a 0.6 to 0.8 of the time of as many products of one.
 
     Args:
         left: Factors of the windows b, shape (n, w, x).
