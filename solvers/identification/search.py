@@ -132,8 +132,8 @@ class Identifier:
     def polished(self, fit: Fit, observations: Observations, least: float = -np.inf) -> Fit:
         """A fit after steps of first order, each from an equilibrium, with the derivatives that the fit has.
 
-        They are computed anew where the steps do not settle; if that does not help, the unknowns are sought; where there is no equilibrium
-        either, the fit is marked as inexact.
+        They are computed anew where the steps do not settle. If that does not help, the unknowns are sought
+        from there; where there is no equilibrium either, the fit is marked as inexact.
 
         Args:
             fit: Its response is near equilibrium, with derivatives that are nearly those there.
