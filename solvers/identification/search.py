@@ -21,7 +21,7 @@ from pinnray.solvers.identification.law_fits import LawFits
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
 from pinnray.solvers.identification.result import Identified
 from pinnray.solvers.identification.settings import IdentifyingSolver
-from pinnray.solvers.identification.unknowns import LAWS, Unknowns
+from pinnray.solvers.identification.unknowns import INDENTATION, LAWS, Unknowns
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
@@ -67,17 +67,18 @@ class Identifier:
         weighed: bool = False,
     ) -> None:
         self._settings, self._mesh = settings, problem.mesh
+        names = [INDENTATION if name == "normal_force" else name for name in settings.unknowns]
 
         @cache
         def model(law: LawName) -> ResponseModel:
             own = replace(problem, material=problem.material.model_copy(update={"law": law}))
-            unknowns = Unknowns(own, settings.unknowns)
+            unknowns = Unknowns(own, names)
             return ResponseModel(body(unknowns), unknowns, weighed=weighed)
 
         self.laws = LAWS if settings.law == "evidence" else (problem.material.law,)
         self.model = model
         self.flexibility = model(self.laws[0]).flexibility() if flexibility is None else flexibility
-        unknowns = Unknowns(problem, settings.unknowns)
+        unknowns = Unknowns(problem, names)
         self._names, self._feet = unknowns.names, unknowns.feet.names
         self.parameters = unknowns.parameters(self.flexibility, settings.prior)
         self._fits = LawFits(model, self.parameters, cost_change)
@@ -140,7 +141,8 @@ class Identifier:
             observations: Those of the fit.
             least: Logarithm of the probability below which the first step is the last one.
         """
-        model, start, before, settling = fit.model, fit, np.inf, True
+        model, start, before = fit.model, fit, np.inf
+        settling = not model.body.thick  # whose derivatives are not those of the plane
         measurement = self.measurement(observations).only(fit.measurement.kept)
         model.restart(fit.response)
         for _ in range(POLISHES):
