@@ -62,9 +62,12 @@ class Film(FilmSettings):
 
     @property
     def simulated(self) -> bool:
-        """Whether a file is a film of `pinnray rig`."""
+        """Whether the workspace, or a file, is of a film of `pinnray rig`."""
         from pinnray.vision.frames.sources import open_frames
+        from pinnray.vision.tracking.workspace import load_workspace
 
+        if self.workspace and load_workspace(self.workspace).simulated:
+            return True
         if self.live:
             return False
         with open_frames(self.source, rate=self.fps) as frames:
