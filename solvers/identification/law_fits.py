@@ -10,6 +10,7 @@ from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estim
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
+from pinnray.solvers.identification.unknowns import INDENTATION
 from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
 HELD = 1e-3
@@ -75,13 +76,12 @@ class LawFits:
         model.restart(None if near is None else near.response)
 
         def predict(values: FloatArray) -> Prediction | None:
-            force = np.linalg.norm(model.unknowns.hypothesis(values).force)
-            self.progress(0.5, f"{law}: force {force:.4g} N/mm")
             found = model.response(values)
             if found is None and model.evaluations == first:  # another law's start was too far away
                 model.restart(None)
                 found = model.response(values)
             if found is not None:
+                self.progress(0.5, f"{law}: force {np.linalg.norm(found.force):.4g} N/mm")
                 reached[values.tobytes()] = found
                 return markers.predicted(found)
             lost.append(values)
@@ -121,14 +121,14 @@ class LawFits:
         return Fit(model, found, exact or rough, measurement, exact is not None)
 
     def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
-        """Standardised values with the normal force that a linear finger would need, the rest as expected."""
+        """Standardised values with the indentation that a linear finger would need, the rest as expected."""
         z = np.zeros(len(self._names))
         at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
         if at_rest is not None:
-            which, noise = self._names.index("normal_force"), markers.measurement.noise
+            which, noise = self._names.index(INDENTATION), markers.measurement.noise
             slope = markers.predicted(at_rest)[1][:, which] / noise
-            force = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
-            z[which] = force / self.parameters[which].scale
+            pressed = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
+            z[which] = pressed / self.parameters[which].scale
         return z
 
     def _holding(self, held: Sequence[str], z: FloatArray) -> list[Parameter]:

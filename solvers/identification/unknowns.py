@@ -21,6 +21,9 @@ from pinnray.solvers.problem import Material, Problem, contact_ends
 CONTACT = ("position", "width", "normal_force", "shear_force", "eccentricity")
 SHARE = "shear_share"
 """Shear over normal force: it takes the place of `shear_force` where friction bounds it."""
+INDENTATION = "indentation"
+"""Mean displacement of the contact into the front: it takes the place of `normal_force` in a search, since a
+force that falls while the finger is pressed farther cannot be prescribed."""
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson", "feet")
 """What is found unless other names are given; the table of docs/how-to/force.md describes each. `feet` stands
@@ -39,13 +42,29 @@ are one there. With odds of 3 to 1, noise decided, and the force of a film was 1
 LAWS = tuple(LAW_ODDS)
 
 
-def doubt_of_the_plane(problem: Problem, thick: bool) -> float:
-    """Deviation of force and stress of a finger with a depth from those of the plane, as a share.
+class Doubt(NamedTuple):
+    """Deviations of a finger's force and stress from those of its model, as shares."""
 
-    Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger is
-    in neither state, and its markers do not tell. A body that is only a plane has none, nor a thick one.
-    """
-    return 0.0 if problem.finger is None or thick else 0.5 * problem.material.poisson**2
+    force: float
+    stress: float
+
+    @classmethod
+    def of_the_plane(cls, problem: Problem) -> "Doubt":
+        """Of plane strain alone, where markers are not known to be in it and the finger has a depth.
+
+        Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger
+        is in neither state.
+        """
+        seen = problem.observations
+        if problem.finger is None or (seen is not None and seen.plane):
+            return RESOLVED
+        share = 0.5 * problem.material.poisson**2
+        return cls(share, share)
+
+
+RESOLVED = Doubt(0.01, 0.05)
+"""Where the markers tell plane strain from free side faces, or there are none: what elements of 1 mm and few
+functions of the depth leave on the default finger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +74,7 @@ class Hypothesis:
     position: float  # Abscissa of the contact's middle, mm
     width: float  # Its length along x, mm
     force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
+    indentation: float  # Mean displacement of the contact into the front where the force follows from it, mm
     couple: FloatArray  # Normal force times its eccentricity, shape (2,), N: the dipole of the traction
     lame: Lame  # Lamé constants, MPa
     changes: FloatArray  # Of the walls' thickness, shape (k,), mm
@@ -69,6 +89,7 @@ class HypothesisSlopes(NamedTuple):
     position: FloatArray
     width: FloatArray
     force: FloatArray
+    indentation: FloatArray
     couple: FloatArray
     moduli: FloatArray
     changes: FloatArray
@@ -135,6 +156,7 @@ class Unknowns:
             Parameter("position", "mm", middle, 0.05 * front.extent * prior, *front.ends),
             Parameter("width", "mm", width, log(2.5) * prior, narrowest, logarithmic=True),
             Parameter("normal_force", "N/mm", 0.0, size * prior),
+            Parameter(INDENTATION, "mm", 0.0, 0.5 * front.extent * prior),
             Parameter("shear_force", "N/mm", 0.0, size * prior),
             Parameter("eccentricity", "mm", 0.0, 0.5 * width * prior),
             Parameter("base_compliance", "mm", 0.02, log(10) * prior, logarithmic=True),
@@ -152,16 +174,17 @@ class Unknowns:
         by_name = {parameter.name: parameter for parameter in [*known, *self._pictures]}
         return [by_name[name] for name in self.names]
 
-    def hypothesis(self, values: FloatArray) -> Hypothesis:
-        """The finger and the contact of values, shape (p,)."""
-        named, material = self._named(values), self.material(values)
+    def hypothesis(self, values: FloatArray, normal: float = 0.0) -> Hypothesis:
+        """The finger and the contact of values, shape (p,), and of a normal force that is none of them."""
+        named, material = {"normal_force": normal} | self._named(values), self.material(values)
         middle, width = self.place
-        normal = named.get("normal_force", 0.0)
+        normal = named["normal_force"]
         sizes = normal, named.get("shear_force", 0.0) + named.get(SHARE, 0.0) * normal
         return Hypothesis(
             position=named.get("position", middle),
             width=named.get("width", width),
             force=np.array(sizes) @ self.directions,
+            indentation=named.get(INDENTATION, 0.0),
             couple=named.get("eccentricity", 0.0) * normal * self.directions[0],
             lame=material.lame,
             changes=self.motion.changes(named),
@@ -170,15 +193,19 @@ class Unknowns:
             pictures=pictures_of(self.centre, named),
         )
 
-    def slopes(self, values: FloatArray) -> HypothesisSlopes:
-        """Derivatives of the hypothesis of values, shape (p,)."""
-        named, material = self._named(values), self.material(values)
+    def slopes(
+        self, values: FloatArray, normal: float = 0.0, by_normal: FloatArray | None = None
+    ) -> HypothesisSlopes:
+        """Derivatives of the hypothesis of values, shape (p,), and of a normal force with its own, (p,)."""
+        named, material = {"normal_force": normal} | self._named(values), self.material(values)
         count = len(self.names)
         by: dict[str, FloatArray] = defaultdict(lambda: np.zeros(count))
+        if by_normal is not None:
+            by["normal_force"] = by_normal
         by |= zip(self.names, np.eye(count), strict=True)
         young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
-        normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
+        normal, eccentricity = named["normal_force"], named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
         along = by["shear_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
 
@@ -190,6 +217,7 @@ class Unknowns:
             position=by["position"],
             width=by["width"],
             force=np.stack([by["normal_force"], along], axis=1) @ self.directions,
+            indentation=by[INDENTATION],
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
             changes=stacked(self.motion.names),
