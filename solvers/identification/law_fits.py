@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estimate
+from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estimate, values_of
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
@@ -49,6 +49,7 @@ class LawFits:
             measurement.noise,
             self.parameters,
             fit.estimate.z,
+            measurement.errors,
         )
         return fit._replace(
             estimate=found,
@@ -90,10 +91,13 @@ class LawFits:
                 raise nothing
             return None
 
+        kept = None
         if near is not None:
             start = near.estimate.z
-        elif start is None:
-            start = self._pressed(model, markers)
+            if len(near.estimate.kept) == len(measurement.observed):
+                kept = near.estimate.kept
+        elif start is not None:
+            start = self._pressed(model, markers, start)
         parameters = self.parameters
         if held:
             parameters = self._holding(held, start)
@@ -111,6 +115,8 @@ class LawFits:
             measurement.noise,
             parameters,
             start,
+            measurement.errors,
+            kept,
             cost_change=self._cost_change,
             **limits,
         )
@@ -120,10 +126,10 @@ class LawFits:
         exact = model.response(found.values, EXACT)
         return Fit(model, found, exact or rough, measurement, exact is not None)
 
-    def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
-        """Standardised values with the indentation that a linear finger would need, the rest as expected."""
-        z = np.zeros(len(self._names))
-        at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
+    def _pressed(self, model: ResponseModel, markers: MarkerModel, start: FloatArray) -> FloatArray:
+        """Standardised values with the indentation that a linear finger would need."""
+        z = start.copy()
+        at_rest = model.response(values_of(self.parameters, start)[0])
         if at_rest is not None:
             which, noise = self._names.index(INDENTATION), markers.measurement.noise
             slope = markers.predicted(at_rest)[1][:, which] / noise
