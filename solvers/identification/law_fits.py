@@ -61,20 +61,19 @@ class LawFits:
         self,
         law: LawName,
         measurement: MarkerData,
-        near: Fit | None,
-        start: FloatArray | None = None,
+        near: Fit | FloatArray,
         *,
         held: Sequence[str] = (),
         **limits: int,
     ) -> Fit:
         """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`.
 
-        A wide contact that the start has is soon lost, while the frame and the walls are those of a narrow
-        one. What is `held` stays, and its value in the fit is zero.
+        The values are at rest: the indentation that a linear finger would need is added. What is `held`
+        stays, and its value in the fit is zero.
         """
         model = self._model(law)
         markers = MarkerModel(model, measurement)
-        model.restart(None if near is None else near.response)
+        model.restart(near.response if isinstance(near, Fit) else None)
 
         def predict(values: FloatArray) -> Prediction | None:
             found = model.response(values)
@@ -91,19 +90,19 @@ class LawFits:
                 raise nothing
             return None
 
-        kept = None
-        if near is not None:
+        kept, explained_elsewhere = None, False
+        if isinstance(near, Fit):
             start = near.estimate.z
             if len(near.estimate.kept) == len(measurement.observed):
                 kept = near.estimate.kept
-        elif start is not None:
-            start = self._pressed(model, markers, start)
+            # Where one law explains the markers, another one does as well, or nowhere.
+            explained_elsewhere = near.law != law and near.estimate.converged
+        else:
+            start = self._pressed(model, markers, near)
         parameters = self.parameters
         if held:
             parameters = self._holding(held, start)
             start = np.where(np.isin(self._names, held), 0.0, start)
-        # Where one law explains the markers, another one does as well, or nowhere.
-        explained_elsewhere = near is not None and near.law != law and near.estimate.converged
         first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
         nothing = NoSolutionError(
             f"no equilibrium of the {law} law was found near the markers, from rest or from the force of a "

@@ -114,7 +114,7 @@ class Identifier:
             contact = {"position": position, "width": width}
             start = np.array([contact.get(name, 0.0) for name in self._names])
             try:
-                fit = self._fits.fit(law, measurement, None, start, held=self._feet, rounds=ROUNDS)
+                fit = self._fits.fit(law, measurement, start, held=self._feet, rounds=ROUNDS)
             except NoSolutionError as error:
                 reason = error
                 continue
