@@ -17,7 +17,7 @@ HELD = 1e-3
 """Factor of the standard deviation of a parameter that is held."""
 
 MOST_LOST = 8
-"""Hypotheses without equilibrium at which a search ends: near a limit load there are ever more of them."""
+"""Hypotheses without equilibrium at which a search ends: each costs all halvings of the way to it."""
 
 
 class LawFits:
@@ -85,18 +85,16 @@ class LawFits:
                 reached[values.tobytes()] = found
                 return markers.predicted(found)
             lost.append(values)
-            nowhere = not reached and (explained_elsewhere or len(lost) > 1)  # nor where the priors are
+            nowhere = not reached and len(lost) > most  # nor, from values, where the priors are
             if nowhere or len(lost) > MOST_LOST:
                 raise nothing
             return None
 
-        kept, explained_elsewhere = None, False
-        if isinstance(near, Fit):
-            start = near.estimate.z
+        kept, most = None, 1
+        if isinstance(near, Fit):  # where one law explains the markers, another one does as well, or nowhere
+            start, most = near.estimate.z, 0
             if len(near.estimate.kept) == len(measurement.observed):
                 kept = near.estimate.kept
-            # Where one law explains the markers, another one does as well, or nowhere.
-            explained_elsewhere = near.law != law and near.estimate.converged
         else:
             start = self._pressed(model, markers, near)
         parameters = self.parameters
@@ -105,8 +103,8 @@ class LawFits:
             start = np.where(np.isin(self._names, held), 0.0, start)
         first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
         nothing = NoSolutionError(
-            f"no equilibrium of the {law} law was found near the markers, from rest or from the force of a "
-            "linear finger; see whether the markers are of this finger and load, or take a smaller prior"
+            f"no equilibrium of the {law} law was found near the markers, from rest or from where a linear "
+            "finger would be; see whether the markers are of this finger and load, or take a smaller prior"
         )
         found = estimate(
             predict,
