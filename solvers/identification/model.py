@@ -26,7 +26,7 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.estimation import NO_ERRORS, GrossErrors, Prediction
+from pinnray.solvers.assimilation.estimation import GrossErrors, Prediction
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
 from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
@@ -39,8 +39,8 @@ MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
-WRONG = 100.0
-"""Markers of which one is not where it seems to be."""
+WRONG, OFF = 100.0, 1.0
+"""Markers of which one is not where it seems to be, and the size of its error, mm, or far more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,12 +337,9 @@ class MarkerData:
 
     @property
     def errors(self) -> GrossErrors:
-        """Markers that may be elsewhere, one in `WRONG`, as far away as the markers are from their middle."""
-        spread = float(np.sqrt(((self.points - self.points.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        if spread == 0:
-            return NO_ERRORS
+        """Markers that may be elsewhere."""
         rows = np.arange(2 * len(self.points)).reshape(-1, 2)
-        return GrossErrors(rows, np.log(self.deviations / spread).sum(axis=1) - log(WRONG))
+        return GrossErrors(rows, np.log(self.deviations / OFF).sum(axis=1) - log(WRONG))
 
     @property
     def observed(self) -> FloatArray:
