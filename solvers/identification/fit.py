@@ -104,7 +104,7 @@ class Fit(NamedTuple):
         found, response = self.estimate, self.response
         known = zip(found.values.tolist(), found.deviations.tolist(), found.intervals.tolist(), strict=True)
         listed = []
-        for parameter, (value, deviation, ends), share in zip(
+        for parameter, (value, deviation, (low, high)), share in zip(
             found.parameters, known, found.resolution.tolist(), strict=True
         ):
             name, unit = parameter.name, parameter.unit
@@ -112,8 +112,7 @@ class Fit(NamedTuple):
                 name, unit, value = "normal_force", "N/mm", response.normal
                 slopes = response.normal_slopes * found.slopes
                 deviation = float(np.sqrt(slopes @ found.covariance @ slopes))
-                ends = [value - found.quantile * deviation, value + found.quantile * deviation]
-            low, high = ends
+                low, high = value - found.quantile * deviation, value + found.quantile * deviation
             listed.append(FoundParameter(name, unit, value, deviation, low, high, share))
         return listed
 

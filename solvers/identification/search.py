@@ -137,7 +137,8 @@ class Identifier:
             observations: Those of the fit.
             least: Logarithm of the probability below which the first step is the last one.
         """
-        model, start, before, settling = fit.model, fit, np.inf, True
+        model, start, before = fit.model, fit, np.inf
+        settling = not model.body.thick  # whose derivatives are not those of the plane
         measurement = self.measurement(observations)
         model.restart(fit.response)
         for _ in range(POLISHES):
