@@ -83,6 +83,13 @@ class FemBody:
         """(N, 2)."""
         return self._clamped.shape
 
+    @property
+    def front(self) -> FloatArray:
+        """Nodes of the front that are not held."""
+        return self.space.nodes[
+            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
+        ]
+
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""
         walls = np.einsum("k,kqij->qij", changes, self._wall_gradients)

@@ -39,6 +39,11 @@ class Body(Protocol):
         """Shape of a state."""
         ...
 
+    @property
+    def front(self) -> FloatArray:
+        """Points of the front, shape (m, 2), mm, at which a cylinder is kept out."""
+        ...
+
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """Whether neither the walls' motion nor the displacement turns a point inside out."""
         ...

@@ -18,7 +18,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, LAW_ODDS, SHARE, Unknowns
+from pinnray.solvers.identification.unknowns import CONTACT, CYLINDER, LAW_ODDS, SHARE, Unknowns
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
@@ -80,11 +80,11 @@ class Fit(NamedTuple):
         unknowns = self.model.unknowns
         if "position" not in unknowns.names:
             return None
-        return place_of(unknowns, self.response.values, self.standard_errors)
+        return place_of(unknowns, self.response, self.standard_errors)
 
     def component(self, direction: FloatArray) -> tuple[float, float]:
         """Component of the indenter's force in a direction, (2,), and its standard deviation, N/mm."""
-        return component_of(self.model, self.response.values, self.standard_errors, direction)
+        return component_of(self.model, self.response, self.standard_errors, direction)
 
     def variances(self, direction: FloatArray) -> dict[str, float]:
         """Variance of that component, (N/mm)^2, by what it comes from: names of `SOURCES`.
@@ -93,34 +93,33 @@ class Fit(NamedTuple):
         is the sum of independent parts. Where φ is above one, all but 1 / φ^2 of the observations' is misfit.
         """
         found, unknowns = self.estimate, self.model.unknowns
-        slopes = unknowns.slopes(self.response.values).force @ direction * found.slopes
+        slopes = self.response.force_slopes @ direction * found.slopes
         spread = found.quantile / NORMAL * found.covariance @ slopes
         noise, misfit = float(((found.sensitivities @ spread) ** 2).sum()), 1 - 1 / found.inflation**2
-        value = float(self.response.hypothesis.force @ direction)
+        value = float(self.response.force @ direction)
         parts = dict.fromkeys(SOURCES, 0.0)
         parts["third dimension"] = (self.model.doubt * value) ** 2
         parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
         for name, part in zip(unknowns.names, spread.tolist(), strict=True):
-            contact, frame = name in (*CONTACT, SHARE), name.startswith(("pressed", "drawn"))
+            contact, frame = name in (*CONTACT, *CYLINDER, SHARE), name.startswith(("pressed", "drawn"))
             parts["contact" if contact else "frames" if frame else "finger"] += part**2
         return parts
 
 
 def component_of(
-    model: ResponseModel, values: FloatArray, errors: FloatArray, direction: FloatArray
+    model: ResponseModel, response: Response, errors: FloatArray, direction: FloatArray
 ) -> tuple[float, float]:
     """Component of the force in a direction, (2,), and its standard deviation, N/mm.
 
-    It is for values, shape (p,), with independent errors, shape (p, k).
+    It is of a response whose unknowns have independent errors, shape (p, k).
     """
-    component = float(model.unknowns.hypothesis(values).force @ direction)
-    slopes = model.unknowns.slopes(values).force @ direction
-    return component, float(np.hypot(np.linalg.norm(slopes @ errors), model.doubt * component))
+    component = float(response.force @ direction)
+    spread = response.force_slopes @ direction @ errors
+    return component, float(np.hypot(np.linalg.norm(spread), model.doubt * component))
 
 
-def place_of(unknowns: Unknowns, values: FloatArray, errors: FloatArray) -> tuple[float, float]:
+def place_of(unknowns: Unknowns, response: Response, errors: FloatArray) -> tuple[float, float]:
     """As `component_of`, the abscissa on the drawn front at which the force acts, mm."""
-    along = np.isin(unknowns.names, ("position", "eccentricity")).astype(np.float64)
     # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
     couple = 0.25 * mean_thickness(unknowns.problem.mesh)
-    return float(along @ values), float(np.hypot(np.linalg.norm(along @ errors), couple))
+    return response.place, float(np.hypot(np.linalg.norm(response.place_slopes @ errors), couple))

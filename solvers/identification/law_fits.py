@@ -75,13 +75,12 @@ class LawFits:
         model.restart(None if near is None else near.response)
 
         def predict(values: FloatArray) -> Prediction | None:
-            force = np.linalg.norm(model.unknowns.hypothesis(values).force)
-            self.progress(0.5, f"{law}: force {force:.4g} N/mm")
             found = model.response(values)
             if found is None and model.evaluations == first:  # another law's start was too far away
                 model.restart(None)
                 found = model.response(values)
             if found is not None:
+                self.progress(0.5, f"{law}: force {np.linalg.norm(found.force):.4g} N/mm")
                 reached[values.tobytes()] = found
                 return markers.predicted(found)
             lost.append(values)
@@ -123,6 +122,8 @@ class LawFits:
     def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
         """Standardised values with the normal force that a linear finger would need, the rest as expected."""
         z = np.zeros(len(self._names))
+        if "normal_force" not in self._names:  # a cylinder, whose travel is known
+            return z
         at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
         if at_rest is not None:
             which, noise = self._names.index("normal_force"), markers.measurement.noise

@@ -13,6 +13,7 @@ drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +29,9 @@ from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
 from pinnray.solvers.identification.unknowns import Hypothesis, Unknowns, doubt_of_the_plane
 from pinnray.solvers.solver import NoSolutionError
+
+if TYPE_CHECKING:
+    from pinnray.solvers.identification.cylinder_model import Stage
 
 MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""
@@ -46,6 +50,11 @@ class Response:
     motion: RigidMotion  # Of the clamp
     contact: FloatArray  # Mean displacement of the contact, shape (2,), mm
     contact_slopes: FloatArray  # Shape (p, 2)
+    force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
+    force_slopes: FloatArray  # Shape (p, 2)
+    place: float  # Abscissa on the drawn front at which it acts, mm
+    place_slopes: FloatArray  # Shape (p,)
+    way: tuple["Stage", ...] = ()  # Of a cylinder, from its first stage to this equilibrium
 
 
 class ResponseModel:
@@ -120,6 +129,8 @@ class ResponseModel:
             state=about.state + np.tensordot(step, about.slopes, axes=1),
             motion=about.motion.extrapolated(step),
             contact=about.contact + step @ about.contact_slopes,
+            force=about.force + step @ about.force_slopes,
+            place=about.place + float(step @ about.place_slopes),
         )
 
     def marker_rows(self, points: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
@@ -238,7 +249,21 @@ class ResponseModel:
         motion = self._clamp.motion(
             (hypothesis.softness, slope.softness), (force, slope.force), (places[0] + contact, place_slopes)
         )
-        return Response(values.copy(), hypothesis, state, slopes, motion, contact, contact_slopes)
+        place = hypothesis.position + hypothesis.eccentricity
+        by_place = slope.position + slope.eccentricity
+        return Response(
+            values.copy(),
+            hypothesis,
+            state,
+            slopes,
+            motion,
+            contact,
+            contact_slopes,
+            force,
+            slope.force,
+            place,
+            by_place,
+        )
 
     def _traction(self, position: float, width: float) -> FloatArray:
         """Rows (5, 2, *shape) of the traction and its derivatives; see `FrontTraction.weights`."""
@@ -339,4 +364,4 @@ class MarkerModel:
         values, derivatives = moved.ravel(), moved_slopes.reshape(len(moved_slopes), -1).T
         if self.measurement.reaction is None:
             return values, derivatives
-        return np.append(values, hypothesis.force[1]), np.vstack([derivatives, by.force[:, 1]])
+        return np.append(values, response.force[1]), np.vstack([derivatives, response.force_slopes[:, 1]])

@@ -125,7 +125,7 @@ class Identified:
             problem=field.problem,
             field=field,
             energy=best.model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
-            reaction=hypothesis.force,
+            reaction=best.response.force,
             status=Status(
                 best.estimate.converged and best.exact and not unstable and not contradicted,
                 f"{unstable_phrase(unstable)}; {sentence}" if unstable else sentence,

@@ -4,7 +4,7 @@ Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, Chapman 
 without an observation.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +16,7 @@ from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.assimilation.estimation import COST_CHANGE, MAX_STEPS
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.body import Body
+from pinnray.solvers.identification.cylinder_model import response_model
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.law_fits import LawFits
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
@@ -51,6 +52,7 @@ class Identifier:
         settings: Unknowns, priors, radius of the markers and reaction.
         problem: The finger; of its load only the drawn contact counts, of its law nothing unless it is given.
         body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
+        names: Of the unknowns; those of the settings by default.
         cost_change: Relative change of the cost below which a search has converged.
         flexibility: Of the finger if it is known, mm per N/mm; see `ResponseModel.flexibility`.
     """
@@ -60,22 +62,24 @@ class Identifier:
         settings: IdentifyingSolver,
         problem: Problem,
         body: Callable[[Unknowns], Body],
+        names: Sequence[str] | None = None,
         *,
         cost_change: float = COST_CHANGE,
         flexibility: float | None = None,
     ) -> None:
         self._settings, self._mesh = settings, problem.mesh
+        names = settings.unknowns if names is None else names
 
         @cache
         def model(law: LawName) -> ResponseModel:
             own = replace(problem, material=problem.material.model_copy(update={"law": law}))
-            unknowns = Unknowns(own, settings.unknowns)
-            return ResponseModel(body(unknowns), unknowns)
+            unknowns = Unknowns(own, names)
+            return response_model(body(unknowns), unknowns)
 
         self.laws = LAWS if settings.law == "evidence" else (problem.material.law,)
         self.model = model
         self.flexibility = model(self.laws[0]).flexibility() if flexibility is None else flexibility
-        unknowns = Unknowns(problem, settings.unknowns)
+        unknowns = Unknowns(problem, names)
         self._names, self._feet = unknowns.names, unknowns.feet.names
         self.parameters = unknowns.parameters(self.flexibility, settings.prior)
         self._fits = LawFits(model, self.parameters, cost_change)

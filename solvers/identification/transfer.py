@@ -45,7 +45,7 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
             state=response.state,
         ),
         energy=member.model.body.energy(response.state, hypothesis.lame, hypothesis.changes),
-        reaction=hypothesis.force,
+        reaction=response.force,
         left_out=None,
         uncertainty=None,
         identified=None,
@@ -55,12 +55,13 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
 def _response(model: ResponseModel, start: Response, share: float, shift: float) -> Response:
     """The response at a share of the contact's displacement, the contact shifted along x by mm.
 
-    The size of the force is found by Newton's method, to 1e-5 mm of the contact's displacement.
+    The size of a patch's force is found by Newton's method, to 1e-5 mm of the contact's displacement; a
+    cylinder has that share of its travel.
     """
     names, into = model.unknowns.names, model.unknowns.directions[0]
     target = share * float(start.contact @ into)
-    force = np.isin(names, ("normal_force", "shear_force", *model.unknowns.feet.names))
-    direction, values = np.where(force, start.values, 0.0), np.where(force, 0.0, start.values)
+    growing = np.isin(names, ("normal_force", "shear_force", "travel", *model.unknowns.feet.names))
+    direction, values = np.where(growing, start.values, 0.0), np.where(growing, 0.0, start.values)
     if "position" in names:
         values[names.index("position")] += shift
     model.restart(start)
@@ -70,7 +71,7 @@ def _response(model: ResponseModel, start: Response, share: float, shift: float)
         if response is None:
             break
         missed = target - float(response.contact @ into)
-        if abs(missed) < 1e-5:
+        if start.way or abs(missed) < 1e-5:
             return response
         scale += missed / float(direction @ response.contact_slopes @ into)
     raise NoSolutionError("no equilibrium of the identified finger was found at the other load")

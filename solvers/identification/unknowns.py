@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import log
+from math import ceil, log
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Parameter
 from pinnray.solvers.assimilation.picture_frames import picture_parameters, pictures_of
+from pinnray.solvers.cylinder_contact import FRICTION_STEP, touching_centre
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
 from pinnray.solvers.identification.boundary import Feet, FrontTraction
 from pinnray.solvers.problem import Material, Problem, contact_ends
@@ -21,6 +22,10 @@ from pinnray.solvers.problem import Material, Problem, contact_ends
 CONTACT = ("position", "width", "normal_force", "shear_force", "eccentricity")
 SHARE = "shear_share"
 """Shear over normal force: it takes the place of `shear_force` where friction bounds it."""
+TRAVEL = 0.2
+"""Standard deviation of the travel of a cylinder over the load's stroke."""
+CYLINDER = ("position", "travel", "friction")
+"""The unknowns of a cylinder, in place of those of `CONTACT`: friction along the way makes its force."""
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson", "feet")
 """What is found unless other names are given; the table of docs/how-to/force.md describes each. `feet` stands
@@ -55,7 +60,11 @@ class Hypothesis:
     position: float  # Abscissa of the contact's middle, mm
     width: float  # Its length along x, mm
     force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
+    eccentricity: float  # Of the normal force from the middle, mm
     couple: FloatArray  # Normal force times its eccentricity, shape (2,), N: the dipole of the traction
+    centre: FloatArray  # Of a cylinder where it touches the front, shape (2,), mm
+    travel: FloatArray  # Of the cylinder from there, shape (2,), mm
+    friction: float  # Its coefficient
     lame: Lame  # Lamé constants, MPa
     changes: FloatArray  # Of the walls' thickness, shape (k,), mm
     softness: float  # Compliance of the base over Young's modulus, mm/MPa
@@ -69,7 +78,11 @@ class HypothesisSlopes(NamedTuple):
     position: FloatArray
     width: FloatArray
     force: FloatArray
+    eccentricity: FloatArray
     couple: FloatArray
+    centre: FloatArray
+    travel: FloatArray
+    friction: FloatArray
     moduli: FloatArray
     changes: FloatArray
     softness: FloatArray
@@ -118,6 +131,26 @@ class Unknowns:
         tx, ty = self.traction.tangent(self.place[0])
         return np.array([[ty, -tx], [tx, ty]])
 
+    @property
+    def radius(self) -> float:
+        """Of the cylinder, mm."""
+        return float(self.problem.load.radius or 0.0)
+
+    @property
+    def stages(self) -> int:
+        """Steps to the full travel, within each of which slip has one direction."""
+        return max(4, ceil(self._stroke / (FRICTION_STEP * self.radius) - 1e-9))
+
+    @property
+    def _stroke(self) -> float:
+        """The load's, mm."""
+        return float(np.linalg.norm(self.problem.load.values))
+
+    @property
+    def _way(self) -> FloatArray:
+        """Unit vector along it, shape (2,)."""
+        return np.array([value or 0.0 for value in self.problem.load.displacement]) / self._stroke
+
     def parameters(self, flexibility: float, prior: float = 1.0) -> list[Parameter]:
         """The unknowns with their priors.
 
@@ -137,6 +170,8 @@ class Unknowns:
             Parameter("normal_force", "N/mm", 0.0, size * prior),
             Parameter("shear_force", "N/mm", 0.0, size * prior),
             Parameter("eccentricity", "mm", 0.0, 0.5 * width * prior),
+            Parameter("travel", "mm", self._stroke, TRAVEL * self._stroke * prior, 0.1 * self._stroke),
+            Parameter("friction", "", friction or 0.5, 0.3 * prior, 0.0, max(1.0, 2 * friction)),
             Parameter("base_compliance", "mm", 0.02, log(10) * prior, logarithmic=True),
             Parameter("poisson", "", material.poisson, 0.03 * prior, 0.0, 0.49),
             Parameter("young", "MPa", material.young, 0.3 * prior, logarithmic=True),
@@ -162,7 +197,11 @@ class Unknowns:
             position=named.get("position", middle),
             width=named.get("width", width),
             force=np.array(sizes) @ self.directions,
+            eccentricity=named.get("eccentricity", 0.0),
             couple=named.get("eccentricity", 0.0) * normal * self.directions[0],
+            centre=touching_centre(self.problem, named.get("position", middle)),
+            travel=named.get("travel", self._stroke) * self._way,
+            friction=named.get("friction", self.problem.load.friction),
             lame=material.lame,
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
@@ -182,6 +221,10 @@ class Unknowns:
         compliance = named.get("base_compliance", 0.0)
         along = by["shear_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
 
+        position, small = named.get("position", self.place[0]), 1e-4 * self.traction.extent
+        ahead, behind = (touching_centre(self.problem, position + way * small) for way in (1, -1))
+        centre_slope = (ahead - behind) / (2 * small)
+
         def stacked(names: Sequence[str]) -> FloatArray:
             """Derivatives (p, k) of k numbers, of which those that are no unknowns have none."""
             return np.array([by[name] for name in names]).reshape(-1, count).T
@@ -190,7 +233,11 @@ class Unknowns:
             position=by["position"],
             width=by["width"],
             force=np.stack([by["normal_force"], along], axis=1) @ self.directions,
+            eccentricity=by["eccentricity"],
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
+            centre=np.outer(by["position"], centre_slope),
+            travel=np.outer(by["travel"], self._way),
+            friction=by["friction"],
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
             changes=stacked(self.motion.names),
             softness=by["base_compliance"] / young - compliance / young**2 * by["young"],

@@ -1,0 +1,244 @@
+"""Equilibria of a finger that a rigid cylinder presses, with friction, on the way to its full travel.
+
+Friction depends on the way there: each response has the stages of its own, and the next one starts every
+stage from them, extrapolated along their derivatives. These are exact, from stage to stage, with what
+touches, sticks and slips held.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.cylinder_contact import FRICTION_STEP
+from pinnray.solvers.identification.body import Body
+from pinnray.solvers.identification.front_contact import Cylinder, FrontContact
+from pinnray.solvers.identification.model import Response, ResponseModel
+from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
+from pinnray.solvers.solver import NoSolutionError
+
+DEBUG=0
+NEAR = 0.1
+"""Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
+FARTHEST = 2.0
+"""Longest step of Newton's method over the travel of the stage; a longer one leads astray."""
+ITERATIONS, HALVINGS = 15, 3
+"""Newton iterations of a stage, and times that the way to it is halved where they do not settle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """An equilibrium on the way, with derivatives by p unknowns; the front has m points."""
+
+    share: float  # Of the travel
+    state: FloatArray
+    forces: FloatArray  # On the front, shape (m, 2), N/mm
+    places: FloatArray  # Of the front on the cylinder, shape (m,), mm
+    touches: BoolArray  # Shape (m,)
+    slips: FloatArray  # See `Pressed`
+    slopes: FloatArray  # Of the state, shape (p, *shape)
+    force_slopes: FloatArray  # Shape (p, m, 2)
+    place_slopes: FloatArray  # Shape (p, m)
+
+    def moved(self, step: FloatArray) -> "Stage":
+        """The stage after a step of the unknowns, shape (p,), to first order."""
+        return replace(
+            self,
+            state=self.state + np.tensordot(step, self.slopes, axes=1),
+            forces=self.forces + np.tensordot(step, self.force_slopes, axes=1),
+        )
+
+
+class CylinderModel(ResponseModel):
+    """Responses of a discretised finger to the unknowns of a cylinder; see `ResponseModel`."""
+
+    def __init__(self, body: Body, unknowns: Unknowns) -> None:
+        super().__init__(body, unknowns)
+        self._points = body.front
+        self._rows = body.traction_rows(self._points, np.eye(len(self._points)))
+
+    def unstable(self, response: Response) -> int:
+        """As the patch has it, with what touches held along the normal, and what sticks altogether."""
+        hypothesis, stage = response.hypothesis, response.way[-1]
+        there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
+        if there is None:
+            raise NoSolutionError("the finger that was found is inside out")
+        cylinder = self._cylinder(hypothesis, 1.0)
+        normal = (self._moved(response.state) - cylinder.centre) / cylinder.radius
+        along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        sticks = stage.touches & (stage.slips == 0)
+        rows = np.concatenate(
+            [
+                np.einsum("mi,mi...->m...", way[held], self._rows[held])
+                for way, held in ((normal, stage.touches), (along, sticks))
+            ]
+        )
+        negative = there.negative()
+        return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
+
+    def _reached(
+        self, values: FloatArray, tolerance: float, iterations: int, halvings: int, slopes: FloatArray | None
+    ) -> Response | None:
+        """The response, by way of the stages of the last one."""
+        known = () if self._last is None else self._last.way
+        step = values if self._last is None else values - self._last.values
+        hypothesis, by = self.unknowns.hypothesis(values), self.unknowns.slopes(values)
+        way = [self._rest(hypothesis, by)]
+
+        def reached(share: float, near: Stage | None, halvings: int) -> bool:
+            guesses = [self._ahead(way, share)]
+            if near is not None:
+                guesses.insert(0, near.moved(step))
+            for guess in guesses:
+                found = self._settled(guess, way[-1], share, hypothesis, by, tolerance)
+                if found is not None:
+                    way.append(found)
+                    return True
+            middle = 0.5 * (way[-1].share + share)
+            return halvings > 0 and reached(middle, None, halvings - 1) and reached(share, None, halvings - 1)
+
+        equal = np.arange(1, self.unknowns.stages + 1) / self.unknowns.stages
+        stages = [(each.share, each) for each in known] or [(float(share), None) for share in equal]
+        if not all(reached(share, near, HALVINGS) for share, near in stages):
+            return None
+        return self._pressed(values, hypothesis, by, way[1:])
+
+    def _cylinder(self, hypothesis: Hypothesis, share: float) -> Cylinder:
+        centre = hypothesis.centre + share * hypothesis.travel
+        return Cylinder(self.unknowns.radius, centre, hypothesis.friction)
+
+    def _moved(self, state: FloatArray) -> FloatArray:
+        """Places of the front, shape (m, 2), mm."""
+        return np.asarray(self._points + np.tensordot(self._rows, state, axes=state.ndim))
+
+    def _rest(self, hypothesis: Hypothesis, by: HypothesisSlopes) -> Stage:
+        cylinder, count = self._cylinder(hypothesis, 0.0), len(self._points)
+        still = np.zeros((len(by.friction), count, 2))
+        return Stage(
+            0.0,
+            np.zeros(self.body.shape),
+            still[0],
+            cylinder.places(self._points),
+            np.zeros(count, dtype=np.bool_),
+            np.zeros(count),
+            np.zeros((len(still), *self.body.shape)),
+            still,
+            -by.centre @ cylinder.place_slopes(self._points).T,
+        )
+
+    def _ahead(self, way: list[Stage], share: float) -> Stage:
+        """The last stage or, from the second one on, the state on the line through the last two."""
+        last = way[-1]
+        if len(way) < 3:
+            return last
+        ahead = (share - last.share) / (last.share - way[-2].share)
+        return replace(last, state=last.state + ahead * (last.state - way[-2].state))
+
+    def _settled(
+        self,
+        guess: Stage,
+        before: Stage,
+        share: float,
+        hypothesis: Hypothesis,
+        by: HypothesisSlopes,
+        tolerance: float,
+    ) -> Stage | None:
+        """The equilibrium at a share of the travel by Newton's method; None where it does not settle."""
+        body, cylinder, inner = self.body, self._cylinder(hypothesis, share), len(self.body.shape)
+        base = body.feet.any(axis=0)
+        state = np.where(base, share * np.tensordot(hypothesis.feet, body.feet, axes=1), guess.state)
+        forces, touches, slips = guess.forces, guess.touches, guess.slips
+        longest = FARTHEST * (share - before.share) * float(np.linalg.norm(hypothesis.travel))
+        for _ in range(ITERATIONS):
+            linearised = body.linearised(state, hypothesis.lame, hypothesis.changes)
+            if linearised is None:
+                return None
+            points = self._moved(state)
+            near = touches | (cylinder.gaps(points) < NEAR * cylinder.radius)
+            rows = self._rows[near].reshape(-1, *body.shape)
+            *answers, relaxing = linearised.solve(np.concatenate([rows, linearised.force[None]]))
+            answers, free = np.array(answers).reshape(rows.shape), state - relaxing
+            compliance = np.tensordot(rows, answers, axes=(range(1, inner + 1), range(1, inner + 1)))
+            contact = FrontContact(cylinder, compliance, points[near], forces[near], before.places[near])
+            loose = self._moved(free)[near]
+            pressed = contact.pressed(loose, touches[near], slips[near])
+            if pressed is None:
+                pressed = contact.pressed(loose, np.zeros(len(loose), dtype=np.bool_), np.zeros(len(loose)))
+            if pressed is None:
+                return None
+            forces, touches, slips = np.zeros_like(forces), np.zeros_like(touches), np.zeros_like(slips)
+            forces[near], touches[near], slips[near] = pressed.forces, pressed.touches, pressed.slips
+            load = np.tensordot(pressed.forces.ravel(), rows, axes=1)
+            step = free + np.tensordot(pressed.forces.ravel(), answers, axes=1) - state
+            if np.abs(step).max() > longest:
+                return None
+            length = 1.0
+            while not body.admissible(state + length * step, hypothesis.changes):
+                if (length := length / 2) < 2.0**-6:
+                    return None
+            work = max(abs(float((load * state).sum())), 1e-10)
+            size = float(np.sqrt(abs((step * (load - linearised.force)).sum()) / work))
+            state = state + length * step
+            if DEBUG: print(f"  {share:.3f} {_} size {size:.1e} len {length} near {near.sum()} touch {touches.sum()} slip {(slips!=0).sum()} move {np.abs(step).max():.2e}")
+            inside = cylinder.gaps(self._moved(state))[~near].min(initial=1.0) < 0
+            if size < tolerance and length == 1 and not inside:
+                break
+        else:
+            return None
+        parts = body.force_slopes(state, hypothesis.lame, hypothesis.changes)
+        right = np.zeros((len(by.friction), *body.shape))
+        for slope, part in zip((by.changes, by.moduli, share * by.feet), parts, strict=True):
+            right -= np.tensordot(slope, part, axes=1)
+        slopes = linearised.solve(right) + share * np.tensordot(by.feet, body.feet, axes=1)
+        centre = by.centre + share * by.travel
+        axes = range(1, inner + 1), range(2, inner + 2)
+        moved = np.tensordot(slopes, self._rows, axes=axes)
+        force_slopes = np.zeros((len(slopes), *forces.shape))
+        force_slopes[:, near] = contact.slopes(
+            pressed, moved[:, near], centre, by.friction, before.place_slopes[:, near]
+        )
+        slopes += np.tensordot(force_slopes[:, near].reshape(len(slopes), -1), answers, axes=1)
+        moved = np.tensordot(slopes, self._rows, axes=axes) - centre[:, None]
+        points = self._moved(state)
+        return Stage(
+            share,
+            state,
+            forces,
+            cylinder.places(points),
+            touches,
+            slips,
+            slopes,
+            force_slopes,
+            np.einsum("pmi,mi->pm", moved, cylinder.place_slopes(points)),
+        )
+
+    def _pressed(
+        self, values: FloatArray, hypothesis: Hypothesis, by: HypothesisSlopes, way: list[Stage]
+    ) -> Response:
+        last, into = way[-1], self.unknowns.directions[0]
+        force, force_slopes = last.forces.sum(axis=0), last.force_slopes.sum(axis=1)
+        # Points weigh in the place by the force into the finger; without contact there is none.
+        total = float(force @ into) or 1.0
+        weights = last.forces @ into / total
+        weight_slopes = (last.force_slopes @ into - np.outer(force_slopes @ into, weights)) / total
+        displacements = self._moved(last.state) - self._points
+        axes = range(1, last.slopes.ndim), range(2, last.slopes.ndim + 1)
+        moved = np.tensordot(last.slopes, self._rows, axes=axes)
+        contact, place = weights @ displacements, weights @ self._points
+        contact_slopes = weight_slopes @ displacements + np.einsum("m,pmi->pi", weights, moved)
+        place_slopes = weight_slopes @ self._points
+        motion = self._clamp.motion(
+            (hypothesis.softness, by.softness),
+            (force, force_slopes),
+            (place + contact, place_slopes + contact_slopes),
+        )
+        return Response(
+            values.copy(), hypothesis, last.state, last.slopes, motion, contact, contact_slopes,
+            force, force_slopes, float(place[0]), place_slopes[:, 0], tuple(way),
+        )
+
+
+def response_model(body: Body, unknowns: Unknowns) -> ResponseModel:
+    """The model of the contact that the unknowns have."""
+    return (CylinderModel if "travel" in unknowns.names else ResponseModel)(body, unknowns)
