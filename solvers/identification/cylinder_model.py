@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scipy.sparse import csr_matrix
+
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.cylinder_contact import FRICTION_STEP
@@ -19,10 +21,11 @@ from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes
 from pinnray.solvers.solver import NoSolutionError
 
 DEBUG=0
-NEAR = 0.1
+NEAR = 0.04
 """Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
 FARTHEST = 2.0
 """Longest step of Newton's method over the travel of the stage; a longer one leads astray."""
+ALMOST = 0.015
 ITERATIONS, HALVINGS = 15, 3
 """Newton iterations of a stage, and times that the way to it is halved where they do not settle."""
 
@@ -56,7 +59,8 @@ class CylinderModel(ResponseModel):
     def __init__(self, body: Body, unknowns: Unknowns) -> None:
         super().__init__(body, unknowns)
         self._points = body.front
-        self._rows = body.traction_rows(self._points, np.eye(len(self._points)))
+        rows = body.traction_rows(self._points, np.eye(len(self._points)))
+        self._rows = csr_matrix(rows.reshape(2 * len(self._points), -1))
 
     def unstable(self, response: Response) -> int:
         """As the patch has it, with what touches held along the normal, and what sticks altogether."""
@@ -68,12 +72,8 @@ class CylinderModel(ResponseModel):
         normal = (self._moved(response.state) - cylinder.centre) / cylinder.radius
         along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
         sticks = stage.touches & (stage.slips == 0)
-        rows = np.concatenate(
-            [
-                np.einsum("mi,mi...->m...", way[held], self._rows[held])
-                for way, held in ((normal, stage.touches), (along, sticks))
-            ]
-        )
+        ways = np.concatenate([_held(normal, stage.touches), _held(along, sticks)])
+        rows = (ways @ self._rows).reshape(-1, *self.body.shape)
         negative = there.negative()
         return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
 
@@ -110,7 +110,11 @@ class CylinderModel(ResponseModel):
 
     def _moved(self, state: FloatArray) -> FloatArray:
         """Places of the front, shape (m, 2), mm."""
-        return np.asarray(self._points + np.tensordot(self._rows, state, axes=state.ndim))
+        return np.asarray(self._points + (self._rows @ state.ravel()).reshape(-1, 2))
+
+    def _moves(self, states: FloatArray) -> FloatArray:
+        """Displacements (p, m, 2) of the front by states (p, *shape)."""
+        return np.asarray((self._rows @ states.reshape(len(states), -1).T).T.reshape(len(states), -1, 2))
 
     def _rest(self, hypothesis: Hypothesis, by: HypothesisSlopes) -> Stage:
         cylinder, count = self._cylinder(hypothesis, 0.0), len(self._points)
@@ -145,7 +149,7 @@ class CylinderModel(ResponseModel):
         tolerance: float,
     ) -> Stage | None:
         """The equilibrium at a share of the travel by Newton's method; None where it does not settle."""
-        body, cylinder, inner = self.body, self._cylinder(hypothesis, share), len(self.body.shape)
+        body, cylinder = self.body, self._cylinder(hypothesis, share)
         base = body.feet.any(axis=0)
         state = np.where(base, share * np.tensordot(hypothesis.feet, body.feet, axes=1), guess.state)
         forces, touches, slips = guess.forces, guess.touches, guess.slips
@@ -156,20 +160,19 @@ class CylinderModel(ResponseModel):
                 return None
             points = self._moved(state)
             near = touches | (cylinder.gaps(points) < NEAR * cylinder.radius)
-            rows = self._rows[near].reshape(-1, *body.shape)
-            *answers, relaxing = linearised.solve(np.concatenate([rows, linearised.force[None]]))
-            answers, free = np.array(answers).reshape(rows.shape), state - relaxing
-            compliance = np.tensordot(rows, answers, axes=(range(1, inner + 1), range(1, inner + 1)))
+            rows = self._rows[np.repeat(near, 2)]
+            asked = np.concatenate([rows.toarray().reshape(-1, *body.shape), linearised.force[None]])
+            answers = linearised.solve(asked)
+            answers, free = answers[:-1], state - answers[-1]
+            compliance = rows @ answers.reshape(len(answers), -1).T
             contact = FrontContact(cylinder, compliance, points[near], forces[near], before.places[near])
             loose = self._moved(free)[near]
             pressed = contact.pressed(loose, touches[near], slips[near])
             if pressed is None:
-                pressed = contact.pressed(loose, np.zeros(len(loose), dtype=np.bool_), np.zeros(len(loose)))
-            if pressed is None:
                 return None
             forces, touches, slips = np.zeros_like(forces), np.zeros_like(touches), np.zeros_like(slips)
             forces[near], touches[near], slips[near] = pressed.forces, pressed.touches, pressed.slips
-            load = np.tensordot(pressed.forces.ravel(), rows, axes=1)
+            load = (pressed.forces.ravel() @ rows).reshape(body.shape)
             step = free + np.tensordot(pressed.forces.ravel(), answers, axes=1) - state
             if np.abs(step).max() > longest:
                 return None
@@ -182,7 +185,7 @@ class CylinderModel(ResponseModel):
             state = state + length * step
             if DEBUG: print(f"  {share:.3f} {_} size {size:.1e} len {length} near {near.sum()} touch {touches.sum()} slip {(slips!=0).sum()} move {np.abs(step).max():.2e}")
             inside = cylinder.gaps(self._moved(state))[~near].min(initial=1.0) < 0
-            if size < tolerance and length == 1 and not inside:
+            if size < max(tolerance, min(10 * tolerance, ALMOST)) and length == 1 and not inside:
                 break
         else:
             return None
@@ -192,14 +195,13 @@ class CylinderModel(ResponseModel):
             right -= np.tensordot(slope, part, axes=1)
         slopes = linearised.solve(right) + share * np.tensordot(by.feet, body.feet, axes=1)
         centre = by.centre + share * by.travel
-        axes = range(1, inner + 1), range(2, inner + 2)
-        moved = np.tensordot(slopes, self._rows, axes=axes)
+        moved = self._moves(slopes)
         force_slopes = np.zeros((len(slopes), *forces.shape))
         force_slopes[:, near] = contact.slopes(
             pressed, moved[:, near], centre, by.friction, before.place_slopes[:, near]
         )
         slopes += np.tensordot(force_slopes[:, near].reshape(len(slopes), -1), answers, axes=1)
-        moved = np.tensordot(slopes, self._rows, axes=axes) - centre[:, None]
+        moved = self._moves(slopes) - centre[:, None]
         points = self._moved(state)
         return Stage(
             share,
@@ -223,8 +225,7 @@ class CylinderModel(ResponseModel):
         weights = last.forces @ into / total
         weight_slopes = (last.force_slopes @ into - np.outer(force_slopes @ into, weights)) / total
         displacements = self._moved(last.state) - self._points
-        axes = range(1, last.slopes.ndim), range(2, last.slopes.ndim + 1)
-        moved = np.tensordot(last.slopes, self._rows, axes=axes)
+        moved = self._moves(last.slopes)
         contact, place = weights @ displacements, weights @ self._points
         contact_slopes = weight_slopes @ displacements + np.einsum("m,pmi->pi", weights, moved)
         place_slopes = weight_slopes @ self._points
@@ -242,3 +243,9 @@ class CylinderModel(ResponseModel):
 def response_model(body: Body, unknowns: Unknowns) -> ResponseModel:
     """The model of the contact that the unknowns have."""
     return (CylinderModel if "travel" in unknowns.names else ResponseModel)(body, unknowns)
+
+
+def _held(ways: FloatArray, held: BoolArray) -> FloatArray:
+    """Rows (k, 2 m) of the displacement along directions (m, 2) of the k points of a mask."""
+    rows = np.eye(len(held))[held]
+    return (rows[:, :, None] * ways).reshape(len(rows), 2 * len(ways))

@@ -20,6 +20,10 @@ import numpy as np
 from pinnray.runtime.arrays import BoolArray, FloatArray
 
 
+SWAPS = 8
+"""Times that what touches and slips is guessed from the last guess."""
+
+
 class Cylinder(NamedTuple):
     """A cylinder at a stage of its way."""
 
@@ -112,7 +116,7 @@ class FrontContact:
         before = np.concatenate([touches, touches & (slips != way), touches & (slips == -way)])
         if friction == 0:
             before[count:] = False
-        found = lemke(whole, np.concatenate([gap, np.abs(slip), np.zeros(count)]), before)
+        found = complementary(whole, np.concatenate([gap, np.abs(slip), np.zeros(count)]), before)
         if found is None:
             return None
         q, reserve, forward = found.reshape(3, -1)
@@ -156,47 +160,57 @@ class FrontContact:
         return (pushed @ axes.T + moved @ self._turning.T).reshape(free.shape)
 
 
-def lemke(matrix: FloatArray, offset: FloatArray, guess: BoolArray) -> FloatArray | None:
-    """The solution z ≥ 0 of w = M z + b ≥ 0, z . w = 0, for M (n, n) and b (n,); None where a ray is met.
+def complementary(matrix: FloatArray, offset: FloatArray, guess: BoolArray) -> FloatArray | None:
+    """The solution z ≥ 0 of w = M z + b ≥ 0, z . w = 0, for M (n, n) and b (n,); None where none is found.
 
-    The guess is the mask of the z that are thought to be positive. Source: R. W. Cottle, J.-S. Pang, R. E.
-    Stone, The Linear Complementarity Problem, Academic Press 1992, algorithm 4.4.5.
+    The guess is the mask of the z that are thought to be positive: those that are not, and the w that are
+    negative, change over a few times; where some are left, `lemke` starts anew.
+    """
+    positive, slack = guess.copy(), 1e-12 * float(np.abs(offset).max(initial=0.0))
+    for _ in range(SWAPS):
+        z = np.zeros(len(offset))
+        try:
+            z[positive] = np.linalg.solve(matrix[np.ix_(positive, positive)], -offset[positive])
+        except np.linalg.LinAlgError:
+            break
+        wrong = np.where(positive, z, matrix @ z + offset) < -slack
+        if not wrong.any():
+            return np.maximum(z, 0.0)
+        positive = positive ^ wrong
+    return lemke(matrix, offset)
+
+
+def lemke(matrix: FloatArray, offset: FloatArray) -> FloatArray | None:
+    """As `complementary`, from z = 0; None where a ray is met.
+
+    Source: R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, Academic Press 1992,
+    algorithm 4.4.5.
     """
     count = len(offset)
-    numbers = np.arange(count)
+    extra, size = 2 * count, float(np.abs(offset).max(initial=0.0))
     # Slightly different offsets leave no ties.
-    size = float(np.abs(offset).max())
-    b = offset + 1e-12 * size * (1 + numbers / count)
-    table = np.column_stack([np.eye(count), -matrix, b])  # w - M z = b
-    basis = np.where(guess, count + numbers, numbers)
-    try:
-        table = np.linalg.solve(table[:, basis], table)
-    except np.linalg.LinAlgError:
-        return None
-    extra = 2 * count
-    table = np.column_stack([table[:, :extra], -np.ones(count), table[:, extra]])
-    row, entering = int(table[:, -1].argmin()), extra
-    if table[row, -1] < 0:
-        for _ in range(20 * count):
-            table[row] /= table[row, entering]
-            others = table[:, entering].copy()
-            others[row] = 0.0
-            table -= np.outer(others, table[row])
-            leaving, basis[row] = int(basis[row]), entering
-            if leaving == extra:
-                break
-            entering = leaving + count if leaving < count else leaving - count
-            column = table[:, entering]
-            rises = column > 1e-9
-            if not rises.any():
-                return None
-            ratios = np.where(rises, table[:, -1] / np.where(rises, column, 1.0), np.inf)
-            row = int(ratios.argmin())
-        else:
+    b = offset + 1e-12 * size * (1 + np.arange(count) / count)
+    table = np.column_stack([np.eye(count), -matrix, -np.ones(count), b])  # w - M z - z0 = b
+    basis, row, entering = np.arange(count), int(b.argmin()), extra
+    if b[row] >= 0:
+        return np.zeros(count)
+    for _ in range(20 * count):
+        table[row] /= table[row, entering]
+        others = table[:, entering].copy()
+        others[row] = 0.0
+        table -= np.outer(others, table[row])
+        leaving, basis[row] = int(basis[row]), entering
+        if leaving == extra:
+            found = np.zeros(extra + 1)
+            found[basis] = table[:, -1]
+            return np.maximum(found[count:extra], 0.0)
+        entering = leaving + count if leaving < count else leaving - count
+        column = table[:, entering]
+        rises = column > 1e-9
+        if not rises.any():
             return None
-    found = np.zeros(extra + 1)
-    found[basis] = table[:, -1]
-    return np.maximum(found[count:extra], 0.0)
+        row = int(np.where(rises, table[:, -1] / np.where(rises, column, 1.0), np.inf).argmin())
+    return None
 
 
 def _diagonal(blocks: FloatArray) -> FloatArray:
