@@ -94,14 +94,24 @@ class FrontContact:
     def pressed(self, free: FloatArray, touches: BoolArray, slips: FloatArray) -> Pressed | None:
         """Equilibrium for places Y (m, 2) without forces; None where there is none.
 
-        What touches and slips before, as in `Pressed`, is where the search begins.
+        The search begins with what touched and slipped last, as in `Pressed`.
+        """
+        none = np.zeros(len(touches), dtype=np.bool_)
+        return self._solved(free, self._offset, touches, slips) or self._solved(free, None, none, slips)
+
+    def _solved(
+        self, free: FloatArray, near: FloatArray | None, touches: BoolArray, slips: FloatArray
+    ) -> Pressed | None:
+        """That from gaps and slips near those of equilibrium, (2 m,), by changes of what touches and slips.
+
+        Without them it is by `lemke`.
         """
         count, friction = len(free), self._cylinder.friction
         moved = self._stiffer @ (free - self._points).ravel()
-        gap, slip = (self._offset + self._measured @ moved).reshape(2, -1)
+        loose = self._offset + self._measured @ moved
+        # The way along the cylinder is counted against the slip, which then needs no pivot.
+        way = np.where((loose if near is None else near)[count:] > 0, -1.0, 1.0)
         matrix = (self._measured @ self._answer).reshape(2, count, 2, count)
-        # The way along the cylinder is counted against the slip without forces, which then needs no pivot.
-        way = np.where(slip > 0, -1.0, 1.0)
         matrix[1] *= way[:, None, None]
         matrix[:, :, 1] *= way
         one, none = np.eye(count), np.zeros((count, count))
@@ -113,10 +123,12 @@ class FrontContact:
                 [2 * friction * one, -one, none],
             ]
         )
-        before = np.concatenate([touches, touches & (slips != way), touches & (slips == -way)])
-        if friction == 0:
-            before[count:] = False
-        found = complementary(whole, np.concatenate([gap, np.abs(slip), np.zeros(count)]), before)
+        offset = np.concatenate([loose[:count], -way * loose[count:], np.zeros(count)])
+        if near is None:
+            found = lemke(whole, offset)
+        else:
+            guess = np.concatenate([touches, touches & (slips != way), touches & (slips == -way)])
+            found = swapped(whole, offset, guess)
         if found is None:
             return None
         q, reserve, forward = found.reshape(3, -1)
@@ -160,28 +172,30 @@ class FrontContact:
         return (pushed @ axes.T + moved @ self._turning.T).reshape(free.shape)
 
 
-def complementary(matrix: FloatArray, offset: FloatArray, guess: BoolArray) -> FloatArray | None:
+def swapped(matrix: FloatArray, offset: FloatArray, guess: BoolArray) -> FloatArray | None:
     """The solution z ≥ 0 of w = M z + b ≥ 0, z . w = 0, for M (n, n) and b (n,); None where none is found.
 
     The guess is the mask of the z that are thought to be positive: those that are not, and the w that are
-    negative, change over a few times; where some are left, `lemke` starts anew.
+    negative, change over a few times. The n are q, μ q - t and s⁺ of the points.
     """
-    positive, slack = guess.copy(), 1e-12 * float(np.abs(offset).max(initial=0.0))
+    count = len(offset) // 3
+    positive, slack = guess.copy(), 1e-9 * float(np.abs(offset).max(initial=0.0))
     for _ in range(SWAPS):
         z = np.zeros(len(offset))
         try:
             z[positive] = np.linalg.solve(matrix[np.ix_(positive, positive)], -offset[positive])
         except np.linalg.LinAlgError:
-            break
+            return None
         wrong = np.where(positive, z, matrix @ z + offset) < -slack
         if not wrong.any():
             return np.maximum(z, 0.0)
+        wrong[2 * count :] &= ~wrong[:count]  # what ceases to touch has no friction either
         positive = positive ^ wrong
-    return lemke(matrix, offset)
+    return None
 
 
 def lemke(matrix: FloatArray, offset: FloatArray) -> FloatArray | None:
-    """As `complementary`, from z = 0; None where a ray is met.
+    """As `swapped`, from z = 0; None where a ray is met.
 
     Source: R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, Academic Press 1992,
     algorithm 4.4.5.
