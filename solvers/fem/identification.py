@@ -1,7 +1,7 @@
 """`fem-id`: contact, walls and law from the markers, by finite elements at finite strain with moved walls."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Literal
@@ -26,6 +26,8 @@ from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.thick_body import ThickBody
 from pinnray.solvers.identification.body import Body, Linearised
+from pinnray.solvers.identification.contacts import Contacts, Search
+from pinnray.solvers.identification.cylinder_model import CylinderModel
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
@@ -235,12 +237,16 @@ class FemIdSolver(IdentifyingSolver):
         Fits share the elements; each search starts from the last result. It takes a progress, too. On a fine
         mesh the unknowns are sought on a coarse one first.
         """
-        kept: dict[tuple[Registration, Registration], Identifier | NestedSearch] = {}
+        kept: dict[tuple[Registration, Registration], Search] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
             started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
             if frames not in kept:
-                kept[frames] = self._search(replace(problem, observations=observations))
+                own = replace(problem, observations=observations)
+                sought = [self.unknowns]
+                if problem.load.kind == "cylinder":
+                    sought.insert(0, self.under_cylinder)
+                kept[frames] = Contacts([self._search(own, names) for names in sought])
             found = kept[frames].identify(observations, progress)
             mesh = found.best.model.unknowns.problem.mesh
             stats = {
@@ -253,7 +259,7 @@ class FemIdSolver(IdentifyingSolver):
 
         return fitted
 
-    def _search(self, problem: Problem) -> Identifier | NestedSearch:
+    def _search(self, problem: Problem, names: Sequence[str]) -> Search:
         coarse = coarser(problem)
         if self.sides == "free":
             _check_depth(problem.finger)
@@ -262,11 +268,10 @@ class FemIdSolver(IdentifyingSolver):
         else:
             fine = partial(FemBody, degree=self.degree)
         if coarse is None:
-            return Identifier(self, problem, fine)
-        rough = Identifier(self, coarse, partial(FemBody, degree=self.degree), cost_change=ROUGHLY)
-        return NestedSearch(
-            rough, Identifier(self, problem, fine, flexibility=rough.flexibility), _interpolated
-        )
+            return Identifier(self, problem, fine, names)
+        rough = Identifier(self, coarse, partial(FemBody, degree=self.degree), names, cost_change=ROUGHLY)
+        exact = Identifier(self, problem, fine, names, flexibility=rough.flexibility)
+        return NestedSearch(rough, exact, _interpolated)
 
 
 def _check_depth(finger: Finger | None) -> None:
@@ -281,7 +286,13 @@ def _interpolated(fit: Fit, model: ResponseModel) -> Response:
     if not (isinstance(here, FemBody) and isinstance(there, FemBody | ThickBody)):
         raise TypeError("the bodies of fem-id are finite elements")
     weights = here.space.shape_functions(there.space.mesh.locate_on(here.space.mesh, there.space.nodes))
-    known = np.stack([weights @ values for values in (fit.response.state, *fit.response.slopes)])
-    states = np.zeros((len(known), *there.shape))
-    states[..., :2] = known
-    return replace(fit.response, state=states[0], slopes=states[1:])
+
+    def finer(states: FloatArray) -> FloatArray:
+        found = np.zeros((len(states), *there.shape))
+        found[..., :2] = [weights @ state for state in states]
+        return found
+
+    if isinstance(model, CylinderModel):
+        return model.carried(fit.response, here.front, finer)
+    state, *slopes = finer(np.stack([fit.response.state, *fit.response.slopes]))
+    return replace(fit.response, state=state, slopes=np.array(slopes))

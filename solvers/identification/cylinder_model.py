@@ -5,6 +5,7 @@ stage from them, extrapolated along their derivatives. These are exact, from sta
 touches, sticks and slips held.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +44,7 @@ class Stage:
     slopes: FloatArray  # Of the state, shape (p, *shape)
     force_slopes: FloatArray  # Shape (p, m, 2)
     place_slopes: FloatArray  # Shape (p, m)
+    final: bool = False  # Whether it is only moved to first order, not solved again
 
     def moved(self, step: FloatArray) -> "Stage":
         """The stage after a step of the unknowns, shape (p,), to first order."""
@@ -50,6 +52,7 @@ class Stage:
             self,
             state=self.state + np.tensordot(step, self.slopes, axes=1),
             forces=self.forces + np.tensordot(step, self.force_slopes, axes=1),
+            places=self.places + step @ self.place_slopes,
         )
 
 
@@ -77,6 +80,36 @@ class CylinderModel(ResponseModel):
         negative = there.negative()
         return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
 
+    def carried(
+        self, response: Response, points: FloatArray, finer: Callable[[FloatArray], FloatArray]
+    ) -> Response:
+        """The response of a coarse model, whose front has the points (n, 2), by these elements.
+
+        Of its stages the last two: the last but one, where slip begins, stays that of the coarse elements.
+        """
+        order = points[:, 0].argsort()
+        units = np.eye(len(points))[order].T
+        weights = np.array([np.interp(self._points[:, 0], points[order, 0], unit) for unit in units]).T
+        shared = len(points) / len(weights) * weights  # of a force on more points
+
+        def carried(stage: Stage, *, final: bool) -> Stage:
+            state, *slopes = finer(np.stack([stage.state, *stage.slopes]))
+            return replace(
+                stage,
+                state=state,
+                forces=shared @ stage.forces,
+                places=weights @ stage.places,
+                touches=weights @ stage.touches > 0.5,
+                slips=np.round(weights @ stage.slips),
+                slopes=np.array(slopes),
+                force_slopes=shared @ stage.force_slopes,
+                place_slopes=stage.place_slopes @ weights.T,
+                final=final,
+            )
+
+        before, last = carried(response.way[-2], final=True), carried(response.way[-1], final=False)
+        return replace(response, state=last.state, slopes=last.slopes, way=(before, last))
+
     def _reached(
         self, values: FloatArray, tolerance: float, iterations: int, halvings: int, slopes: FloatArray | None
     ) -> Response | None:
@@ -87,6 +120,9 @@ class CylinderModel(ResponseModel):
         way = [self._rest(hypothesis, by)]
 
         def reached(share: float, near: Stage | None, halvings: int) -> bool:
+            if near is not None and near.final:
+                way.append(near.moved(step))
+                return True
             guesses = [self._ahead(way, share)]
             if near is not None:
                 guesses.insert(0, near.moved(step))

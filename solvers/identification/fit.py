@@ -18,7 +18,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, CYLINDER, LAW_ODDS, SHARE, Unknowns
+from pinnray.solvers.identification.unknowns import CONTACT, CONTACT_ODDS, CYLINDER, LAW_ODDS, SHARE, Unknowns
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
@@ -51,6 +51,11 @@ class Fit(NamedTuple):
         return self.model.unknowns.problem.material.law
 
     @property
+    def contact(self) -> str:
+        """What presses: `cylinder` or `patch`."""
+        return "cylinder" if self.response.way else "patch"
+
+    @property
     def log_evidence(self) -> float:
         """Logarithm of the evidence, up to a constant that all laws share."""
         found = self.estimate
@@ -61,8 +66,9 @@ class Fit(NamedTuple):
 
     @property
     def log_posterior(self) -> float:
-        """Logarithm of the law's probability, up to a constant that all laws share."""
-        return self.log_evidence + float(np.log(LAW_ODDS.get(self.law, 1.0)))
+        """Logarithm of the probability of law and contact, up to a constant that all share."""
+        odds = LAW_ODDS.get(self.law, 1.0) * CONTACT_ODDS[self.contact]
+        return self.log_evidence + float(np.log(odds))
 
     @property
     def standard_errors(self) -> FloatArray:

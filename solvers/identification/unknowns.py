@@ -43,6 +43,10 @@ chapter 5), and in plane strain so does every incompressible body of Mooney and 
 are one there. With odds of 3 to 1, noise decided, and the force of a film was 12 % off."""
 LAWS = tuple(LAW_ODDS)
 
+CONTACT_ODDS = {"cylinder": 150.0, "patch": 1.0}
+"""Odds of the contacts before the markers are seen: who gives a cylinder has seen it, so that very strong
+evidence is asked for a patch, as for a law of `LAW_ODDS`."""
+
 
 def doubt_of_the_plane(problem: Problem, thick: bool) -> float:
     """Deviation of force and stress of a finger with a depth from those of the plane, as a share.
