@@ -294,7 +294,9 @@ def virtual_experiment(
     except UserError as error:
         raise type(error)(f"{error}; or give measurements") from None
     known = replace(
-        no_displacements(problem, marker_radius, experiment_source(problem, truth)), simulated=True
+        no_displacements(problem, marker_radius, experiment_source(problem, truth)),
+        simulated=True,
+        solid=truth.solid,
     )
     seen = np.ones_like(known.visible)
     return replace(known, displacements=true.marker_displacement, visible=seen), true

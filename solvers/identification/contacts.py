@@ -1,19 +1,13 @@
 """The unknowns under each of several contacts, compared by the evidence of the fits."""
 
 from collections.abc import Sequence
-from typing import Protocol
+
+import numpy as np
 
 from pinnray.geometry.observations import Observations
+from pinnray.solvers.identification.nested_search import NestedSearch
 from pinnray.solvers.identification.result import Identified
 from pinnray.solvers.solver import NoSolutionError, Progress, silent
-
-
-class Search(Protocol):
-    """Finds the unknowns for observations; see `Identifier` and `NestedSearch`."""
-
-    def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
-        """The unknowns under every law."""
-        ...
 
 
 class Contacts:
@@ -23,7 +17,7 @@ class Contacts:
         searches: One for each contact.
     """
 
-    def __init__(self, searches: Sequence[Search]) -> None:
+    def __init__(self, searches: Sequence[NestedSearch]) -> None:
         self._searches = searches
 
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
@@ -38,7 +32,8 @@ class Contacts:
         found: list[Identified] = []
         for search in self._searches:
             try:
-                found.append(search.identify(observations, progress))
+                least = max((each.best.log_posterior for each in found), default=-np.inf)
+                found.append(search.identify(observations, progress, least))
             except NoSolutionError as error:
                 reason = error
         if not found:

@@ -21,7 +21,7 @@ from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
 from pinnray.solvers.solver import NoSolutionError
 
-DEBUG=0
+DEBUG = 0
 NEAR = 0.04
 """Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
 FARTHEST = 2.0
@@ -59,8 +59,8 @@ class Stage:
 class CylinderModel(ResponseModel):
     """Responses of a discretised finger to the unknowns of a cylinder; see `ResponseModel`."""
 
-    def __init__(self, body: Body, unknowns: Unknowns) -> None:
-        super().__init__(body, unknowns)
+    def __init__(self, body: Body, unknowns: Unknowns, *, weighed: bool = False) -> None:
+        super().__init__(body, unknowns, weighed=weighed)
         self._points = body.front
         rows = body.traction_rows(self._points, np.eye(len(self._points)))
         self._rows = csr_matrix(rows.reshape(2 * len(self._points), -1))
@@ -219,7 +219,10 @@ class CylinderModel(ResponseModel):
             work = max(abs(float((load * state).sum())), 1e-10)
             size = float(np.sqrt(abs((step * (load - linearised.force)).sum()) / work))
             state = state + length * step
-            if DEBUG: print(f"  {share:.3f} {_} size {size:.1e} len {length} near {near.sum()} touch {touches.sum()} slip {(slips!=0).sum()} move {np.abs(step).max():.2e}")
+            if DEBUG:
+                print(
+                    f"  {share:.3f} {_} size {size:.1e} len {length} near {near.sum()} touch {touches.sum()} slip {(slips != 0).sum()} move {np.abs(step).max():.2e}"
+                )
             inside = cylinder.gaps(self._moved(state))[~near].min(initial=1.0) < 0
             if size < max(tolerance, min(10 * tolerance, ALMOST)) and length == 1 and not inside:
                 break
@@ -271,14 +274,25 @@ class CylinderModel(ResponseModel):
             (place + contact, place_slopes + contact_slopes),
         )
         return Response(
-            values.copy(), hypothesis, last.state, last.slopes, motion, contact, contact_slopes,
-            force, force_slopes, float(place[0]), place_slopes[:, 0], tuple(way),
+            values.copy(),
+            hypothesis,
+            last.state,
+            last.slopes,
+            motion,
+            contact,
+            contact_slopes,
+            force,
+            force_slopes,
+            float(place[0]),
+            place_slopes[:, 0],
+            tuple(way),
         )
 
 
-def response_model(body: Body, unknowns: Unknowns) -> ResponseModel:
+def response_model(body: Body, unknowns: Unknowns, *, weighed: bool) -> ResponseModel:
     """The model of the contact that the unknowns have."""
-    return (CylinderModel if "travel" in unknowns.names else ResponseModel)(body, unknowns)
+    kind = CylinderModel if "travel" in unknowns.names else ResponseModel
+    return kind(body, unknowns, weighed=weighed)
 
 
 def _held(ways: FloatArray, held: BoolArray) -> FloatArray:

@@ -23,8 +23,8 @@ from pinnray.solvers.identification.unknowns import CONTACT, CONTACT_ODDS, CYLIN
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
 SOURCES = {
-    "third dimension": "the third dimension, which plane strain leaves out: take fem-id.sides=free, "
-    "or weigh one press, and multiply the forces of other presses by the ratio of weighed to found",
+    "third dimension": "the third dimension, which plane strain leaves out: take fem-id with a finger that "
+    "has a depth, or weigh one press, and multiply the forces of others by the ratio of weighed to found",
     "markers": "the errors of the markers: film nearer or sharper, or use more markers",
     "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
     "contact": "place, width and pressure of the contact: put markers nearer to it",
@@ -34,6 +34,11 @@ SOURCES = {
     "law": "the choice between the laws: give the law, or press farther",
 }
 """What the variance of a force comes from, and what would narrow its interval."""
+
+
+SIDE_ODDS = 150.0
+"""Of free side faces to plane strain before the markers are seen: what `LAW_ODDS` calls very strong evidence
+is asked for plane strain, which only simulated markers have."""
 
 
 class Fit(NamedTuple):
@@ -66,8 +71,9 @@ class Fit(NamedTuple):
 
     @property
     def log_posterior(self) -> float:
-        """Logarithm of the probability of law and contact, up to a constant that all share."""
+        """Logarithm of the probability of law, contact and side faces, up to a constant that all share."""
         odds = LAW_ODDS.get(self.law, 1.0) * CONTACT_ODDS[self.contact]
+        odds *= SIDE_ODDS if self.model.body.thick else 1.0
         return self.log_evidence + float(np.log(odds))
 
     @property
@@ -104,7 +110,7 @@ class Fit(NamedTuple):
         noise, misfit = float(((found.sensitivities @ spread) ** 2).sum()), 1 - 1 / found.inflation**2
         value = float(self.response.force @ direction)
         parts = dict.fromkeys(SOURCES, 0.0)
-        parts["third dimension"] = (self.model.doubt * value) ** 2
+        parts["third dimension"] = (self.model.doubt.force * value) ** 2
         parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
         for name, part in zip(unknowns.names, spread.tolist(), strict=True):
             contact, frame = name in (*CONTACT, *CYLINDER, SHARE), name.startswith(("pressed", "drawn"))
@@ -121,7 +127,7 @@ def component_of(
     """
     component = float(response.force @ direction)
     spread = response.force_slopes @ direction @ errors
-    return component, float(np.hypot(np.linalg.norm(spread), model.doubt * component))
+    return component, float(np.hypot(np.linalg.norm(spread), model.doubt.force * component))
 
 
 def place_of(unknowns: Unknowns, response: Response, errors: FloatArray) -> tuple[float, float]:

@@ -43,7 +43,9 @@ class Cylinder(NamedTuple):
     def place_slopes(self, points: FloatArray) -> FloatArray:
         """Derivatives of the places by the points, shape (m, 2)."""
         away = points - self.centre
-        return np.asarray(self.radius / (away**2).sum(axis=1)[:, None] * np.stack([-away[:, 1], away[:, 0]], 1))
+        return np.asarray(
+            self.radius / (away**2).sum(axis=1)[:, None] * np.stack([-away[:, 1], away[:, 0]], 1)
+        )
 
 
 class Pressed(NamedTuple):

@@ -27,7 +27,7 @@ from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
-from pinnray.solvers.identification.unknowns import Hypothesis, Unknowns, doubt_of_the_plane
+from pinnray.solvers.identification.unknowns import RESOLVED, Doubt, Hypothesis, Unknowns
 from pinnray.solvers.solver import NoSolutionError
 
 if TYPE_CHECKING:
@@ -58,19 +58,21 @@ class Response:
 
 
 class ResponseModel:
-    """Responses of a discretised finger to the unknowns; each starts from the last one."""
+    """Responses of a discretised finger to the unknowns; each starts from the last one.
 
-    def __init__(self, body: Body, unknowns: Unknowns) -> None:
+    Args:
+        body: The finger.
+        unknowns: Their values are what it responds to.
+        weighed: Whether plane strain and free side faces are weighed by the markers.
+    """
+
+    def __init__(self, body: Body, unknowns: Unknowns, *, weighed: bool = False) -> None:
         self.body, self.unknowns = body, unknowns
+        self.doubt = RESOLVED if weighed else Doubt.of_the_plane(unknowns.problem)
         self._clamp = Clamp(unknowns.problem.mesh)
         self._last: Response | None = None
         self._marker_rows: dict[tuple[bytes, float], tuple[FloatArray, FloatArray]] = {}
         self.evaluations = 0
-
-    @property
-    def doubt(self) -> float:
-        """See `doubt_of_the_plane`."""
-        return doubt_of_the_plane(self.unknowns.problem, self.body.thick)
 
     def flexibility(self) -> float:
         """Displacement of the drawn contact into the finger under a unit force, mm per N/mm."""

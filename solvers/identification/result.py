@@ -44,10 +44,10 @@ PROBABLE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """The fits of all laws to one measurement."""
+    """The fits to one measurement, one for each law in plane strain and with free side faces."""
 
-    fits: Sequence[Fit]  # The most probable law first
-    probabilities: FloatArray  # Of the laws, shape (number of fits,)
+    fits: Sequence[Fit]  # The most probable first
+    probabilities: FloatArray  # Shape (number of fits,)
     # Markers that contradict the others and were not used: number among those seen, and their computed
     # minus their observed displacement, shape (2,), mm
     doubtful: Mapping[int, FloatArray]
@@ -160,6 +160,18 @@ class Identified:
             left_out[marker] = -off
         return missed, left_out
 
+    def _laws(self) -> dict[LawName, float]:
+        """Probability of every law, the most probable fit's first."""
+        found = dict.fromkeys((fit.law for fit in self.fits), 0.0)
+        for fit, probability in zip(self.fits, self.probabilities.tolist(), strict=True):
+            found[fit.law] += probability
+        return found
+
+    def _free_sides(self) -> float | None:
+        """Probability of free side faces; None if they were not weighed against plane strain."""
+        free = np.array([fit.model.body.thick for fit in self.fits])
+        return float(self.probabilities @ free) if free.any() else None
+
     def _contradictions(self) -> list[str]:
         """A clause on each marker that was not believed."""
         return [
@@ -222,11 +234,12 @@ class Identified:
             "force_low": low,
             "force_high": high,
         }
-        for fit, probability in zip(self.fits, self.probabilities, strict=True):
-            numbers |= {
-                f"probability {fit.law}": float(probability),
-                f"log_evidence {fit.law}": fit.log_evidence,
-            }
+        for name, probability in self._laws().items():
+            numbers[f"probability {name}"] = probability
+        for fit in reversed(self.fits):  # that of the best one stays
+            numbers[f"log_evidence {fit.law}"] = fit.log_evidence
+        if (sides := self._free_sides()) is not None:
+            numbers["probability free sides"] = sides
         return numbers | {"doubtful_markers": len(self.doubtful)}
 
     def sentence(self, missed: FloatArray) -> str:
@@ -251,9 +264,14 @@ class Identified:
                 for u, value, (low, high) in columns
             )
         )
-        if len(self.fits) > 1:
-            shares = zip(self.fits, self.probabilities, strict=True)
-            parts.append("law " + ", ".join(f"{fit.law} {share:.1%}" for fit, share in shares) + " probable")
+        if len(laws := self._laws()) > 1:
+            shares = ", ".join(f"{law} {share:.1%}" for law, share in laws.items())
+            parts.append(f"law {shares} probable")
+        seen = self.best.model.unknowns.problem.observations
+        if (sides := self._free_sides()) is not None:
+            parts.append(f"free side faces {sides:.1%} probable, plane strain {1 - sides:.1%}")
+        elif seen is None or not seen.plane:
+            parts.append("in plane strain: the third dimension takes fem-id and a finger with a depth")
         parts += [f"no equilibrium of the {law} law was found near the markers" for law in self.lost]
         parts += [f"{said}: not used" for said in self._contradictions()]
         parts.append(f"markers missed by {np.sqrt((missed**2).mean()):.2g} mm (root mean square)")

@@ -55,6 +55,7 @@ class Identifier:
         names: Of the unknowns; those of the settings by default.
         cost_change: Relative change of the cost below which a search has converged.
         flexibility: Of the finger if it is known, mm per N/mm; see `ResponseModel.flexibility`.
+        weighed: See `ResponseModel`.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class Identifier:
         *,
         cost_change: float = COST_CHANGE,
         flexibility: float | None = None,
+        weighed: bool = False,
     ) -> None:
         self._settings, self._mesh = settings, problem.mesh
         names = settings.unknowns if names is None else names
@@ -74,7 +76,7 @@ class Identifier:
         def model(law: LawName) -> ResponseModel:
             own = replace(problem, material=problem.material.model_copy(update={"law": law}))
             unknowns = Unknowns(own, names)
-            return response_model(body(unknowns), unknowns)
+            return response_model(body(unknowns), unknowns, weighed=weighed)
 
         self.laws = LAWS if settings.law == "evidence" else (problem.material.law,)
         self.model = model
@@ -131,21 +133,22 @@ class Identifier:
             other = self._fits.fit(law, fit.measurement, other)
         return other
 
-    def polished(self, fit: Fit, observations: Observations) -> Fit:
+    def polished(self, fit: Fit, observations: Observations, least: float = -np.inf) -> Fit:
         """A fit after steps of first order, each from an equilibrium, with the derivatives that the fit has.
 
-        Where the steps do not settle, the unknowns are sought from there; where there is no equilibrium
-        either, the fit is marked as inexact.
+        They are computed anew where the steps do not settle. If that does not help, the unknowns are sought
+        from there; where there is no equilibrium either, the fit is marked as inexact.
 
         Args:
             fit: Its response is near equilibrium, with derivatives that are nearly those there.
             observations: Those of the fit.
+            least: Logarithm of the probability below which the first step is the last one.
         """
-        model, start, before = fit.model, fit, np.inf
+        model, start, before, settling = fit.model, fit, np.inf, True
         measurement = self.measurement(observations).only(fit.measurement.kept)
         model.restart(fit.response)
         for _ in range(POLISHES):
-            values, slopes = fit.response.values, fit.response.slopes
+            values, slopes = fit.response.values, fit.response.slopes if settling else None
             response = model.response(values, iterations=20, halvings=0, slopes=slopes)
             if response is None:
                 break
@@ -153,11 +156,9 @@ class Identifier:
             fit = self._fits.shifted(start, measurement)
             step = fit.estimate.z - start.estimate.z
             size = float(np.sqrt(step @ np.linalg.solve(fit.estimate.covariance, step)))
-            if size < POLISHED:
+            if size < POLISHED or fit.log_posterior < least:
                 return fit
-            if size > SHRUNK * before:
-                break
-            before = size
+            settling, before = size < SHRUNK * before, size
         try:
             return self._fits.fit(fit.law, measurement, start)
         except NoSolutionError:

@@ -48,13 +48,29 @@ CONTACT_ODDS = {"cylinder": 150.0, "patch": 1.0}
 evidence is asked for a patch, as for a law of `LAW_ODDS`."""
 
 
-def doubt_of_the_plane(problem: Problem, thick: bool) -> float:
-    """Deviation of force and stress of a finger with a depth from those of the plane, as a share.
+class Doubt(NamedTuple):
+    """Deviations of a finger's force and stress from those of its model, as shares."""
 
-    Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger is
-    in neither state, and its markers do not tell. A body that is only a plane has none, nor a thick one.
-    """
-    return 0.0 if problem.finger is None or thick else 0.5 * problem.material.poisson**2
+    force: float
+    stress: float
+
+    @classmethod
+    def of_the_plane(cls, problem: Problem) -> "Doubt":
+        """Of plane strain alone, where markers are not known to be in it and the finger has a depth.
+
+        Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger
+        is in neither state.
+        """
+        seen = problem.observations
+        if problem.finger is None or (seen is not None and seen.plane):
+            return RESOLVED
+        share = 0.5 * problem.material.poisson**2
+        return cls(share, share)
+
+
+RESOLVED = Doubt(0.01, 0.05)
+"""Where the markers tell plane strain from free side faces, or there are none: what elements of 1 mm and few
+functions of the depth leave on the default finger."""
 
 
 @dataclass(frozen=True, eq=False)

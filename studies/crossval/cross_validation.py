@@ -156,6 +156,7 @@ def _noisy(
             visible=np.ones(len(true), dtype=bool),
             source=f"{source}, with {study.noise:g} mm of noise",
             simulated=True,
+            solid=study.chosen_truths[truth].solid,
             marker_radius=study.design.marker_radius,
             pressed=known,
         )

@@ -109,7 +109,7 @@ class PinnIdSolver(IdentifyingSolver):
         network = Identifier(
             self, problem, self._body, cost_change=COST_CHANGE, flexibility=elements.flexibility
         )
-        search = NestedSearch(elements, network, _projected)
+        search = NestedSearch(elements, _projected, fine=network)
         found = search.identify(_with_error(observations), progress)
         return self._solution(problem, found, started), search, found
 

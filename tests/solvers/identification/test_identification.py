@@ -1,5 +1,6 @@
 """Contact, walls and law from the markers: twin experiments, deviations, other loads."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.model import EXACT
 from pinnray.solvers.identification.search import Identifier
-from pinnray.solvers.identification.unknowns import DEFAULT, PARTS  # type: ignore[attr-defined]
+from pinnray.solvers.identification.unknowns import DEFAULT, PARTS, Doubt  # type: ignore[attr-defined]
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Load
 from tests.solvers.conftest import observed_at
@@ -100,11 +101,15 @@ def test_a_finger_with_a_depth_is_in_no_plane_state(identified):
     """Half of the difference of the plane moduli widens force and stress, also where there is no stress."""
     solution = identified[2]
     field, mesh = solution.field, solution.problem.mesh
-    deep = replace(field, problem=replace(field.problem, finger=Design()))
+    member, share = field.members[0], 0.5 * solution.problem.material.poisson**2
+    member = replace(member, model=copy(member.model))
+    member.model.doubt = Doubt.of_the_plane(replace(field.problem, finger=Design()))
+    assert member.model.doubt == (share, share)
+    deep = replace(field, members=[member, *field.members[1:]])
     there = mesh.at_centroids()
     stress = solution.state(there).von_mises
     usual = np.sqrt(np.average(stress**2, weights=mesh.areas))
-    added = 0.5 * solution.problem.material.poisson**2 * np.hypot(stress, usual)
+    added = share * np.hypot(stress, usual)
     expected = np.hypot(field.von_mises_deviation(there), added)
     np.testing.assert_allclose(deep.von_mises_deviation(there), expected, rtol=1e-9)
 
