@@ -6,22 +6,19 @@ touches, sticks and slips held.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-
 from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
-from pinnray.solvers.cylinder_contact import FRICTION_STEP
 from pinnray.solvers.identification.body import Body
-from pinnray.solvers.identification.front_contact import Cylinder, FrontContact
+from pinnray.solvers.identification.front_contact import Cylinder, FrontContact, Stage
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
 from pinnray.solvers.solver import NoSolutionError
 
-DEBUG = 0
 NEAR = 0.04
 """Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
 FARTHEST = 2.0
@@ -29,31 +26,6 @@ FARTHEST = 2.0
 ALMOST = 0.015
 ITERATIONS, HALVINGS = 15, 3
 """Newton iterations of a stage, and times that the way to it is halved where they do not settle."""
-
-
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """An equilibrium on the way, with derivatives by p unknowns; the front has m points."""
-
-    share: float  # Of the travel
-    state: FloatArray
-    forces: FloatArray  # On the front, shape (m, 2), N/mm
-    places: FloatArray  # Of the front on the cylinder, shape (m,), mm
-    touches: BoolArray  # Shape (m,)
-    slips: FloatArray  # See `Pressed`
-    slopes: FloatArray  # Of the state, shape (p, *shape)
-    force_slopes: FloatArray  # Shape (p, m, 2)
-    place_slopes: FloatArray  # Shape (p, m)
-    final: bool = False  # Whether it is only moved to first order, not solved again
-
-    def moved(self, step: FloatArray) -> "Stage":
-        """The stage after a step of the unknowns, shape (p,), to first order."""
-        return replace(
-            self,
-            state=self.state + np.tensordot(step, self.slopes, axes=1),
-            forces=self.forces + np.tensordot(step, self.force_slopes, axes=1),
-            places=self.places + step @ self.place_slopes,
-        )
 
 
 class CylinderModel(ResponseModel):
@@ -135,8 +107,9 @@ class CylinderModel(ResponseModel):
             return halvings > 0 and reached(middle, None, halvings - 1) and reached(share, None, halvings - 1)
 
         equal = np.arange(1, self.unknowns.stages + 1) / self.unknowns.stages
-        stages = [(each.share, each) for each in known] or [(float(share), None) for share in equal]
-        if not all(reached(share, near, HALVINGS) for share, near in stages):
+        known_or_none: list[Stage | None] = [*known] or [None] * len(equal)
+        shares = [each.share for each in known] or equal.tolist()
+        if not all(reached(share, near, HALVINGS) for share, near in zip(shares, known_or_none, strict=True)):
             return None
         return self._pressed(values, hypothesis, by, way[1:])
 
@@ -219,10 +192,6 @@ class CylinderModel(ResponseModel):
             work = max(abs(float((load * state).sum())), 1e-10)
             size = float(np.sqrt(abs((step * (load - linearised.force)).sum()) / work))
             state = state + length * step
-            if DEBUG:
-                print(
-                    f"  {share:.3f} {_} size {size:.1e} len {length} near {near.sum()} touch {touches.sum()} slip {(slips != 0).sum()} move {np.abs(step).max():.2e}"
-                )
             inside = cylinder.gaps(self._moved(state))[~near].min(initial=1.0) < 0
             if size < max(tolerance, min(10 * tolerance, ALMOST)) and length == 1 and not inside:
                 break

@@ -12,13 +12,12 @@ About known points and forces these are linear complementarity conditions, which
 and slips held, they are equations, whose derivatives are exact.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-
 
 SWAPS = 8
 """Times that what touches and slips is guessed from the last guess."""
@@ -55,6 +54,31 @@ class Pressed(NamedTuple):
     forces: FloatArray  # f, shape (m, 2), N/mm
     touches: BoolArray  # Shape (m,)
     slips: FloatArray  # Sign of t where a point slips, else zero, shape (m,)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """An equilibrium on the way, with derivatives by p unknowns; the front has m points."""
+
+    share: float  # Of the travel
+    state: FloatArray
+    forces: FloatArray  # On the front, shape (m, 2), N/mm
+    places: FloatArray  # Of the front on the cylinder, shape (m,), mm
+    touches: BoolArray  # Shape (m,)
+    slips: FloatArray  # See `Pressed`
+    slopes: FloatArray  # Of the state, shape (p, *shape)
+    force_slopes: FloatArray  # Shape (p, m, 2)
+    place_slopes: FloatArray  # Shape (p, m)
+    final: bool = False  # Whether it is only moved to first order, not solved again
+
+    def moved(self, step: FloatArray) -> "Stage":
+        """The stage after a step of the unknowns, shape (p,), to first order."""
+        return replace(
+            self,
+            state=self.state + np.tensordot(step, self.slopes, axes=1),
+            forces=self.forces + np.tensordot(step, self.force_slopes, axes=1),
+            places=self.places + step @ self.place_slopes,
+        )
 
 
 class FrontContact:
@@ -171,7 +195,8 @@ class FrontContact:
         pushed = rubbed - np.linalg.solve(answer @ ways.T, missed.T).T @ ways
         moved = moved + pushed @ self._answer.T
         axes = np.concatenate(self._axes, axis=1)
-        return (pushed @ axes.T + moved @ self._turning.T).reshape(free.shape)
+        slopes: FloatArray = (pushed @ axes.T + moved @ self._turning.T).reshape(free.shape)
+        return slopes
 
 
 def swapped(matrix: FloatArray, offset: FloatArray, guess: BoolArray) -> FloatArray | None:

@@ -13,7 +13,6 @@ drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,11 +26,9 @@ from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
+from pinnray.solvers.identification.front_contact import Stage
 from pinnray.solvers.identification.unknowns import RESOLVED, Doubt, Hypothesis, Unknowns
 from pinnray.solvers.solver import NoSolutionError
-
-if TYPE_CHECKING:
-    from pinnray.solvers.identification.cylinder_model import Stage
 
 MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""
@@ -54,7 +51,7 @@ class Response:
     force_slopes: FloatArray  # Shape (p, 2)
     place: float  # Abscissa on the drawn front at which it acts, mm
     place_slopes: FloatArray  # Shape (p,)
-    way: tuple["Stage", ...] = ()  # Of a cylinder, from its first stage to this equilibrium
+    way: tuple[Stage, ...] = ()  # Of a cylinder, from its first stage to this equilibrium
 
 
 class ResponseModel:
