@@ -156,6 +156,10 @@ class Unknowns:
         """Of the cylinder, mm."""
         return float(self.problem.load.radius or 0.0)
 
+    def _centre(self, position: float) -> FloatArray:
+        """Of a cylinder that touches the front at an abscissa, mm; zero for another contact."""
+        return touching_centre(self.problem, position) if "travel" in self.names else np.zeros(2)
+
     @property
     def stages(self) -> int:
         """Steps to the full travel, within each of which slip has one direction."""
@@ -219,7 +223,7 @@ class Unknowns:
             force=np.array(sizes) @ self.directions,
             eccentricity=named.get("eccentricity", 0.0),
             couple=named.get("eccentricity", 0.0) * normal * self.directions[0],
-            centre=touching_centre(self.problem, named.get("position", middle)),
+            centre=self._centre(named.get("position", middle)),
             travel=named.get("travel", self._stroke) * self._way,
             friction=named.get("friction", self.problem.load.friction),
             lame=material.lame,
@@ -242,7 +246,7 @@ class Unknowns:
         along = by["shear_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
 
         position, small = named.get("position", self.place[0]), 1e-4 * self.traction.extent
-        ahead, behind = (touching_centre(self.problem, position + way * small) for way in (1, -1))
+        ahead, behind = (self._centre(position + way * small) for way in (1, -1))
         centre_slope = (ahead - behind) / (2 * small)
 
         def stacked(names: Sequence[str]) -> FloatArray:
