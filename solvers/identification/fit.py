@@ -8,7 +8,7 @@ residuals r over φ σ, the sensitivities A and the standardised values z of `Es
 Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
@@ -56,7 +56,7 @@ class Fit(NamedTuple):
         return self.model.unknowns.problem.material.law
 
     @property
-    def contact(self) -> str:
+    def contact(self) -> Literal["cylinder", "patch"]:
         """What presses: `cylinder` or `patch`."""
         return "cylinder" if self.response.way else "patch"
 
