@@ -116,4 +116,4 @@ def checked(job: Job) -> Job:
     if isinstance(job.measurements, Path):
         radius = job.design.marker_radius
         return replace(job, measurements=read_measurements(job.measurements, marker_radius=radius))
-    return job
+    return job if job.measurements else replace(job, load=job.simulated.reached(job.load))

@@ -264,7 +264,7 @@ class FemIdSolver(IdentifyingSolver):
     def _search(self, problem: Problem, names: Sequence[str]) -> NestedSearch:
         coarse, seen = coarser(problem), problem.observations
         plane_seen = seen is not None and seen.plane
-        weighed = self.sides == "weighed" and not plane_seen and _has_depth(problem.finger)
+        weighed = self.sides == "weighed" and not plane_seen and has_depth(problem.finger)
         plane, thick = partial(FemBody, degree=self.degree), partial(ThickBody, degree=self.degree)
         accuracy = ROUGHLY if coarse else COST_CHANGE
         rough = Identifier(self, coarse or problem, plane, names, cost_change=accuracy, weighed=weighed)
@@ -280,7 +280,7 @@ class FemIdSolver(IdentifyingSolver):
         )
 
 
-def _has_depth(finger: Finger | None) -> bool:
+def has_depth(finger: Finger | None) -> bool:
     """Whether a finger has a depth of its own."""
     proposed = isinstance(finger, DrawnFinger) and finger.sources.get("depth") == "proposed"
     return finger is not None and not proposed

@@ -52,6 +52,11 @@ class CylinderModel(ResponseModel):
         negative = there.negative()
         return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
 
+    def extrapolated(self, about: Response, values: FloatArray) -> Response:
+        """See `ResponseModel`; the force, too, is of first order."""
+        force = about.force + (values - about.values) @ about.force_slopes
+        return replace(super().extrapolated(about, values), force=force)
+
     def carried(
         self, response: Response, points: FloatArray, finer: Callable[[FloatArray], FloatArray]
     ) -> Response:
@@ -250,6 +255,8 @@ class CylinderModel(ResponseModel):
             motion,
             contact,
             contact_slopes,
+            float(force @ into),
+            force_slopes @ into,
             force,
             force_slopes,
             float(place[0]),

@@ -18,7 +18,15 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, CONTACT_ODDS, CYLINDER, LAW_ODDS, SHARE, Unknowns
+from pinnray.solvers.identification.unknowns import (
+    CONTACT,
+    CONTACT_ODDS,
+    CYLINDER,
+    INDENTATION,
+    LAW_ODDS,
+    SHARE,
+    Unknowns,
+)
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
@@ -39,6 +47,18 @@ SOURCES = {
 SIDE_ODDS = 150.0
 """Of free side faces to plane strain before the markers are seen: what `LAW_ODDS` calls very strong evidence
 is asked for plane strain, which only simulated markers have."""
+
+
+class FoundParameter(NamedTuple):
+    """An unknown with its standard deviation, interval and resolution; see `Estimate`."""
+
+    name: str
+    unit: str
+    value: float
+    deviation: float
+    low: float
+    high: float
+    resolution: float
 
 
 class Fit(NamedTuple):
@@ -87,6 +107,24 @@ class Fit(NamedTuple):
         return np.asarray(wider * found.slopes[:, None] * np.linalg.cholesky(found.covariance))
 
     @property
+    def parameters(self) -> list[FoundParameter]:
+        """What was found of each unknown; of the indentation, the normal force that goes with it."""
+        found, response = self.estimate, self.response
+        known = zip(found.values.tolist(), found.deviations.tolist(), found.intervals.tolist(), strict=True)
+        listed = []
+        for parameter, (value, deviation, (low, high)), share in zip(
+            found.parameters, known, found.resolution.tolist(), strict=True
+        ):
+            name, unit = parameter.name, parameter.unit
+            if name == INDENTATION:
+                name, unit, value = "normal_force", "N/mm", response.normal
+                slopes = response.normal_slopes * found.slopes
+                deviation = float(np.sqrt(slopes @ found.covariance @ slopes))
+                low, high = value - found.quantile * deviation, value + found.quantile * deviation
+            listed.append(FoundParameter(name, unit, value, deviation, low, high, share))
+        return listed
+
+    @property
     def place(self) -> tuple[float, float] | None:
         """Abscissa on the drawn front at which the force acts, and its standard deviation, mm; if unknown."""
         unknowns = self.model.unknowns
@@ -113,7 +151,8 @@ class Fit(NamedTuple):
         parts["third dimension"] = (self.model.doubt.force * value) ** 2
         parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
         for name, part in zip(unknowns.names, spread.tolist(), strict=True):
-            contact, frame = name in (*CONTACT, *CYLINDER, SHARE), name.startswith(("pressed", "drawn"))
+            contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
+            frame = name.startswith(("pressed", "drawn"))
             parts["contact" if contact else "frames" if frame else "finger"] += part**2
         return parts
 

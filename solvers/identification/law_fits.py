@@ -10,6 +10,7 @@ from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estim
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
+from pinnray.solvers.identification.unknowns import INDENTATION
 from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
 HELD = 1e-3
@@ -120,16 +121,16 @@ class LawFits:
         return Fit(model, found, exact or rough, measurement, exact is not None)
 
     def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
-        """Standardised values with the normal force that a linear finger would need, the rest as expected."""
+        """Standardised values with the indentation that a linear finger would need, the rest as expected."""
         z = np.zeros(len(self._names))
-        if "normal_force" not in self._names:  # a cylinder, whose travel is known
+        if INDENTATION not in self._names:  # a cylinder, whose travel is known
             return z
         at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
         if at_rest is not None:
-            which, noise = self._names.index("normal_force"), markers.measurement.noise
+            which, noise = self._names.index(INDENTATION), markers.measurement.noise
             slope = markers.predicted(at_rest)[1][:, which] / noise
-            force = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
-            z[which] = force / self.parameters[which].scale
+            pressed = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
+            z[which] = pressed / self.parameters[which].scale
         return z
 
     def _holding(self, held: Sequence[str], z: FloatArray) -> list[Parameter]:

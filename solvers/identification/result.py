@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.estimation import LEVEL
+from pinnray.solvers.assimilation.estimation import LEVEL, MIN_RESOLUTION
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.field import (
@@ -223,16 +223,10 @@ class Identified:
             "evaluations": found.evaluations,
             "inflation": found.inflation,
         }
-        columns = zip(
-            found.parameters, found.values, found.deviations, found.intervals, found.resolution, strict=True
-        )
-        for parameter, value, deviation, (low, high), resolution in columns:
-            numbers |= {
-                parameter.name: float(value),
-                f"{parameter.name}_deviation": float(deviation),
-                f"{parameter.name}_low": float(low),
-                f"{parameter.name}_high": float(high),
-                f"{parameter.name}_resolution": float(resolution),
+        for name, _, value, *rest in self.best.parameters:
+            columns = ("deviation", "low", "high", "resolution")
+            numbers |= {name: value} | {
+                f"{name}_{column}": each for column, each in zip(columns, rest, strict=True)
             }
         force, low, high = self.force().force
         numbers |= {
@@ -256,7 +250,7 @@ class Identified:
 
         `missed` are displacements of the markers that were believed, computed minus observed, (m, 2), mm.
         """
-        found, parts = self.best.estimate, []
+        found, parameters, parts = self.best.estimate, self.best.parameters, []
         if not found.converged:
             parts.append("the minimum was not found: take fewer parameters or a smaller prior")
         elif not self.best.exact:
@@ -266,11 +260,9 @@ class Identified:
             )
         force, low, high = self.force().force
         parts.append(f"force {force:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
-        columns = zip(found.parameters, found.values, found.intervals, strict=True)
         parts.append(
             ", ".join(
-                f"{u.name} {value:.4g} ({low:.4g} to {high:.4g}) {u.unit}".rstrip()
-                for u, value, (low, high) in columns
+                f"{u.name} {u.value:.4g} ({u.low:.4g} to {u.high:.4g}) {u.unit}".rstrip() for u in parameters
             )
         )
         if len(laws := self._laws()) > 1:
@@ -294,9 +286,7 @@ class Identified:
                 f"{found.inflation:.3g} times their standard deviations; intervals are as much wider"
             )
         if unresolved := [
-            f"{u.name} ({share:.0%})"
-            for u, share, known in zip(found.parameters, found.resolution, found.resolved, strict=True)
-            if not known
+            f"{u.name} ({u.resolution:.0%})" for u in parameters if u.resolution < MIN_RESOLUTION
         ]:
             parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
         return "; ".join(parts)

@@ -22,7 +22,7 @@ from pinnray.solvers.identification.law_fits import LawFits
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
 from pinnray.solvers.identification.result import Identified
 from pinnray.solvers.identification.settings import IdentifyingSolver
-from pinnray.solvers.identification.unknowns import LAWS, Unknowns
+from pinnray.solvers.identification.unknowns import INDENTATION, LAWS, Unknowns
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
@@ -70,7 +70,8 @@ class Identifier:
         weighed: bool = False,
     ) -> None:
         self._settings, self._mesh = settings, problem.mesh
-        names = settings.unknowns if names is None else names
+        sought = settings.unknowns if names is None else names
+        names = [INDENTATION if name == "normal_force" else name for name in sought]
 
         @cache
         def model(law: LawName) -> ResponseModel:
@@ -144,7 +145,8 @@ class Identifier:
             observations: Those of the fit.
             least: Logarithm of the probability below which the first step is the last one.
         """
-        model, start, before, settling = fit.model, fit, np.inf, True
+        model, start, before = fit.model, fit, np.inf
+        settling = not model.body.thick  # whose derivatives are not those of the plane
         measurement = self.measurement(observations).only(fit.measurement.kept)
         model.restart(fit.response)
         for _ in range(POLISHES):

@@ -92,11 +92,14 @@ class ForceTracker:
         model: The finger, with `normal_force` and `position` among its unknowns.
         points: The m markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of their discs, mm; less is taken where one is nearer to the boundary.
+        stiffness: Of the finger over that of the model.
     """
 
-    def __init__(self, model: ResponseModel, points: FloatArray, radius: float) -> None:
+    def __init__(
+        self, model: ResponseModel, points: FloatArray, radius: float, stiffness: float = 1.0
+    ) -> None:
         self._unknowns, names = model.unknowns, model.unknowns.names
-        self._model, self.law = model, model.unknowns.problem.material.law
+        self._stiffness, self._model, self.law = stiffness, model, model.unknowns.problem.material.law
         self._parameters = model.unknowns.parameters(model.flexibility())
         self._bounds = tuple(np.array([parameter.bounds for parameter in self._parameters]).T)
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
@@ -217,7 +220,7 @@ class ForceTracker:
         errors = found.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(found.covariance)
         response = self._model.extrapolated(self._last.response, values)
         force, across = (
-            _estimated(*component_of(self._model, response, errors, axis))
+            _estimated(*component_of(self._model, response, errors, self._stiffness * axis))
             for axis in stroke_axes(self._unknowns.problem.load)
         )
         place, around = place_of(self._unknowns, response, errors)

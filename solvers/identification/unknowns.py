@@ -22,6 +22,9 @@ from pinnray.solvers.problem import Material, Problem, contact_ends
 CONTACT = ("position", "width", "normal_force", "shear_force", "eccentricity")
 SHARE = "shear_share"
 """Shear over normal force: it takes the place of `shear_force` where friction bounds it."""
+INDENTATION = "indentation"
+"""Mean displacement of the contact into the front: it takes the place of `normal_force` in a search, since a
+force that falls while the finger is pressed farther cannot be prescribed."""
 TRAVEL = 0.2
 """Standard deviation of the travel of a cylinder over the load's stroke."""
 CYLINDER = ("position", "travel", "friction")
@@ -81,6 +84,7 @@ class Hypothesis:
     width: float  # Its length along x, mm
     force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
     eccentricity: float  # Of the normal force from the middle, mm
+    indentation: float  # Mean displacement of the contact into the front where the force follows from it, mm
     couple: FloatArray  # Normal force times its eccentricity, shape (2,), N: the dipole of the traction
     centre: FloatArray  # Of a cylinder where it touches the front, shape (2,), mm
     travel: FloatArray  # Of the cylinder from there, shape (2,), mm
@@ -99,6 +103,7 @@ class HypothesisSlopes(NamedTuple):
     width: FloatArray
     force: FloatArray
     eccentricity: FloatArray
+    indentation: FloatArray
     couple: FloatArray
     centre: FloatArray
     travel: FloatArray
@@ -192,6 +197,7 @@ class Unknowns:
             Parameter("position", "mm", middle, 0.05 * front.extent * prior, *front.ends),
             Parameter("width", "mm", width, log(2.5) * prior, narrowest, logarithmic=True),
             Parameter("normal_force", "N/mm", 0.0, size * prior),
+            Parameter(INDENTATION, "mm", 0.0, 0.5 * front.extent * prior),
             Parameter("shear_force", "N/mm", 0.0, size * prior),
             Parameter("eccentricity", "mm", 0.0, 0.5 * width * prior),
             Parameter("travel", "mm", self._stroke, TRAVEL * self._stroke * prior, 0.1 * self._stroke),
@@ -211,17 +217,18 @@ class Unknowns:
         by_name = {parameter.name: parameter for parameter in [*known, *self._pictures]}
         return [by_name[name] for name in self.names]
 
-    def hypothesis(self, values: FloatArray) -> Hypothesis:
-        """The finger and the contact of values, shape (p,)."""
-        named, material = self._named(values), self.material(values)
+    def hypothesis(self, values: FloatArray, normal: float = 0.0) -> Hypothesis:
+        """The finger and the contact of values, shape (p,), and of a normal force that is none of them."""
+        named, material = {"normal_force": normal} | self._named(values), self.material(values)
         middle, width = self.place
-        normal = named.get("normal_force", 0.0)
+        normal = named["normal_force"]
         sizes = normal, named.get("shear_force", 0.0) + named.get(SHARE, 0.0) * normal
         return Hypothesis(
             position=named.get("position", middle),
             width=named.get("width", width),
             force=np.array(sizes) @ self.directions,
             eccentricity=named.get("eccentricity", 0.0),
+            indentation=named.get(INDENTATION, 0.0),
             couple=named.get("eccentricity", 0.0) * normal * self.directions[0],
             centre=self._centre(named.get("position", middle)),
             travel=named.get("travel", self._stroke) * self._way,
@@ -233,15 +240,19 @@ class Unknowns:
             pictures=pictures_of(self.centre, named),
         )
 
-    def slopes(self, values: FloatArray) -> HypothesisSlopes:
-        """Derivatives of the hypothesis of values, shape (p,)."""
-        named, material = self._named(values), self.material(values)
+    def slopes(
+        self, values: FloatArray, normal: float = 0.0, by_normal: FloatArray | None = None
+    ) -> HypothesisSlopes:
+        """Derivatives of the hypothesis of values, shape (p,), and of a normal force with its own, (p,)."""
+        named, material = {"normal_force": normal} | self._named(values), self.material(values)
         count = len(self.names)
         by: dict[str, FloatArray] = defaultdict(lambda: np.zeros(count))
+        if by_normal is not None:
+            by["normal_force"] = by_normal
         by |= zip(self.names, np.eye(count), strict=True)
         young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
-        normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
+        normal, eccentricity = named["normal_force"], named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
         along = by["shear_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
 
@@ -258,6 +269,7 @@ class Unknowns:
             width=by["width"],
             force=np.stack([by["normal_force"], along], axis=1) @ self.directions,
             eccentricity=by["eccentricity"],
+            indentation=by[INDENTATION],
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
             centre=np.outer(by["position"], centre_slope),
             travel=np.outer(by["travel"], self._way),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-from pinnray.comparison.evaluation.truths import virtual_experiment
+from pinnray.comparison.evaluation.virtual_experiment import virtual_experiment
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.solvers.problem import Load, Material, Problem

@@ -66,7 +66,7 @@ def test_the_variance_of_the_force_is_the_sum_of_what_it_comes_from(identified):
         assert all(part >= 0 for part in parts.values())
         shares[finger is not None] = found.force().shares
         assert sum(found.force().shares.values()) == pytest.approx(1)
-    assert shares[False]["third dimension"] == 0
+    assert shares[False]["third dimension"] < 0.1  # by what few elements leave
     assert next(iter(shares[True])) == "third dimension"
     # The observations of a body without a depth are most of the rest, and no frame was to be found.
     assert shares[False]["markers"] > 0.2
