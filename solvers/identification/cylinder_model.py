@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
-from pinnray.solvers.identification.body import Body
+from pinnray.solvers.identification.body import Body, PressedBody
 from pinnray.solvers.identification.front_contact import Cylinder, FrontContact, Stage
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
@@ -31,7 +31,7 @@ ITERATIONS, HALVINGS = 15, 3
 class CylinderModel(ResponseModel):
     """Responses of a discretised finger to the unknowns of a cylinder; see `ResponseModel`."""
 
-    def __init__(self, body: Body, unknowns: Unknowns, *, weighed: bool = False) -> None:
+    def __init__(self, body: PressedBody, unknowns: Unknowns, *, weighed: bool = False) -> None:
         super().__init__(body, unknowns, weighed=weighed)
         self._points = body.front
         rows = body.traction_rows(self._points, np.eye(len(self._points)))
@@ -267,8 +267,11 @@ class CylinderModel(ResponseModel):
 
 def response_model(body: Body, unknowns: Unknowns, *, weighed: bool) -> ResponseModel:
     """The model of the contact that the unknowns have."""
-    kind = CylinderModel if "travel" in unknowns.names else ResponseModel
-    return kind(body, unknowns, weighed=weighed)
+    if "travel" not in unknowns.names:
+        return ResponseModel(body, unknowns, weighed=weighed)
+    if not isinstance(body, PressedBody):
+        raise TypeError("a cylinder presses bodies of finite elements")
+    return CylinderModel(body, unknowns, weighed=weighed)
 
 
 def _held(ways: FloatArray, held: BoolArray) -> FloatArray:
