@@ -23,9 +23,6 @@ class Contacts:
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
         """The unknowns under every contact and law.
 
-        Evidence is of the same markers: a contact under which more of them contradict the others than under
-        the best one is left out.
-
         Raises:
             UserError: If no contact has a solution.
         """
@@ -38,6 +35,5 @@ class Contacts:
                 reason = error
         if not found:
             raise reason
-        best = min(found, key=lambda each: (len(each.doubtful), -each.best.log_posterior))
-        same = [each for each in found if each.doubtful.keys() == best.doubtful.keys()]
-        return Identified.ranked([fit for each in same for fit in each.fits], best.doubtful, best.lost)
+        best = max(found, key=lambda each: each.best.log_posterior)
+        return Identified.ranked([fit for each in found for fit in each.fits], best.lost)

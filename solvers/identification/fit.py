@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from pinnray.geometry.mesh.boundary import mean_thickness
-from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
@@ -67,7 +67,7 @@ class Fit(NamedTuple):
     model: ResponseModel  # The finger of that law as a function of the unknowns
     estimate: Estimate  # Values, covariance, residuals
     response: Response  # The equilibrium there
-    measurement: MarkerData  # The markers that were believed
+    measurement: MarkerData
     exact: bool  # Whether the equilibrium was found to the last digit, and by the finest discretisation
 
     @property
@@ -84,10 +84,16 @@ class Fit(NamedTuple):
     def log_evidence(self) -> float:
         """Logarithm of the evidence, up to a constant that all laws share."""
         found = self.estimate
-        a, r = found.sensitivities, found.residuals
+        a, r = found.sensitivities[found.kept], found.residuals[found.kept]
         _, volume = np.linalg.slogdet(a.T @ a + np.eye(a.shape[1]))
         misfit = float(r @ r + found.z @ found.z)
-        return -len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
+        wrong = float(self.measurement.errors.log_odds[self.doubted].sum())
+        return wrong - len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
+
+    @property
+    def doubted(self) -> IntArray:
+        """Numbers, among the markers that were seen, of those that were left out as wrong."""
+        return np.flatnonzero(~self.estimate.kept[: 2 * len(self.measurement.points) : 2])
 
     @property
     def log_posterior(self) -> float:
@@ -145,7 +151,8 @@ class Fit(NamedTuple):
         found, unknowns = self.estimate, self.model.unknowns
         slopes = self.response.force_slopes @ direction * found.slopes
         spread = found.quantile / NORMAL * found.covariance @ slopes
-        noise, misfit = float(((found.sensitivities @ spread) ** 2).sum()), 1 - 1 / found.inflation**2
+        noise = float(((found.sensitivities[found.kept] @ spread) ** 2).sum())
+        misfit = 1 - 1 / found.inflation**2
         value = float(self.response.force @ direction)
         parts = dict.fromkeys(SOURCES, 0.0)
         parts["third dimension"] = (self.model.doubt.force * value) ** 2

@@ -18,14 +18,15 @@ drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and
 """
 
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.estimation import Prediction
+from pinnray.solvers.assimilation.estimation import NO_ERRORS, GrossErrors, Prediction
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
 from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
@@ -39,6 +40,8 @@ MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
+WRONG = 100.0
+"""Markers of which one is not where it seems to be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +319,6 @@ class MarkerData:
     displacements: FloatArray  # Shape (m, 2), mm
     deviations: FloatArray  # Their standard deviations, shape (m, 2), mm
     radius: float  # Of the discs over which the displacement is averaged, mm
-    kept: IntArray  # Numbers of the markers among those that were seen, ascending, shape (m,)
     # Force of the indenter along y per depth, with its standard deviation, N/mm
     reaction: tuple[float, float] | None = None
 
@@ -337,20 +339,17 @@ class MarkerData:
             observations.displacements[observations.visible],
             standard_deviations(observations),
             radius_within(mesh, points, observations.marker_radius if radius is None else radius),
-            np.arange(len(points)),
             reaction,
         )
 
-    def only(self, numbers: IntArray) -> "MarkerData":
-        """The measurement of some of its markers, by their numbers among those that were seen."""
-        chosen = np.isin(self.kept, numbers)
-        return replace(
-            self,
-            points=self.points[chosen],
-            displacements=self.displacements[chosen],
-            deviations=self.deviations[chosen],
-            kept=self.kept[chosen],
-        )
+    @property
+    def errors(self) -> GrossErrors:
+        """Markers that may be elsewhere, one in `WRONG`, as far away as the markers are from their middle."""
+        spread = float(np.sqrt(((self.points - self.points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+        if spread == 0:
+            return NO_ERRORS
+        rows = np.arange(2 * len(self.points)).reshape(-1, 2)
+        return GrossErrors(rows, np.log(self.deviations / spread).sum(axis=1) - log(WRONG))
 
     @property
     def observed(self) -> FloatArray:

@@ -66,7 +66,7 @@ class NestedSearch:
         if self._thick is not None and likely and found.best.estimate.inflation < CONTRADICTED:
             least = plane[0].log_posterior - IMPROBABLE
             thick = carried(likely, self._thick, "with free side faces", least)
-        return Identified.ranked([*plane, *thick, *rest], found.doubtful, found.lost)
+        return Identified.ranked([*plane, *thick, *rest], found.lost)
 
     def updated(self, found: Identified, observations: Observations) -> Identified:
         """The unknowns for observations near those of fits, to first order; see `Identifier`."""
