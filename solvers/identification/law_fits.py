@@ -124,7 +124,7 @@ class LawFits:
         return Fit(model, found, exact or rough, measurement, exact is not None)
 
     def _pressed(self, model: ResponseModel, markers: MarkerModel, start: FloatArray) -> FloatArray:
-        """Standardised values with the indentation that a linear finger would need; the start of a cylinder."""
+        """Standardised values with the indentation of a linear finger; a cylinder has the start's travel."""
         z = start.copy()
         if INDENTATION not in self._names:
             return z
