@@ -14,12 +14,10 @@ BENCHMARKS = {
     "fields": "results.fields:loads",
     "friction": "results.fields:friction",
     "fingers": "results.fields:fingers",
-    "fem": "elements.scikit_fem:main",
-    "pinn": "networks.graded:pinn",
-    "designs": "networks.graded:designs",
-    "drawings": "networks.graded:drawings",
-    "contact": "networks.graded:contact",
-    "trained": "networks.graded:trained",
+    "entries": "entries.run:small",
+    "full-entries": "entries.run:full",
+    "page": "entries.run:page",
+    "references": "entries.references:main",
     "scenes": "tracker.scenes:main",
     "stress": "tracker.stress:main",
     "verification": "verification.document:main",
@@ -28,8 +26,8 @@ BENCHMARKS = {
 }
 """Names, and functions that return a table; the modules' docstrings have descriptions and times."""
 
-SHORT = ("fem", "pinn")
-ROWED = ("stress", "reliability")
+SHORT = ("page",)
+ROWED = ("entries", "full-entries", "references", "stress", "reliability")
 
 
 def show(table: RenderableType, console: Console | None = None) -> None:
@@ -43,9 +41,7 @@ def show(table: RenderableType, console: Console | None = None) -> None:
 def main() -> int:
     """Entry of `python -m benchmarks [NAME ...] [--rows WORDS]`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument(
-        "names", nargs="*", metavar="NAME", help=f"{', '.join(BENCHMARKS)}; default: fem pinn"
-    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(BENCHMARKS)}; default: page")
     parser.add_argument("--rows", default="", help=f"words in the names of the rows of {' and '.join(ROWED)}")
     arguments = parser.parse_args()
     for name in arguments.names:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from pinnray.designers import predict as predict
     from pinnray.designers import predict_field as predict_field
     from pinnray.designers import sweep as sweep
+    from pinnray.functions import benchmark as benchmark
     from pinnray.functions import compare as compare
     from pinnray.functions import crossval as crossval
     from pinnray.functions import load_drawing as load_drawing
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from pinnray.solvers.materials.presets import MATERIALS as MATERIALS
     from pinnray.solvers.problem import Problem as Problem
     from pinnray.solvers.registry import solver_names as solver_names
+    from pinnray.studies.benchmark.benchmark import Benchmark as Benchmark
     from pinnray.studies.crossval.result import CrossvalResult as CrossvalResult
     from pinnray.studies.fields.prediction import PredictedField as PredictedField
     from pinnray.studies.optimum.search import Optimum as Optimum

@@ -32,6 +32,7 @@ from pinnray.solvers.solver import Solver, Traits, check_asked, solved, with_law
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pinnray.studies.benchmark.benchmark import Benchmark
     from pinnray.studies.crossval.result import CrossvalResult
 
 
@@ -296,6 +297,54 @@ def crossval(
         found = cross_validate(job, stages)
     for name, message in found.failed.items():
         warnings.warn(f"{name} failed, and is tried again by the same call: {message}", stacklevel=2)
+    return found
+
+
+def benchmark(
+    solvers: str | Sequence[str | Solver] = ("fem", "fem-nonlinear", "pinn-std"),
+    *,
+    preset: str | None = None,
+    problems: str = "small",
+    entries: str | Path | None = None,
+    time_limit: float = 600.0,
+    out: str | Path | None = None,
+    progress: bool | None = None,
+) -> "Benchmark":
+    """Score solvers on a fixed set of problems: accuracy, cost, and whether what they claim is true.
+
+    Args:
+        solvers: Solvers or their names: `benchmark([MySolver()])`.
+        preset: Of the networks among them.
+        problems: The set, `small` or `full`.
+        entries: Folder with entries of others to show beside them.
+        time_limit: Longest time for a problem, s; a solver of a notebook or the calling script has none.
+        out: Folder for the files of `pinnray benchmark`; the same call goes on where it was stopped. None
+            keeps nothing.
+        progress: Whether to show the stages; if None in a notebook only.
+
+    Returns:
+        The entries; `table()` has a row for each of them and problem, with the claims that are not true.
+
+    Raises:
+        UserError: If the benchmark cannot be run, or the folder holds something else.
+    """
+    from pinnray.runtime.stages import shown_stages
+    from pinnray.studies.benchmark.benchmark import BenchmarkJob, run_benchmark
+    from pinnray.studies.benchmark.page import write_benchmark
+
+    with TemporaryDirectory() as folder, shown_stages(progress) as stages:
+        job = BenchmarkJob(
+            solvers=read_solvers(solvers, preset),
+            out=Path(folder) if out is None else as_path(out, "out"),
+            which=problems,
+            time_limit=time_limit,
+            others=None if entries is None else as_path(entries, "entries"),
+        )
+        found = run_benchmark(job, stages)
+        if out is not None:
+            write_benchmark(found, job.out, stages.record())
+    for remark in found.remarks:
+        warnings.warn(remark, stacklevel=2)
     return found
 
 

@@ -18,19 +18,21 @@ drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and
 """
 
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.estimation import Prediction
+from pinnray.solvers.assimilation.estimation import GrossErrors, Prediction
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
 from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
+from pinnray.solvers.identification.front_contact import Stage
 from pinnray.solvers.identification.unknowns import RESOLVED, Doubt, Hypothesis, Unknowns
 from pinnray.solvers.solver import NoSolutionError
 
@@ -38,6 +40,8 @@ MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
+WRONG, OFF = 100.0, 1.0
+"""Markers of which one is not where it seems to be, and the size of its error, mm, or far more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +59,9 @@ class Response:
     normal_slopes: FloatArray  # Shape (p,)
     force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
     force_slopes: FloatArray  # Shape (p, 2)
+    place: float  # Abscissa on the drawn front at which it acts, mm
+    place_slopes: FloatArray  # Shape (p,)
+    way: tuple[Stage, ...] = ()  # Of a cylinder, from its first stage to this equilibrium
 
 
 class ResponseModel:
@@ -135,6 +142,7 @@ class ResponseModel:
             contact=about.contact + step @ about.contact_slopes,
             normal=normal,
             force=hypothesis.force,
+            place=about.place + float(step @ about.place_slopes),
         )
 
     def marker_rows(self, points: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
@@ -293,6 +301,8 @@ class ResponseModel:
             *normal,
             force,
             slope.force,
+            hypothesis.position + hypothesis.eccentricity,
+            slope.position + slope.eccentricity,
         )
 
     def _traction(self, position: float, width: float) -> FloatArray:
@@ -309,7 +319,6 @@ class MarkerData:
     displacements: FloatArray  # Shape (m, 2), mm
     deviations: FloatArray  # Their standard deviations, shape (m, 2), mm
     radius: float  # Of the discs over which the displacement is averaged, mm
-    kept: IntArray  # Numbers of the markers among those that were seen, ascending, shape (m,)
     # Force of the indenter along y per depth, with its standard deviation, N/mm
     reaction: tuple[float, float] | None = None
 
@@ -330,20 +339,14 @@ class MarkerData:
             observations.displacements[observations.visible],
             standard_deviations(observations),
             radius_within(mesh, points, observations.marker_radius if radius is None else radius),
-            np.arange(len(points)),
             reaction,
         )
 
-    def only(self, numbers: IntArray) -> "MarkerData":
-        """The measurement of some of its markers, by their numbers among those that were seen."""
-        chosen = np.isin(self.kept, numbers)
-        return replace(
-            self,
-            points=self.points[chosen],
-            displacements=self.displacements[chosen],
-            deviations=self.deviations[chosen],
-            kept=self.kept[chosen],
-        )
+    @property
+    def errors(self) -> GrossErrors:
+        """Markers that may be elsewhere."""
+        rows = np.arange(2 * len(self.points)).reshape(-1, 2)
+        return GrossErrors(rows, np.log(self.deviations / OFF).sum(axis=1) - log(WRONG))
 
     @property
     def observed(self) -> FloatArray:

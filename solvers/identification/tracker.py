@@ -103,7 +103,7 @@ class ForceTracker:
         self._parameters = model.unknowns.parameters(model.flexibility())
         self._bounds = tuple(np.array([parameter.bounds for parameter in self._parameters]).T)
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
-        measurement = MarkerData(points, still, still, inside, np.arange(len(points)))
+        measurement = MarkerData(points, still, still, inside)
         self._markers = MarkerModel(model, measurement)
         self._of_finger = ~np.isin(names, (*CONTACT, SHARE, *model.unknowns.feet.names))
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))

@@ -97,6 +97,25 @@ def test_a_reversed_u_is_warned_of_at_a_small_stroke(measured, problem):
     assert "u goes against that of fem" in remark
 
 
+def test_a_finger_that_is_pressed_far_is_not_warned_of(measured, problem):
+    """A cylinder of radius 15 mm by 22 mm at x = 45 mm by `fem-nonlinear`: u goes against that of `fem`."""
+    moved = np.array(
+        [
+            (-0.79, -5.35),
+            (-4.43, -5.11),
+            (-3.41, -13.64),
+            (-5.35, -14.23),
+            (-5.11, -20.42),
+            (-4.97, -20.30),
+            (-5.29, -21.89),
+            (-4.70, -21.70),
+            (-5.31, -20.24),
+        ]
+    )
+    far = replace(problem, load=Load(displacement=(None, -22.0), position=45.0))
+    assert displacement_remarks(replace(measured, displacements=moved), far) == []
+
+
 def test_markers_that_hardly_move_in_fem_say_nothing_of_directions(measured, problem):
     only = np.arange(len(measured.points)) == 0
     reversed_ = replace(measured, displacements=-measured.displacements, visible=only)

@@ -136,7 +136,16 @@ def test_a_positive_parameter_has_no_bound_at_zero_or_below() -> None:
 def as_found(sensitivities: FloatArray, inflation: float = 1.0, z: float = 0.0) -> Estimate:
     count, parameters = len(sensitivities), [LENGTH, FACTOR, ONE][: sensitivities.shape[1]]
     places = np.full(len(parameters), z)
-    return Estimate(parameters, places, sensitivities, np.zeros(count), inflation, 1, converged=True)
+    return Estimate(
+        parameters,
+        places,
+        sensitivities,
+        np.zeros(count),
+        np.ones(count, dtype=bool),
+        inflation,
+        1,
+        converged=True,
+    )
 
 
 def test_a_parameter_is_resolved_from_half_of_its_prior_on() -> None:

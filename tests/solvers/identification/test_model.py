@@ -13,18 +13,6 @@ from tests.solvers.conftest import observed_at
 from tests.solvers.identification.twins import NAMES, NOISE, VALUES, model_of, values_of
 
 
-def test_a_measurement_of_some_markers_is_the_one_without_the_others(problem):
-    """A marker that was dropped as doubtful stays dropped where the fit goes on with other deviations."""
-    moved = np.arange(18.0).reshape(9, 2)
-    seen = np.arange(9) != 4
-    observed = replace(observed_at(problem.mesh.markers, moved, NOISE), visible=seen)
-    kept = np.array([0, 2, 3, 6, 7])
-    found = MarkerData.of(problem.mesh, observed, None, None).only(kept)
-    np.testing.assert_array_equal(found.kept, kept)
-    np.testing.assert_array_equal(found.displacements, moved[seen][kept])
-    assert found.noise.shape == (10,)
-
-
 def test_a_last_step_that_turns_a_point_inside_out_is_not_taken(problem, monkeypatch):
     """Its forces are not numbers: once the slopes after it were zero, and a force was found to be 74 % off.
 

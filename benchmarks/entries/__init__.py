@@ -1,0 +1,1 @@
+"""Solvers of other libraries as entries of `pinnray benchmark`, a short file each, and its references."""

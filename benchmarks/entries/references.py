@@ -1,0 +1,87 @@
+"""The references of `pinnray benchmark`: finite elements graded to the corners and the contact; half an hour.
+
+Their error is bounded by the difference between two meshes: it falls at least in proportion to the elements.
+"""
+
+import numpy as np
+from rich.table import Table
+from scipy.spatial import cKDTree
+
+from pinnray.geometry.cache import finger_mesh
+from pinnray.geometry.mesh.boundary import mean_thickness, singular_points
+from pinnray.geometry.mesh.quadrature import body_quadrature
+from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.errors import UserError
+from pinnray.runtime.tables import terminal_table
+from pinnray.solvers.problem import contact_nodes, front_points
+from pinnray.solvers.registry import make_solver
+from pinnray.solvers.solution import Solution
+from pinnray.studies.benchmark.problems import BenchmarkProblem, problem_set
+from pinnray.studies.benchmark.references import MEASURES, Reference, Sampled, packed, unpacked
+
+POINTS = MeshSettings(size=2.0)
+"""Of the mesh with one element across each wall whose quadrature points are the fixed points."""
+FINE, COARSE = (
+    {"size": 0.25, "corner_size": 0.005, "contact_size": 1 / 32},
+    {"size": 0.35, "corner_size": 0.01, "contact_size": 1 / 16},
+)
+"""Elements of a reference, and those that tell its error, mm; at the contact over the contact's width."""
+
+
+def main(rows: str = "") -> Table:
+    """Make the references of the problems whose names hold a text, and keep them."""
+    cells = []
+    for problem in problem_set("full").problems:
+        if rows in problem.name:
+            made = make_reference(problem)
+            made.save(problem.reference_file)
+            cells.append(
+                (problem.name, str(len(made.points)), *(f"{made.bounds[name]:.1e}" for name in MEASURES))
+            )
+    return terminal_table(
+        "Bounds of the references' errors", ("problem", "points", *MEASURES), cells, left=["problem"]
+    )
+
+
+def make_reference(problem: BenchmarkProblem) -> Reference:
+    """Solve a problem on two graded meshes; their difference bounds the error on the finer one.
+
+    Raises:
+        UserError: If a solution does not converge.
+    """
+    fine, coarse = (_graded(problem, sizes) for sizes in (FINE, COARSE))
+    rule = body_quadrature(finger_mesh(problem.finger, settings=POINTS, across=1))
+    points = unpacked(*packed(rule.location.points))
+    singular = np.concatenate([singular_points(fine.problem.mesh), _touched(fine)])
+    away = cKDTree(singular).query(points)[0] > mean_thickness(fine.problem.mesh)
+    unknown = Sampled(np.empty(0), np.empty(0), 0.0, 0.0)
+    place = Reference(points, rule.weights, away, unknown)
+    reference = Reference(points, rule.weights, away, place.sampled(fine))
+    errors = reference.errors(place.sampled(coarse))
+    return Reference(
+        points, rule.weights, away, reference.exact, {name: abs(value) for name, value in errors.items()}
+    )
+
+
+def _graded(problem: BenchmarkProblem, sizes: dict[str, float]) -> Solution:
+    """The solution on elements that are graded to corners and contact."""
+    settings = MeshSettings(
+        size=sizes["size"],
+        corner_size=problem.grading * sizes["corner_size"],
+        contact_size=problem.grading * sizes["contact_size"] * problem.finger.contact_width,
+    )
+    solver = make_solver("fem", estimate=False) if problem.linear else make_solver("fem-nonlinear")
+    solution = solver.solve(problem.made(settings))
+    if not solution.status.converged:
+        raise UserError(f"the reference of {problem.name}: {solution.status.message}")
+    return solution
+
+
+def _touched(solution: Solution) -> FloatArray:
+    """Points of the front that the indenter touches before the load, shape (k, 2), mm."""
+    mesh, contact = solution.problem.mesh, solution.contact
+    drawn = mesh.points[contact_nodes(solution.problem)]
+    if solution.problem.load.kind != "cylinder" or contact is None:
+        return drawn
+    return front_points(mesh, np.linspace(contact.start, contact.end, 100))

@@ -1,0 +1,94 @@
+"""The entries of docs/benchmark.md, run here, and the page's table and picture from all files of entries.
+
+- `entries`: each entry on the small set, an hour; `--rows` chooses some by words in their names.
+- `full-entries`: the same on the full set.
+- `page`: only the page.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from shutil import copy
+from typing import Any
+
+from rich.table import Table
+
+from benchmarks.tables import DOCS, fill, markdown
+from pinnray.runtime.stages import Stages
+from pinnray.runtime.tables import terminal_table
+from pinnray.solvers.registry import make_solver
+from pinnray.studies.benchmark.benchmark import ENTRIES, Benchmark, BenchmarkJob, run_benchmark
+from pinnray.studies.benchmark.entry import load_entries
+from pinnray.studies.benchmark.page import broken_table, summary_table
+from pinnray.studies.benchmark.picture import draw_front
+from pinnray.studies.benchmark.problems import SETS, problem_set
+
+FOLDER, PAGE = DOCS / "benchmark", DOCS / "benchmark.md"
+
+
+def _own(name: str, **settings: Any) -> Callable[[], Any]:
+    return lambda: make_solver(name, **settings)
+
+
+def _outside(place: str, **settings: Any) -> Callable[[], Any]:
+    module, _, name = place.partition(":")
+    return lambda: getattr(import_module(f"benchmarks.entries.{module}"), name)(**settings)
+
+
+ALL: dict[str, tuple[Callable[[], Any], str]] = {
+    "fem": (_own("fem"), ""),
+    "fem-nonlinear": (_own("fem-nonlinear"), ""),
+    "skfem-p1": (_outside("scikit_fem:SkfemEntry", degree=1), ""),
+    "skfem-p2": (
+        _outside("scikit_fem:SkfemEntry"),
+        "SuperLU is in its symmetric mode.",
+    ),
+    "felupe": (
+        _outside("felupe_entry:FelupeEntry"),
+        "A derivative of its quadratic triangle is put right; linear problems are solved by SuperLU.",
+    ),
+    "torch-fem": (_outside("torch_fem:TorchFemEntry"), ""),
+    "pinn-std fast": (_own("pinn-std"), ""),
+    "pinn-std local": (_own("pinn-std", preset="local"), ""),
+    "pinn-std trained": (_own("pinn-std", preset="trained"), ""),
+    "pinn-std paper": (_own("pinn-std", preset="paper"), ""),
+    "deep-energy": (_outside("deep_energy:DeepEnergySolver"), ""),
+    "deep-energy-fourier": (_outside("deep_energy:DeepEnergySolver", features=32), ""),
+    "deepxde": (_outside("deepxde_energy:DeepXdeEntry"), "The energy as its loss is ours."),
+}
+"""How an entry is made, and what differs from its authors' settings."""
+
+
+def run(which: str, rows: str = "", time_limit: float = 600.0) -> Table:
+    """Run entries whose names hold a text, keep their files, and write the page."""
+    out = Path("out") / f"entries-{which}"
+    chosen = {name: entry for name, entry in ALL.items() if rows in name}
+    for name, (make, note) in chosen.items():
+        job = BenchmarkJob(
+            solvers=[make()], out=out, which=which, time_limit=time_limit, notes={name.split()[0]: note}
+        )
+        with Stages() as stages:
+            (entry,) = run_benchmark(job, stages).entries
+        copy(out / ENTRIES / entry.file_name, FOLDER)
+    return page()
+
+
+def page() -> Table:
+    """Write tables and pictures of all entries into the page."""
+    for which in SETS:
+        problems = problem_set(which)
+        entries, _ = load_entries(FOLDER, problems)
+        order = list(ALL)
+        entries.sort(key=lambda each: order.index(each.label) if each.label in order else len(order))
+        found = Benchmark(problems, entries)
+        if entries:
+            draw_front(found).save(DOCS / "pictures" / f"benchmark-{which}.png")
+        for name, table in {"entries": summary_table(found), "broken claims": broken_table(found)}.items():
+            headings = [heading.replace("\n", " ") for heading in table.headings]
+            fill(PAGE, f"{name}: {which}", markdown(headings, table.rows, left=3 if name != "entries" else 1))
+    shown = summary_table(found)
+    return terminal_table(shown.title, shown.headings, shown.rows, left=shown.left)
+
+
+small, full = partial(run, "small"), partial(run, "full")

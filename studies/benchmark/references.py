@@ -1,0 +1,114 @@
+"""References: solutions on graded elements at fixed points, with bounds of their errors; kept in small files.
+
+`python -m benchmarks references` makes them again.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.atomic import atomic_path
+from pinnray.runtime.errors import UserError
+from pinnray.solvers.solution import Solution
+from pinnray.studies.benchmark.problems import BenchmarkProblem
+
+STEPS = 65_535
+MEASURES = ("displacement", "von_mises", "von_mises_away", "force", "energy")
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Displacement (n, 2), mm, von Mises stress (n,), MPa, force, N, and energy, N mm/mm."""
+
+    displacement: FloatArray
+    von_mises: FloatArray
+    force: float
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The solution of a problem at n points, and by how much it may be off."""
+
+    points: FloatArray  #: Shape (n, 2), mm
+    weights: FloatArray  #: Shape (n,), mm²
+    away: BoolArray  #: Whether a point is a wall's thickness away from corners and contact, shape (n,)
+    exact: Sampled
+    bounds: dict[str, float] = field(default_factory=dict)  #: Relative error by `MEASURES`
+
+    def errors(self, found: Sampled) -> dict[str, float]:
+        """Relative errors by `MEASURES`: L2 norms over the body, force and energy with their signs."""
+        return {
+            "displacement": self._l2(found.displacement, self.exact.displacement),
+            "von_mises": self._l2(found.von_mises, self.exact.von_mises),
+            "von_mises_away": self._l2(found.von_mises, self.exact.von_mises, self.away),
+            "force": found.force / self.exact.force - 1,
+            "energy": found.energy / self.exact.energy - 1,
+        }
+
+    def sampled(self, solution: Solution) -> Sampled:
+        """A solution of the problem at the points."""
+        mesh = solution.problem.mesh
+        location = mesh.locate_on(mesh, self.points)  # which may lie beyond its chords of arcs
+        von_mises = solution.state(location).von_mises
+        return Sampled(solution.displacement(location), von_mises, solution.force, float(solution.energy))
+
+    def _l2(self, found: FloatArray, exact: FloatArray, where: BoolArray | slice = slice(None)) -> float:
+        weights = self.weights[where]
+        rows = (values[where].reshape(len(weights), -1) for values in (found - exact, exact))
+        error, size = (float(weights @ (each**2).sum(axis=1)) for each in rows)
+        return float(np.sqrt(error / size))
+
+    def save(self, file: Path) -> None:
+        """Write it compressed; fields and points in 65,535 steps of their range."""
+        fields = {"points": self.points, "u": self.exact.displacement, "von_mises": self.exact.von_mises}
+        arrays: dict[str, NDArray[Any]] = {}
+        for name, values in fields.items():
+            arrays[name], arrays[f"{name}_range"] = packed(values)
+        numbers = [self.exact.force, self.exact.energy, *(self.bounds[name] for name in MEASURES)]
+        with atomic_path(file) as partial, partial.open("wb") as stream:
+            np.savez_compressed(
+                stream,
+                weights=self.weights.astype(np.float32),
+                away=np.packbits(self.away),
+                numbers=numbers,
+                **arrays,
+            )
+
+    @classmethod
+    def load(cls, problem: BenchmarkProblem) -> Self:
+        """The one of a problem.
+
+        Raises:
+            UserError: If its file is missing or damaged.
+        """
+        file = problem.reference_file
+        try:
+            with np.load(file, allow_pickle=False) as stored:
+                arrays = dict(stored)
+        except (OSError, ValueError) as error:
+            raise UserError(f"the reference {file} cannot be read: {error}") from None
+        points, u, von_mises = (
+            unpacked(arrays[name], arrays[f"{name}_range"]) for name in ("points", "u", "von_mises")
+        )
+        force, energy, *bounds = map(float, arrays["numbers"])
+        away = np.unpackbits(arrays["away"], count=len(points)).astype(bool)
+        exact = Sampled(u, von_mises, force, energy)
+        weights = arrays["weights"].astype(np.float64)
+        return cls(points, weights, away, exact, dict(zip(MEASURES, bounds, strict=True)))
+
+
+def packed(values: FloatArray) -> tuple[NDArray[np.uint16], FloatArray]:
+    """Values as whole steps of their range, and the range."""
+    low, high = float(values.min()), float(values.max())
+    return np.round((values - low) / (high - low) * STEPS).astype(np.uint16), np.array([low, high])
+
+
+def unpacked(steps: NDArray[np.uint16], ends: FloatArray) -> FloatArray:
+    """The values of `packed`."""
+    low, high = ends
+    return np.asarray(low + steps * ((high - low) / STEPS))
