@@ -1,7 +1,7 @@
 """`fem-id`: contact, walls and law from the markers, by finite elements at finite strain with moved walls."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Literal
@@ -27,6 +27,8 @@ from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.thick_body import ThickBody
 from pinnray.solvers.identification.body import Body, Linearised
+from pinnray.solvers.identification.contacts import Contacts
+from pinnray.solvers.identification.cylinder_model import CylinderModel
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
@@ -83,6 +85,13 @@ class FemBody:
     def shape(self) -> tuple[int, ...]:
         """(N, 2)."""
         return self._clamped.shape
+
+    @property
+    def front(self) -> FloatArray:
+        """Nodes of the front that are not held."""
+        return self.space.nodes[
+            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
+        ]
 
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""
@@ -230,12 +239,16 @@ class FemIdSolver(IdentifyingSolver):
         Fits share the elements; each search starts from the last result. It takes a progress, too. On a fine
         mesh the unknowns are sought on a coarse one first.
         """
-        kept: dict[tuple[Registration, Registration], NestedSearch] = {}
+        kept: dict[tuple[Registration, Registration], Contacts] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
             started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
             if frames not in kept:
-                kept[frames] = self._search(replace(problem, observations=observations))
+                own = replace(problem, observations=observations)
+                sought = [self.unknowns]
+                if problem.load.kind == "cylinder":
+                    sought.insert(0, self.under_cylinder)
+                kept[frames] = Contacts([self._search(own, names) for names in sought])
             found = kept[frames].identify(observations, progress)
             mesh = found.best.model.unknowns.problem.mesh
             stats = {
@@ -248,16 +261,16 @@ class FemIdSolver(IdentifyingSolver):
 
         return fitted
 
-    def _search(self, problem: Problem) -> NestedSearch:
+    def _search(self, problem: Problem, names: Sequence[str]) -> NestedSearch:
         coarse, seen = coarser(problem), problem.observations
         plane_seen = seen is not None and seen.plane
         weighed = self.sides == "weighed" and not plane_seen and has_depth(problem.finger)
         plane, thick = partial(FemBody, degree=self.degree), partial(ThickBody, degree=self.degree)
         accuracy = ROUGHLY if coarse else COST_CHANGE
-        rough = Identifier(self, coarse or problem, plane, cost_change=accuracy, weighed=weighed)
+        rough = Identifier(self, coarse or problem, plane, names, cost_change=accuracy, weighed=weighed)
 
         def other(there: Problem, body: Callable[[Unknowns], Body]) -> Identifier:
-            return Identifier(self, there, body, flexibility=rough.flexibility, weighed=weighed)
+            return Identifier(self, there, body, names, flexibility=rough.flexibility, weighed=weighed)
 
         return NestedSearch(
             rough,
@@ -279,7 +292,13 @@ def _interpolated(fit: Fit, model: ResponseModel) -> Response:
     if not (isinstance(here, FemBody) and isinstance(there, FemBody | ThickBody)):
         raise TypeError("the bodies of fem-id are finite elements")
     weights = here.space.shape_functions(there.space.mesh.locate_on(here.space.mesh, there.space.nodes))
-    known = np.stack([weights @ values for values in (fit.response.state, *fit.response.slopes)])
-    states = np.zeros((len(known), *there.shape))
-    states[..., :2] = known
-    return replace(fit.response, state=states[0], slopes=states[1:])
+
+    def finer(states: FloatArray) -> FloatArray:
+        found = np.zeros((len(states), *there.shape))
+        found[..., :2] = [weights @ state for state in states]
+        return found
+
+    if isinstance(model, CylinderModel):
+        return model.carried(fit.response, here.front, finer)
+    state, *slopes = finer(np.stack([fit.response.state, *fit.response.slopes]))
+    return replace(fit.response, state=state, slopes=np.array(slopes))

@@ -119,6 +119,13 @@ class ThickBody:
         """(N, D)."""
         return len(self.space.nodes), len(COMPONENT)
 
+    @property
+    def front(self) -> FloatArray:
+        """Nodes of the front that are not held."""
+        return self.space.nodes[
+            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
+        ]
+
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""
         return self._strained(state, changes) is not None

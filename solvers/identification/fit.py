@@ -8,7 +8,7 @@ residuals r over φ σ, the sensitivities A and the standardised values z of `Es
 Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
@@ -18,7 +18,15 @@ from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, INDENTATION, LAW_ODDS, SHARE, Unknowns
+from pinnray.solvers.identification.unknowns import (
+    CONTACT,
+    CONTACT_ODDS,
+    CYLINDER,
+    INDENTATION,
+    LAW_ODDS,
+    SHARE,
+    Unknowns,
+)
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
@@ -68,6 +76,11 @@ class Fit(NamedTuple):
         return self.model.unknowns.problem.material.law
 
     @property
+    def contact(self) -> Literal["cylinder", "patch"]:
+        """What presses: `cylinder` or `patch`."""
+        return "cylinder" if self.response.way else "patch"
+
+    @property
     def log_evidence(self) -> float:
         """Logarithm of the evidence, up to a constant that all laws share."""
         found = self.estimate
@@ -84,8 +97,9 @@ class Fit(NamedTuple):
 
     @property
     def log_posterior(self) -> float:
-        """Logarithm of the probability of law and side faces, up to a constant that all fits share."""
-        odds = LAW_ODDS.get(self.law, 1.0) * (SIDE_ODDS if self.model.body.thick else 1.0)
+        """Logarithm of the probability of law, contact and side faces, up to a constant that all share."""
+        odds = LAW_ODDS.get(self.law, 1.0) * CONTACT_ODDS[self.contact]
+        odds *= SIDE_ODDS if self.model.body.thick else 1.0
         return self.log_evidence + float(np.log(odds))
 
     @property
@@ -144,7 +158,8 @@ class Fit(NamedTuple):
         parts["third dimension"] = (self.model.doubt.force * value) ** 2
         parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
         for name, part in zip(unknowns.names, spread.tolist(), strict=True):
-            contact, frame = name in (*CONTACT, SHARE, INDENTATION), name.startswith(("pressed", "drawn"))
+            contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
+            frame = name.startswith(("pressed", "drawn"))
             parts["contact" if contact else "frames" if frame else "finger"] += part**2
         return parts
 
@@ -163,7 +178,6 @@ def component_of(
 
 def place_of(unknowns: Unknowns, response: Response, errors: FloatArray) -> tuple[float, float]:
     """As `component_of`, the abscissa on the drawn front at which the force acts, mm."""
-    along = np.isin(unknowns.names, ("position", "eccentricity")).astype(np.float64)
     # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
     couple = 0.25 * mean_thickness(unknowns.problem.mesh)
-    return float(along @ response.values), float(np.hypot(np.linalg.norm(along @ errors), couple))
+    return response.place, float(np.hypot(np.linalg.norm(response.place_slopes @ errors), couple))

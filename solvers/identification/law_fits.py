@@ -124,8 +124,10 @@ class LawFits:
         return Fit(model, found, exact or rough, measurement, exact is not None)
 
     def _pressed(self, model: ResponseModel, markers: MarkerModel, start: FloatArray) -> FloatArray:
-        """Standardised values with the indentation that a linear finger would need."""
+        """Standardised values with the indentation of a linear finger; a cylinder has the start's travel."""
         z = start.copy()
+        if INDENTATION not in self._names:
+            return z
         at_rest = model.response(values_of(self.parameters, start)[0])
         if at_rest is not None:
             which, noise = self._names.index(INDENTATION), markers.measurement.noise

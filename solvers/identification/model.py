@@ -32,6 +32,7 @@ from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
+from pinnray.solvers.identification.front_contact import Stage
 from pinnray.solvers.identification.unknowns import RESOLVED, Doubt, Hypothesis, Unknowns
 from pinnray.solvers.solver import NoSolutionError
 
@@ -58,6 +59,9 @@ class Response:
     normal_slopes: FloatArray  # Shape (p,)
     force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
     force_slopes: FloatArray  # Shape (p, 2)
+    place: float  # Abscissa on the drawn front at which it acts, mm
+    place_slopes: FloatArray  # Shape (p,)
+    way: tuple[Stage, ...] = ()  # Of a cylinder, from its first stage to this equilibrium
 
 
 class ResponseModel:
@@ -138,6 +142,7 @@ class ResponseModel:
             contact=about.contact + step @ about.contact_slopes,
             normal=normal,
             force=hypothesis.force,
+            place=about.place + float(step @ about.place_slopes),
         )
 
     def marker_rows(self, points: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
@@ -296,6 +301,8 @@ class ResponseModel:
             *normal,
             force,
             slope.force,
+            hypothesis.position + hypothesis.eccentricity,
+            slope.position + slope.eccentricity,
         )
 
     def _traction(self, position: float, width: float) -> FloatArray:

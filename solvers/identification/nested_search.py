@@ -41,8 +41,13 @@ class NestedSearch:
     ) -> None:
         self._coarse, self._carried, self._fine, self._thick = coarse, carried, fine, thick
 
-    def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
-        """The unknowns under every law, with free side faces and without, and their probabilities."""
+    def identify(
+        self, observations: Observations, progress: Progress = silent, rival: float = -np.inf
+    ) -> Identified:
+        """The unknowns under every law, with free side faces and without, and their probabilities.
+
+        What is far less probable than a rival of a logarithm is not carried to other elements.
+        """
 
         def carried(fits: Sequence[Fit], other: Identifier, said: str, least: float = -np.inf) -> list[Fit]:
             found = []
@@ -54,11 +59,11 @@ class NestedSearch:
             return found
 
         found = self._coarse.identify(observations, lambda share, text: progress(0.6 * share, text))
-        least = found.best.log_posterior - IMPROBABLE
+        least = max(found.best.log_posterior, rival) - IMPROBABLE
         likely = [fit for fit in found.fits if fit.log_posterior > least]
         rest, thick = found.fits[len(likely) :], list[Fit]()
         plane = likely if self._fine is None else carried(likely, self._fine, "finer")
-        if self._thick is not None and found.best.estimate.inflation < CONTRADICTED:
+        if self._thick is not None and likely and found.best.estimate.inflation < CONTRADICTED:
             least = plane[0].log_posterior - IMPROBABLE
             thick = carried(likely, self._thick, "with free side faces", least)
         return Identified.ranked([*plane, *thick, *rest], found.lost)

@@ -80,7 +80,14 @@ class Identified:
             self._mean(places) if places else None,
             shares,
             f"{100 * share:.0f} % of the variance of the force comes from {SOURCES[first]}.",
+            self.best.contact,
         )
+
+    def _cylinder(self) -> float | None:
+        """Probability of the contact of a cylinder; None where the load has none."""
+        if self.best.model.unknowns.problem.load.kind != "cylinder":
+            return None
+        return float(self.probabilities @ np.array([fit.contact == "cylinder" for fit in self.fits]))
 
     def _mean(self, found: Sequence[tuple[float, float]]) -> Estimated:
         """The mean over the laws of a value with its standard deviation by each."""
@@ -222,6 +229,8 @@ class Identified:
             numbers[f"log_evidence {fit.law}"] = fit.log_evidence
         if (sides := self._free_sides()) is not None:
             numbers["probability free sides"] = sides
+        if (cylinder := self._cylinder()) is not None:
+            numbers["probability cylinder"] = cylinder
         return numbers | {"doubtful_markers": len(self.best.doubted)}
 
     def sentence(self, missed: FloatArray) -> str:
@@ -247,6 +256,11 @@ class Identified:
         if len(laws := self._laws()) > 1:
             shares = ", ".join(f"{law} {share:.1%}" for law, share in laws.items())
             parts.append(f"law {shares} probable")
+        if (cylinder := self._cylinder()) is not None:
+            other = "" if cylinder else ", which was not fitted or has no equilibrium there,"
+            parts.append(
+                f"contact of the cylinder{other} {cylinder:.1%} probable, of a patch {1 - cylinder:.1%}"
+            )
         seen = self.best.model.unknowns.problem.observations
         if (sides := self._free_sides()) is not None:
             parts.append(f"free side faces {sides:.1%} probable, plane strain {1 - sides:.1%}")

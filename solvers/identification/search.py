@@ -5,7 +5,7 @@ fit of the largest evidence. From there every other law is fitted, and the laws 
 A marker that makes it larger by being wrong than by being explained is left out.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -15,6 +15,7 @@ from pinnray.geometry.observations import Observations
 from pinnray.solvers.assimilation.estimation import COST_CHANGE
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.body import Body
+from pinnray.solvers.identification.cylinder_model import response_model
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.law_fits import LawFits
 from pinnray.solvers.identification.model import MarkerData, ResponseModel
@@ -43,6 +44,7 @@ class Identifier:
         settings: Unknowns, priors, radius of the markers and reaction.
         problem: The finger; of its load only the drawn contact counts, of its law nothing unless it is given.
         body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
+        names: Of the unknowns; those of the settings by default.
         cost_change: Relative change of the cost below which a search has converged.
         flexibility: Of the finger if it is known, mm per N/mm; see `ResponseModel.flexibility`.
         weighed: See `ResponseModel`.
@@ -53,19 +55,21 @@ class Identifier:
         settings: IdentifyingSolver,
         problem: Problem,
         body: Callable[[Unknowns], Body],
+        names: Sequence[str] | None = None,
         *,
         cost_change: float = COST_CHANGE,
         flexibility: float | None = None,
         weighed: bool = False,
     ) -> None:
         self._settings, self._mesh = settings, problem.mesh
-        names = [INDENTATION if name == "normal_force" else name for name in settings.unknowns]
+        sought = settings.unknowns if names is None else names
+        names = [INDENTATION if name == "normal_force" else name for name in sought]
 
         @cache
         def model(law: LawName) -> ResponseModel:
             own = replace(problem, material=problem.material.model_copy(update={"law": law}))
             unknowns = Unknowns(own, names)
-            return ResponseModel(body(unknowns), unknowns, weighed=weighed)
+            return response_model(body(unknowns), unknowns, weighed=weighed)
 
         self.laws = LAWS if settings.law == "evidence" else (problem.material.law,)
         self.model = model
@@ -110,11 +114,11 @@ class Identifier:
         The feet are held: they would turn far to make up for a contact that is not found yet.
         """
         best: Fit | None = None
-        for position, width in STARTS:
-            contact = {"position": position, "width": width}
-            start = np.array([contact.get(name, 0.0) for name in self._names])
+        contacts = [{"position": position, "width": width} for position, width in STARTS]
+        # A cylinder has no width, so that some are the same.
+        for start in dict.fromkeys(tuple(each.get(name, 0.0) for name in self._names) for each in contacts):
             try:
-                fit = self._fits.fit(law, measurement, start, held=self._feet, rounds=ROUNDS)
+                fit = self._fits.fit(law, measurement, np.array(start), held=self._feet, rounds=ROUNDS)
             except NoSolutionError as error:
                 reason = error
                 continue

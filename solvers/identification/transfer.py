@@ -56,21 +56,22 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
 def _response(model: ResponseModel, start: Response, share: float, shift: float) -> Response:
     """The response at a share of the contact's indentation, the contact shifted along x by mm.
 
-    What grows with the normal force follows it, to a millionth, by iteration.
+    What grows with the normal force follows it, to a millionth, by iteration; a cylinder has that share of
+    its travel, on a way of its own.
     """
     names = model.unknowns.names
-    growing = np.isin(names, ("shear_force", *model.unknowns.feet.names))
     values = start.values.copy()
-    values[names.index(INDENTATION)] *= share
+    values[names.index("travel" if start.way else INDENTATION)] *= share
+    growing = np.isin(names, ("shear_force", *model.unknowns.feet.names))
     if "position" in names:
         values[names.index("position")] += shift
-    model.restart(start)
+    model.restart(None if start.way else start)
     scale = share
     for _ in range(12):
         response = model.response(np.where(growing, scale * values, values), EXACT)
         if response is None:
             break
         before, scale = scale, response.normal / start.normal
-        if abs(scale - before) < 1e-6:
+        if start.way or abs(scale - before) < 1e-6:
             return response
     raise NoSolutionError("no equilibrium of the identified finger was found at the other load")

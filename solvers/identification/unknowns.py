@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import log
+from math import ceil, log
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Parameter
 from pinnray.solvers.assimilation.picture_frames import picture_parameters, pictures_of
+from pinnray.solvers.cylinder_contact import FRICTION_STEP, touching_centre
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
 from pinnray.solvers.identification.boundary import Feet, FrontTraction
 from pinnray.solvers.problem import Material, Problem, contact_ends
@@ -24,6 +25,10 @@ SHARE = "shear_share"
 INDENTATION = "indentation"
 """Mean displacement of the contact into the front: it takes the place of `normal_force` in a search, since a
 force that falls while the finger is pressed farther cannot be prescribed."""
+TRAVEL = 0.2
+"""Standard deviation of the travel of a cylinder over the load's stroke."""
+CYLINDER = ("position", "travel", "friction")
+"""The unknowns of a cylinder, in place of those of `CONTACT`: friction along the way makes its force."""
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson", "feet")
 """What is found unless other names are given; the table of docs/how-to/force.md describes each. `feet` stands
@@ -40,6 +45,10 @@ neo-Hookean law up to strains of 0.3 (L. R. G. Treloar, The physics of rubber el
 chapter 5), and in plane strain so does every incompressible body of Mooney and Rivlin, whose two invariants
 are one there. With odds of 3 to 1, noise decided, and the force of a film was 12 % off."""
 LAWS = tuple(LAW_ODDS)
+
+CONTACT_ODDS = {"cylinder": 150.0, "patch": 1.0}
+"""Odds of the contacts before the markers are seen: who gives a cylinder has seen it, so that very strong
+evidence is asked for a patch, as for a law of `LAW_ODDS`."""
 
 
 class Doubt(NamedTuple):
@@ -74,8 +83,12 @@ class Hypothesis:
     position: float  # Abscissa of the contact's middle, mm
     width: float  # Its length along x, mm
     force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
+    eccentricity: float  # Of the normal force from the middle, mm
     indentation: float  # Mean displacement of the contact into the front where the force follows from it, mm
     couple: FloatArray  # Normal force times its eccentricity, shape (2,), N: the dipole of the traction
+    centre: FloatArray  # Of a cylinder where it touches the front, shape (2,), mm
+    travel: FloatArray  # Of the cylinder from there, shape (2,), mm
+    friction: float  # Its coefficient
     lame: Lame  # Lamé constants, MPa
     changes: FloatArray  # Of the walls' thickness, shape (k,), mm
     softness: float  # Compliance of the base over Young's modulus, mm/MPa
@@ -89,8 +102,12 @@ class HypothesisSlopes(NamedTuple):
     position: FloatArray
     width: FloatArray
     force: FloatArray
+    eccentricity: FloatArray
     indentation: FloatArray
     couple: FloatArray
+    centre: FloatArray
+    travel: FloatArray
+    friction: FloatArray
     moduli: FloatArray
     changes: FloatArray
     softness: FloatArray
@@ -139,6 +156,30 @@ class Unknowns:
         tx, ty = self.traction.tangent(self.place[0])
         return np.array([[ty, -tx], [tx, ty]])
 
+    @property
+    def radius(self) -> float:
+        """Of the cylinder, mm."""
+        return float(self.problem.load.radius or 0.0)
+
+    def _centre(self, position: float) -> FloatArray:
+        """Of a cylinder that touches the front at an abscissa, mm; zero for another contact."""
+        return touching_centre(self.problem, position) if "travel" in self.names else np.zeros(2)
+
+    @property
+    def stages(self) -> int:
+        """Steps to the full travel, within each of which slip has one direction."""
+        return max(4, ceil(self._stroke / (FRICTION_STEP * self.radius) - 1e-9))
+
+    @property
+    def _stroke(self) -> float:
+        """The load's, mm."""
+        return float(np.linalg.norm(self.problem.load.values))
+
+    @property
+    def _way(self) -> FloatArray:
+        """Unit vector along it, shape (2,)."""
+        return np.array([value or 0.0 for value in self.problem.load.displacement]) / self._stroke
+
     def parameters(self, flexibility: float, prior: float = 1.0) -> list[Parameter]:
         """The unknowns with their priors.
 
@@ -159,6 +200,8 @@ class Unknowns:
             Parameter(INDENTATION, "mm", 0.0, 0.5 * front.extent * prior),
             Parameter("shear_force", "N/mm", 0.0, size * prior),
             Parameter("eccentricity", "mm", 0.0, 0.5 * width * prior),
+            Parameter("travel", "mm", self._stroke, TRAVEL * self._stroke * prior, 0.1 * self._stroke),
+            Parameter("friction", "", friction or 0.5, 0.3 * prior, 0.0, max(1.0, 2 * friction)),
             Parameter("base_compliance", "mm", 0.02, log(10) * prior, logarithmic=True),
             Parameter("poisson", "", material.poisson, 0.03 * prior, 0.0, 0.49),
             Parameter("young", "MPa", material.young, 0.3 * prior, logarithmic=True),
@@ -184,8 +227,12 @@ class Unknowns:
             position=named.get("position", middle),
             width=named.get("width", width),
             force=np.array(sizes) @ self.directions,
+            eccentricity=named.get("eccentricity", 0.0),
             indentation=named.get(INDENTATION, 0.0),
             couple=named.get("eccentricity", 0.0) * normal * self.directions[0],
+            centre=self._centre(named.get("position", middle)),
+            travel=named.get("travel", self._stroke) * self._way,
+            friction=named.get("friction", self.problem.load.friction),
             lame=material.lame,
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
@@ -209,6 +256,10 @@ class Unknowns:
         compliance = named.get("base_compliance", 0.0)
         along = by["shear_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
 
+        position, small = named.get("position", self.place[0]), 1e-4 * self.traction.extent
+        ahead, behind = (self._centre(position + way * small) for way in (1, -1))
+        centre_slope = (ahead - behind) / (2 * small)
+
         def stacked(names: Sequence[str]) -> FloatArray:
             """Derivatives (p, k) of k numbers, of which those that are no unknowns have none."""
             return np.array([by[name] for name in names]).reshape(-1, count).T
@@ -217,8 +268,12 @@ class Unknowns:
             position=by["position"],
             width=by["width"],
             force=np.stack([by["normal_force"], along], axis=1) @ self.directions,
+            eccentricity=by["eccentricity"],
             indentation=by[INDENTATION],
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
+            centre=np.outer(by["position"], centre_slope),
+            travel=np.outer(by["travel"], self._way),
+            friction=by["friction"],
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
             changes=stacked(self.motion.names),
             softness=by["base_compliance"] / young - compliance / young**2 * by["young"],
