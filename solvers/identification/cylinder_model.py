@@ -23,6 +23,7 @@ NEAR = 0.04
 """Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
 FARTHEST = 2.0
 """Longest step of Newton's method over the travel of the stage; a longer one leads astray."""
+ALMOST = 0.015
 ITERATIONS, HALVINGS = 15, 3
 """Newton iterations of a stage, and times that the way to it is halved where they do not settle."""
 
