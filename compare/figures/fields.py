@@ -81,15 +81,7 @@ def triangle_values(quantity: FieldQuantity, evaluation: Evaluation) -> FloatArr
 def field_scale(quantity: FieldQuantity, mesh: TriangleMesh, reference: Evaluation) -> ColourScale:
     """The scale that every solver's field is drawn on: it covers the percentile of the reference's area."""
     values = triangle_values(quantity, reference)
-    return symmetric([values], mesh.areas) if quantity.signed else sequential(values, mesh.areas)
-
-
-def difference_scale(
-    quantity: FieldQuantity, mesh: TriangleMesh, evaluation: Evaluation, reference: Evaluation
-) -> ColourScale:
-    """The scale of a solver's difference, its own: beside one that is far away, a near one would be blank."""
-    difference = triangle_values(quantity, evaluation) - triangle_values(quantity, reference)
-    return symmetric([difference], mesh.areas)
+    return symmetric(values, mesh.areas) if quantity.signed else sequential(values, mesh.areas)
 
 
 def compared_with(comparison: Results) -> Evaluation:
@@ -162,13 +154,12 @@ def draw_field(
             note = f"{largest} {significant(np.abs(means).max(), 3)} {quantity.unit}"
             body.panel(axes := next_axes(), canvas, mesh, scale.paint(means), name, note)
             if evaluation is not reference:
-                own = difference_scale(quantity, mesh, evaluation, reference)
+                difference = evaluation.per_triangle(values - base)
+                own = symmetric(difference, mesh.areas)  # or a near solver would be blank beside a far one
                 distance = percent(relative_l2(values, base, reference.weights), 2)
                 title = f"minus {reference.solver}, ±{significant(own.high, 2)} {quantity.unit}"
-                colours = own.paint(evaluation.per_triangle(values - base))
-                body.panel(
-                    axes := next_axes(), canvas, mesh, colours, title, f"rel. L² {distance}", bold=False
-                )
+                colours, said = own.paint(difference), f"rel. L² {distance}"
+                body.panel(axes := next_axes(), canvas, mesh, colours, title, said, bold=False)
         body.scale_bar(axes, extent)
         differences = ColourScale(-1.0, 1.0, mpl.colormaps[DIVERGING])
         legends = [

@@ -85,7 +85,7 @@ def _solver(
         "isReference": is_reference,
         "isTruth": evaluation.solver == TRUTH,
         "scales": {
-            base: [symmetric([difference], mesh.areas).high for difference in own - others]
+            base: [symmetric(difference, mesh.areas).high for difference in own - others]
             for base, others in against.items()
         },
         "contact": [start.tolist(), end.tolist()],
