@@ -135,6 +135,8 @@ def solve(
             check_asked(chosen, elastic, seen)
             with stages.stage("mesh"):
                 triangles = finger_mesh(finger, settings=mesh_settings(size))
+                if seen is not None:
+                    check_positions(seen, triangles)
             problem = Problem(triangles, elastic, moved, seen, finger)
         elif given or any(each is not None for each in others):
             raise UserError(
@@ -142,10 +144,11 @@ def solve(
             )
         else:
             check_asked(chosen, problem.material, problem.observations)
+            if problem.observations is not None:
+                check_positions(problem.observations, problem.mesh)
         problem = replace(problem, material=with_law(problem.material, chosen))
         remarks = [] if problem.finger is None else problem_remarks(problem)  # a closed form has any unit
         if (seen := problem.observations) is not None:
-            check_positions(seen, problem.mesh)
             remarks += displacement_remarks(seen, problem)
         with stages.stage(chosen.name) as report:
             solution = solved(chosen, problem, report)

@@ -37,24 +37,13 @@ def command(
         strokes: Strokes at which to print the force, mm, separated by commas; default: the full one.
         out: VTU file of the fields.
     """
-    from pinnray.comparison.evaluation.certifier import with_certificates
-    from pinnray.comparison.evaluation.deformed_body import with_body_checks
     from pinnray.comparison.evaluation.evaluation import evaluated
     from pinnray.comparison.evaluation.force_curves import force_curves, write_force_displacement
-    from pinnray.comparison.evaluation.plausibility import (
-        check_positions,
-        displacement_remarks,
-        problem_remarks,
-    )
     from pinnray.comparison.figures.force_charts import draw_force_displacement
     from pinnray.comparison.report.output_files import write_vtu
-    from pinnray.geometry.cache import finger_mesh
-    from pinnray.runtime.stages import Stages
+    from pinnray.functions import solve
     from pinnray.solvers.finger_figures import break_answer
-    from pinnray.solvers.problem import Problem
     from pinnray.solvers.registry import make_solver, unknown_solver
-    from pinnray.solvers.solver import check_asked, solved, with_law
-    from pinnray.vision.measurements import read_measurements
 
     if not solver:
         raise UserError(unknown_solver(solver))
@@ -73,35 +62,21 @@ def command(
     if at_strokes and "stops" in made.settings():
         stops = [min(each / travel, 1.0) for each in at_strokes]
         made = make_solver(made.name, **made.settings() | {"stops": stops})
-    given = None
-    if file := existing_table(measurements):
-        given = read_measurements(file, marker_radius=chosen.marker_radius)
-    check_asked(made, material, given)
+    file = existing_table(measurements)
     finger.check_cost(chosen, settings, [made])
-    with Stages() as stages:
-        with stages.stage("mesh"):
-            triangles = finger_mesh(chosen, settings=settings)
-            if given:
-                check_positions(given, triangles)
-        with stages.stage(made.name) as progress:
-            problem = Problem(triangles, with_law(material, made), load, given, chosen)
-            measured = displacement_remarks(given, problem) if given else []
-            for remark in [*problem_remarks(problem), *measured]:
-                say(f"warning: {remark}")
-            solution = solved(made, problem, progress)
-        with stages.stage("certificate"):
-            certified = with_certificates([evaluated(solution, triangles)], problem)
-            (evaluation,), remarks = with_body_checks(certified, triangles)
-        figures = evaluation.figures
-        forces = [(stroke, _force(figures, stroke)) for stroke in at_strokes] if figures else []
-        write_vtu(out, triangles, evaluation)
-        written = [out]
-        if curves := force_curves([evaluation], load):
-            written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
-            write_force_displacement(written[1], curves, depth=chosen.depth)
-            draw_force_displacement(curves, depth=chosen.depth).save(written[2])
-    for remark in [*evaluation.warnings, *remarks]:
-        say(f"warning: {remark}")
+    solution = solve(
+        chosen, made, size=settings, material=material, load=load, measurements=file, progress=True
+    )
+    mesh = solution.problem.mesh
+    evaluation = evaluated(solution, mesh)
+    figures = evaluation.figures
+    forces = [(stroke, _force(figures, stroke)) for stroke in at_strokes] if figures else []
+    write_vtu(out, mesh, evaluation)
+    written = [out]
+    if curves := force_curves([evaluation], load):
+        written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
+        write_force_displacement(written[1], curves, depth=chosen.depth)
+        draw_force_displacement(curves, depth=chosen.depth).save(written[2])
     print(f"{evaluation.label}: {evaluation.message}")
     print(f"energy {solution.energy:.6g} N mm/mm")
     if figures:
