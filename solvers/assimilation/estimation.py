@@ -153,11 +153,6 @@ class Estimate:
         """Resolution of each parameter, shape (p,): 0 where only the prior determines it, up to 1."""
         return np.asarray(1 - np.diagonal(self.covariance))
 
-    @property
-    def resolved(self) -> BoolArray:
-        """Mask of the parameters that the observations determine, shape (p,)."""
-        return np.asarray(self.resolution >= MIN_RESOLUTION)
-
     def residuals_without(self, rows: IntArray) -> FloatArray:
         """Residuals over φ σ of observations left out together, shape (k,): (I - H)^-1 r to first order.
 

@@ -58,10 +58,6 @@ def test_a_picture_of_the_comparison_is_a_png_in_a_notebook(comparison: pr.Compa
     assert comparison.plot(picture)._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
-def test_a_solver_of_the_comparison_by_its_name(comparison: pr.Comparison):
-    assert comparison["fem-asm"].in_sample
-
-
 def test_the_report_is_one_file(comparison: pr.Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     chosen = {name: GALLERY[name] for name in ("overlay", "mesh")}
     monkeypatch.setattr("pinnray.comparison.figures.gallery.GALLERY", chosen)

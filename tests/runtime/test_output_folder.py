@@ -189,11 +189,6 @@ def test_a_link_in_an_unfinished_folder_is_not_followed(tmp_path, place):
     assert tree(mine) == {"thesis.tex": "mine"}
 
 
-def test_a_file_is_not_replaced(out):
-    with pytest.raises(UserError, match="is a file"):
-        check_output(out / "run.json")
-
-
 @pytest.mark.parametrize("inside", [".", "solutions"])
 def test_the_folder_that_one_stands_in_is_not_pulled_away(out, monkeypatch, inside):
     monkeypatch.chdir(out / inside)

@@ -39,12 +39,6 @@ def test_the_body_ends_where_it_ends(canvas: Canvas, mesh: TriangleMesh) -> None
     assert (columns[0], columns[-1]) == pytest.approx((10, 129), abs=1)
 
 
-def test_a_second_picture_is_not_the_first_again(canvas: Canvas, mesh: TriangleMesh) -> None:
-    canvas.picture(halves(mesh), mesh.points)
-    swapped = canvas.picture(halves(mesh)[:, ::-1].copy(), mesh.points)
-    assert at(swapped, 0.55, -0.55) == (*RED[::-1], 255)
-
-
 def test_the_body_is_drawn_where_its_nodes_have_gone(canvas: Canvas, mesh: TriangleMesh) -> None:
     image = canvas.picture(halves(mesh), mesh.points + np.array([0, 0.8]))
     assert at(image, 3, 0.5)[3] == 255

@@ -103,17 +103,6 @@ def test_no_text_leaves_the_page_or_runs_into_another(name, drawings, pages):
     assert pages[name].overlaps() == []
 
 
-def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
-    pinn, failed = (certificate_of(evaluation, mesh) for evaluation in (pinn, failed))
-    more = [replace(pinn, solver=f"pinn-{name}", converged=name != "asm") for name in ("local", "asm", "x")]
-    told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
-    more += [replace(told, solver="gp"), replace(told, solver="statfem", converged=False)]
-    eight = compared(fem, pinn, failed, *more)
-    for name in ("overlay", "marker_errors", "von_mises"):
-        page = page_of(draw(eight, name).figure)
-        assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
-
-
 @pytest.mark.parametrize("width", [85.0, 180.0])
 def test_pictures_for_a_journal_have_its_width_and_type_that_fits(comparison, failed, pinn, width, compared):
     """Nine solvers of long names, most of them not converged, on a column of a journal and on its page."""
@@ -133,12 +122,6 @@ def test_pictures_for_a_journal_have_its_width_and_type_that_fits(comparison, fa
         assert page.largest <= 9
     with pytest.raises(UserError, match="80 to 200 mm"):
         page_width(40.0)
-
-
-def test_a_picture_as_pdf_is_as_wide_as_it_was_asked_for(comparison, tmp_path):
-    path = draw(comparison, "design", page=page_width(85.0)).figure.save(tmp_path / "design.pdf")
-    box = re.search(rb"/MediaBox \[ *0 0 ([\d.]+) ", path.read_bytes())
-    assert float(box[1]) * 25.4 / 72 == pytest.approx(85.0, abs=0.01)
 
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors", *FIELDS])

@@ -350,19 +350,6 @@ def test_numbers_of_numpy_are_no_obstacle(job):
     assert told["energy"] == pytest.approx(told["certificate"]["fem_energy"], rel=1e-6)  # single precision
 
 
-def test_a_solver_that_did_not_converge_is_marked_and_what_is_not_a_number_is_null(job):
-    def stops(solution: Solution) -> Solution:
-        status = Status(False, "stopped after 20 steps; try more")
-        return replace(solution, status=status, stats={"seconds": np.nan})
-
-    asked = job(Scripted("first", stops))
-    compare(asked)
-    told = strictly(asked.out / "metrics.json")["solvers"]["first"]
-    assert (told["status"], told["message"]) == ("not converged", "stopped after 20 steps; try more")
-    assert told["seconds"] is None
-    assert rows_of(asked.out / "summary.csv")[0]["converged"] == "0"
-
-
 def test_a_result_that_its_solver_believes_in_but_finite_elements_do_not_is_marked(job, monkeypatch):
     """Linear elements on a coarse mesh: in JSON, both CSV files, report, fields and what pictures get."""
     drawn = []

@@ -85,13 +85,6 @@ def test_it_asks_for_nothing_from_outside(content: Results, tmp_path: Path) -> N
     assert {link[0] for link in Page(html).values("href")} == {"#"}
 
 
-def test_measured_displacements_are_not_called_simulated(content, observe, fem):
-    assert "simulated" in page_of(content).values("id")
-    page = page_of(content, observations=observe(fem.marker_displacement, simulated=False, hidden=(0,)))
-    assert "simulated" not in page.values("id")
-    assert "simulated" not in page.text.lower()
-
-
 @pytest.mark.parametrize(("kind", "warned"), [("point", True), ("mean", False)])
 def test_a_point_load_is_said_to_have_no_limit(content: Results, kind: str, warned: bool) -> None:
     assert ("point-load" in page_of(content, load=Load(kind=kind)).values("id")) is warned

@@ -4,10 +4,8 @@ import json
 import math
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.certifier import with_certificates
@@ -65,18 +63,6 @@ def test_the_numbers_are_those_of_the_solvers(numbers, pinn):
     told = told["pinn-std"]
     assert (told["energy"], told["reaction"]) == (pinn.energy, pinn.reaction.tolist())
     assert (told["seconds"], told["stats"]["unknowns"]) == (1.25, 450)
-
-
-def test_held_out_errors_are_those_of_markers_that_the_solver_was_not_given(numbers, fem, pinn):
-    told = numbers(evaluations=[fem, replace(pinn, in_sample=True)])["solvers"]
-    assert [told[name]["markers"]["in_sample"] for name in ("fem", "pinn-std")] == [False, True]
-    assert told["pinn-std"]["held_out"] is None
-    left_out = replace(pinn, in_sample=True, left_out=fem.marker_displacement + np.array([0.0, 0.1]))
-    told = numbers(evaluations=[fem, left_out])["solvers"]
-    assert told["pinn-std"]["held_out"]["mae_u"] == pytest.approx(0.3)
-    assert told["pinn-std"]["held_out"]["mae_v"] == pytest.approx(0.5)
-    same = {name: value for name, value in told["fem"]["markers"].items() if name != "in_sample"}
-    assert told["fem"]["held_out"] == same
 
 
 def test_without_dolfinx_no_result_is_certified_and_a_warning_says_so(estimated, mesh, monkeypatch):

@@ -12,7 +12,6 @@ from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
 import pytest
-import pyvista
 
 from pinnray.cli import compare_main, main
 from pinnray.geometry.cache import cad_files, finger_mesh
@@ -269,27 +268,6 @@ def test_a_terminal_in_ascii_shows_what_it_lacks_as_question_marks(monkeypatch):
         assert b"?" in terminal.buffer.getvalue()
 
 
-def test_a_broken_plug_in_is_one_line_among_the_solvers(tmp_path, capsys, monkeypatch):
-    info = tmp_path / "broken-0.1.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 0.1\n")
-    (info / "entry_points.txt").write_text("[pinnray.solvers]\nbroken = no_such_module:Solver\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    assert main(["solvers"]) == 0
-    output = capsys.readouterr()
-    assert "│ fem " in output.out
-    assert output.err.startswith("warning: solver 'broken' is left out: ")
-    assert output.err.count("\n") == 1
-
-
-def test_one_solver_alone(folder, capsys):
-    assert main(["solve", "fem", "--mesh-size", "1.0", "--out", "fields/fem.vtu"]) == 0
-    _, energy, *_, file = capsys.readouterr().out.splitlines()
-    assert energy.startswith("energy 1.11")
-    assert file == "fields/fem.vtu"
-    assert pyvista.read("fields/fem.vtu").n_cells > 1000
-
-
 def test_one_solver_that_follows_the_load_has_its_forces_beside_the_fields(folder, capsys):
     options = "--mesh-size 1.0 --load patch --slide --stroke 2 --law st-venant-kirchhoff"
     assert main(["solve", "fem-nonlinear", *options.split(), "--out", "fields/pressed.vtu"]) == 0
@@ -373,15 +351,6 @@ def test_a_tolerance_that_is_missed_ends_with_its_own_code(folder, monkeypatch, 
     assert main([*SMALL, *options]) == NOT_CONVERGED
     assert "error: the markers are known to 0.01" in capsys.readouterr().err
     assert len(Path("adapted/adapt.csv").read_text(encoding="utf-8").splitlines()) == 3
-
-
-def test_solve_gives_the_markers_to_a_solver_that_assimilates(tmp_path, capsys):
-    markers = tmp_path / "markers.csv"
-    markers.write_text("x_mm,y_mm,u_mm,v_mm\n50,-1,-1.5,-8.5\n85,-1,-2,-0.5\n")
-    out = tmp_path / "pulled.vtu"
-    options = ["--mesh-size", "1.0", "--measurements", str(markers), "--out", str(out)]
-    assert main(["solve", "fem-asm", *options]) == 0
-    assert out.exists()
 
 
 @pytest.mark.parametrize(("given", "threads"), [("", {1}), ("OPENBLAS_NUM_THREADS=2", {2})])

@@ -1,13 +1,10 @@
 """`compare --from`: a run is repeated from its run.json, and a file of options is read or refused."""
 
 import json
-import shutil
-from pathlib import Path
 
 import pytest
 
 from pinnray.cli import compare_main
-from pinnray.runtime.exits import BAD_INPUT
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("few_elements_throughout", "without_pictures")]
 
@@ -52,15 +49,3 @@ def test_other_versions_and_inputs_are_noted(first, tmp_path, capsys):
     versions, inputs = capsys.readouterr().err.splitlines()
     assert "run.json was made with numpy 0.9 (now" in versions
     assert inputs.endswith("run.json: design")
-
-
-def test_a_folder_that_is_not_named_keeps_the_finished_run_of_another_job(
-    first, tmp_path, monkeypatch, capsys
-):
-    """A job is the same whether a default is given or not, and in whatever formats its pictures are."""
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(first, Path("out") / "default-rib_count-3")
-    assert compare_main([*SMALL, "--stroke", "3"]) == BAD_INPUT
-    assert "holds the finished run of another job (other stroke)" in capsys.readouterr().err
-    assert compare_main([*SMALL, "--design", "default", "--stroke", "10", "--pictures", "svg"]) == 0
-    assert compare_main([*SMALL, "--stroke", "3", "--out", "out/default-rib_count-3"]) == 0

@@ -77,7 +77,7 @@ def test_what_is_not_observed_is_held_by_its_prior(slopes):
     np.testing.assert_allclose(found.values, [0.3, 0.3, 5.0], atol=1e-5)
     np.testing.assert_allclose(found.resolution, [0.5, 0.5, 1.0], atol=1e-5)
     nothing = fitted(0 * slopes, np.zeros(COUNT), 1.0, parameters)
-    assert not nothing.resolved.any()
+    assert (nothing.resolution < 0.5).all()
     np.testing.assert_allclose(nothing.deviations, 1.0)
 
 
@@ -165,14 +165,6 @@ def as_found(sensitivities: FloatArray, inflation: float = 1.0, z: float = 0.0) 
         1,
         converged=True,
     )
-
-
-def test_a_parameter_is_resolved_from_half_of_its_prior_on() -> None:
-    """With the sensitivity s of one observation the prior's variance falls to 1 / (1 + s²)."""
-    for sensitivity, resolved in ((0.9, False), (1.0, True), (1.1, True)):
-        found = as_found(np.array([[sensitivity]]))
-        assert found.resolution == pytest.approx([sensitivity**2 / (1 + sensitivity**2)], rel=1e-12)
-        assert found.resolved.tolist() == [resolved]
 
 
 @pytest.mark.parametrize("inflation", [1.0, 1.5])

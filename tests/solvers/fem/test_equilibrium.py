@@ -70,19 +70,6 @@ def test_balance_with_a_cylinder_has_its_tangent_as_derivative():
     np.testing.assert_allclose(slopes(left), 2, atol=0.1)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_a_rotated_body_has_the_same_energy_and_rotated_forces(law):
-    problem = equilibrium(law)
-    (start,) = fields(problem, 0)
-    nodes, angle = problem.elements.space.nodes, 1.2
-    q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    turned = (nodes + start) @ q.T - nodes
-    assert problem.energy(turned) == pytest.approx(problem.energy(start), rel=1e-10)
-    np.testing.assert_allclose(
-        problem.internal_force(turned), problem.internal_force(start) @ q.T, atol=1e-10
-    )
-
-
 def newton(problem: DiscreteEquilibrium, iterations: int = 12) -> ConstrainedNewton:
     return ConstrainedNewton(problem, 1e-8, iterations)
 

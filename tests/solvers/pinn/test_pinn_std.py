@@ -65,14 +65,6 @@ def test_shares_are_those_of_the_gates_applied_from_the_bottom_up(tree, points):
     torch.testing.assert_close(tree.values(points, everyone) @ given, mixed(0), rtol=0, atol=1e-12)
 
 
-def test_shares_sum_to_one_and_their_slopes_to_zero(tree, points):
-    (near,) = tree.near(boxes_around([points[:1]]))
-    shares, slopes = tree.values_and_gradients(points[:1], near)
-    assert len(near) < tree.count
-    assert shares.sum().item() == pytest.approx(1, abs=windows.NEGLIGIBLE * tree.count)
-    assert slopes.sum(dim=2).abs().max() < 1e-4
-
-
 def test_encoders_that_are_left_out_have_a_negligible_share(tree, points):
     patch = 4 + 0.05 * points
     shares = tree.values(patch, torch.arange(tree.count))
