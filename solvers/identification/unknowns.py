@@ -121,7 +121,7 @@ class Unknowns:
 
     Args:
         problem: It has the values of everything else; its load only gives the drawn contact, or a cylinder
-            and its way, and the friction, its observations only how well the frames of their pictures are known.
+            and its way, and the friction, its observations how well the frames of their pictures are known.
         names: Some of `DEFAULT`, and `young`; a finger without cavities has no walls to be found, a base in
             one piece no feet.
     """
