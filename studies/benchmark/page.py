@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 from pinnray.runtime.atomic import write_text
@@ -80,15 +79,12 @@ def broken_table(found: Benchmark) -> TextTable:
 
 def summary_table(found: Benchmark) -> TextTable:
     """Medians of each entry over the problems of a law that it solved."""
-    rows = []
-    for place, entry in enumerate(found.entries, start=1):
-        for linear, law in LAWS.items():
-            names = [each.name for each in found.problems.problems if each.linear == linear]
-            solved = [row for name, row in entry.solved.items() if name in names]
-            own = [_middle(solved, figure, shown) for figure, shown in COLUMNS.values()]
-            broken = sum(len(row.broken) for row in solved)
-            if solved:
-                rows.append((str(place), entry.label, law, f"{len(solved)}/{len(names)}", *own, str(broken)))
+    rows, numbers = [], [each.label for each in found.entries]
+    for (entry, linear), each in found.medians().iterrows():
+        count = sum(problem.linear == linear for problem in found.problems.problems)
+        figures = [shown(each[figure]) for figure, shown in COLUMNS.values()]
+        said = (str(numbers.index(entry) + 1), entry, LAWS[linear], f"{each['solved']:.0f}/{count}")
+        rows.append((*said, *figures, f"{each['broken']:.0f}"))
     headings = ("no.", "entry", "law", "solved", *COLUMNS, "broken\nclaims")
     title = "Medians over the problems of each law that an entry solved"
     return TextTable(title, headings, rows, f"{MEANINGS} {_notes(found.entries)}", left=("entry", "law"))
@@ -107,7 +103,7 @@ def _problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextT
     for entry in entries:
         row = next(each for each in entry.rows if each.problem == problem.name)
         if row.solved:
-            rows.append((entry.label, *(_middle([row], *each) for each in known), row.state))
+            rows.append((entry.label, *(_shown(row, *each) for each in known), row.state))
         elif row.state != "refused":
             rows.append((entry.label, *[NONE] * len(known), row.state))
             reasons.append(f"{entry.label}: {row.message}")
@@ -117,10 +113,10 @@ def _problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextT
     )
 
 
-def _middle(rows: Sequence[EntryRow], figure: str, shown: Callable[[float], str]) -> str:
-    """The median of a figure over rows; a dash where none has it."""
-    values = [value for row in rows if (value := getattr(row, figure)) is not None]
-    return shown(median(values)) if values else NONE
+def _shown(row: EntryRow, figure: str, shown: Callable[[float], str]) -> str:
+    """A figure of a row; a dash where there is none."""
+    value = getattr(row, figure)
+    return NONE if value is None else shown(value)
 
 
 def _notes(entries: Sequence[Entry]) -> str:

@@ -117,7 +117,7 @@ def command(
         job = Job(
             design=design,
             solvers=made,
-            spare=[] if solvers else spare_solvers(made, reference, options.preset, set_up),
+            spare=spare_solvers(made, reference, options.preset, set_up),
             mesh=mesh,
             adapt=adapt,
             material=material,
