@@ -60,6 +60,19 @@ class Film(FilmSettings):
         camera = self.source.removeprefix("/dev/video").isdecimal() and not Path(self.source).is_dir()
         return camera or self.source == "-"
 
+    @property
+    def simulated(self) -> bool:
+        """Whether the workspace, or a file, is of a film of `pinnray rig`."""
+        from pinnray.vision.frames.sources import open_frames
+        from pinnray.vision.tracking.workspace import load_workspace
+
+        if self.workspace and load_workspace(self.workspace).simulated:
+            return True
+        if self.live:
+            return False
+        with open_frames(self.source, rate=self.fps) as frames:
+            return frames.simulated
+
     def scene(self, design: "Finger") -> "FilmedScene":
         """The filmed scene of a finger.
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
-from pinnray.comparison.evaluation.truths import SLIDING, experiment_source, simulate
+from pinnray.comparison.evaluation.truths import SLIDING
+from pinnray.comparison.evaluation.virtual_experiment import experiment_source, simulate
 from pinnray.film.filmed_force import LONGEST_STEP, filmed_course, true_forces
 from pinnray.film.rig_settings import RigSettings
 from pinnray.runtime.errors import UserError

@@ -22,7 +22,8 @@ class Observations:
         standard_deviations: Of the displacements, shape (m, 2), mm, or one for all; 0 where unknown.
         visible: Which markers were seen, shape (m,), all if None; none where no displacement is known.
         source: One sentence on the origin of the numbers, or on why there are none, shown with them.
-        simulated: True if no camera was involved.
+        simulated: True if no camera was involved; in plane strain, unless it is `solid`.
+        solid: True if simulated in three dimensions, with the side faces that a camera sees.
         marker_radius: Radius of the markers' discs, over which their displacements are means, mm; the default
             design's, `design.marker_radius` is that of another one.
         pressed: Registration of the pressed picture with that at rest.
@@ -39,6 +40,7 @@ class Observations:
     visible: BoolArray
     source: str
     simulated: bool
+    solid: bool
     marker_radius: float
     pressed: Registration
     drawn: Registration
@@ -51,6 +53,7 @@ class Observations:
         visible: ArrayLike | None = None,
         source: str = "measurements given as arrays",
         simulated: bool = False,
+        solid: bool = False,
         marker_radius: float = 0.8,
         pressed: Registration = FIXED,
         drawn: Registration = FIXED,
@@ -66,7 +69,12 @@ class Observations:
         ):
             object.__setattr__(self, name, frozen_array(values, dtype=dtype, shape=shape, name=name))
         self.__dict__.update(
-            source=source, simulated=simulated, marker_radius=marker_radius, pressed=pressed, drawn=drawn
+            source=source,
+            simulated=simulated,
+            solid=solid,
+            marker_radius=marker_radius,
+            pressed=pressed,
+            drawn=drawn,
         )
         self._check()
 
@@ -88,6 +96,11 @@ class Observations:
             raise UserError(f"the marker radius must be zero or more, got {self.marker_radius} (mm)")
         if not len(self.visible):
             raise ShapeError("observations need at least one marker")
+
+    @property
+    def plane(self) -> bool:
+        """True if they are known to be of a finger without side faces."""
+        return self.simulated and not self.solid
 
     @property
     def known(self) -> bool:

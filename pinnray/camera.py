@@ -145,7 +145,7 @@ def film_forces(
         with stages.stage("mesh"):
             mesh = finger_mesh(finger, settings=mesh_sizes(finger, usual=MESH))
         with stages.stage("force") as report:
-            tracker = force_tracker(mesh, finger, elastic, seen.points)
+            tracker = force_tracker(mesh, finger, elastic, seen.points, plane=seen.plane)
             forces = forces_of(tracking, tracker, report)
     return pd.DataFrame([force_row(force, finger.depth) for force in forces]).fillna(np.nan)
 

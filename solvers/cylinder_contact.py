@@ -237,9 +237,13 @@ def _turned(normal: FloatArray) -> FloatArray:
     return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
 
 
-def touching_centre(problem: Problem) -> FloatArray:
-    """Centre of the cylinder, shape (2,), mm: as low above the contact's middle as the front lets it."""
-    radius, middle = float(problem.load.radius or 0), float(np.mean(contact_ends(problem)))
+def touching_centre(problem: Problem, middle: float | None = None) -> FloatArray:
+    """Centre of the cylinder, shape (2,), mm: as low above an abscissa as the front lets it.
+
+    By default it is that of the contact's middle, mm.
+    """
+    radius = float(problem.load.radius or 0)
+    middle = float(np.mean(contact_ends(problem))) if middle is None else middle
     front = problem.mesh.points[np.unique(problem.mesh.boundary("front"))]
     under = np.concatenate([front_points(problem.mesh, np.array([middle])), front])
     under = under[np.abs(under[:, 0] - middle) < radius]

@@ -106,24 +106,23 @@ class LagrangeSpace:
 
     def shape_gradients(self, location: LocatedPoints) -> tuple[csr_matrix, csr_matrix]:
         """Derivatives of the shape functions along x and y, each a matrix (n, N), 1/mm."""
-        dλ = self._barycentric_gradients[location.cells]
-        if self.degree == 1:
-            gradients = dλ
-        else:
-            λ = location.barycentric
-            corners = (4 * λ - 1)[:, :, None] * dλ
-            first, second = EDGES[:, 0], EDGES[:, 1]
-            middles = 4 * (λ[:, first, None] * dλ[:, second] + λ[:, second, None] * dλ[:, first])
-            gradients = np.concatenate([corners, middles], axis=1)
-        return self._matrix(location, gradients[..., 0]), self._matrix(location, gradients[..., 1])
+        λ, (first, second) = location.barycentric, EDGES.T
+        found = []
+        for axis in range(2):
+            gradients = dλ = self._barycentric_gradients[axis, location.cells]
+            if self.degree == 2:
+                middles = 4 * (λ[:, first] * dλ[:, second] + λ[:, second] * dλ[:, first])
+                gradients = np.concatenate([(4 * λ - 1) * dλ, middles], axis=1)
+            found.append(self._matrix(location, gradients))
+        return found[0], found[1]
 
     @cached_property
     def _barycentric_gradients(self) -> FloatArray:
-        """Gradients of the barycentric coordinates, shape (t, 3, 2), 1/mm."""
+        """Derivatives of the barycentric coordinates along x and y, shape (2, t, 3), 1/mm."""
         corners = self.mesh.points[self.mesh.triangles]
         opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-        rotated = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
-        return np.asarray(rotated / (2 * self.mesh.areas)[:, None, None], dtype=np.float64)
+        rotated = np.stack([-opposite[..., 1], opposite[..., 0]])
+        return np.asarray(rotated / (2 * self.mesh.areas)[:, None], dtype=np.float64)
 
     def _matrix(self, location: LocatedPoints, values: FloatArray) -> csr_matrix:
         columns = self.cell_nodes[location.cells]

@@ -102,6 +102,7 @@ class IdentifiedForce(NamedTuple):
     #: Shares of the variance of `force` by what they come from, the largest first
     shares: Mapping[str, float] = {}
     advice: str = ""  #: A sentence on the largest share, and on what would narrow the interval
+    contact: Literal["cylinder", "patch"] = "patch"  #: What presses in the model of the finger
 
     def phrase(self, depth: float | None = None) -> str:
         """Forces and place with their intervals in words: in N for a finger of a depth, mm, else in N/mm."""
@@ -110,7 +111,8 @@ class IdentifiedForce(NamedTuple):
             f"{_interval(*(factor * value for value in each))} {unit}"
             for each in (self.force, self.tangential_force)
         )
-        said = f"force {force}, tangential force {across}"
+        by = " of the cylinder" if self.contact == "cylinder" else ""
+        said = f"force {force}{by}, tangential force {across}"
         return said if self.position is None else f"{said}, at x = {_interval(*self.position)} mm"
 
 

@@ -30,7 +30,7 @@ SMALLEST_DISTANCE = 1e-3
 """Distance below which two markers are the same one, mm: less than a camera tells apart."""
 LARGEST = 1e6
 """Size of a coordinate or displacement that cannot be of a finger, mm."""
-SIMULATED_MARK = "# simulated"
+SIMULATED_MARK, SOLID = "# simulated", " in three dimensions"
 SOURCE_MARK = "# source: "
 PICTURES = {"pressed": "# pressed picture: ", "drawn": "# picture at rest: "}
 """Marks of the comments that say how well the pictures' frames are known."""
@@ -43,7 +43,7 @@ def write_measurements(path: Path, observations: Observations) -> None:
     """
     with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         if observations.simulated:
-            file.write(f"{SIMULATED_MARK}\n")
+            file.write(f"{SIMULATED_MARK}{SOLID if observations.solid else ''}\n")
         file.write(f"{SOURCE_MARK}{' '.join(observations.source.split())}\n")
         for picture, mark in PICTURES.items():
             known = getattr(observations, picture)
@@ -71,11 +71,11 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     `WORDS`) may be left out. Only the position is read of a marker that is not visible; one whose u and v are
     both `EMPTY` is not, unless `visible` says that it is.
 
-    Comment lines start with `#`. `# source: TEXT` names the origin of the numbers, `# simulated` means that
-    no camera was involved. `# pressed picture: TEXT` says how well the pressed picture's frame is known in
-    that at rest, and `# picture at rest: TEXT` how well that one's is in the drawing, in words of
-    `Registration.parse`. Where nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose
-    points were `CLICKED`.
+    Comment lines start with `#`. `# source: TEXT` names the origin of the numbers. `# simulated` means that
+    no camera was involved and the finger is in plane strain, unless `in three dimensions` follows.
+    `# pressed picture: TEXT` says how well the pressed picture's frame is known in that at rest, and `#
+    picture at rest: TEXT` how well that one's is in the drawing, in words of `Registration.parse`. Where
+    nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose points were `CLICKED`.
 
     Raises:
         UserError: If the file cannot be read, a column is missing, a value is no number
@@ -83,7 +83,8 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     """
     table = read_table(path, "measurements", *TITLES)
     sources = _said(table.comments, SOURCE_MARK)
-    simulated = any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in table.comments)
+    marks = [re.fullmatch(rf"#\s*simulated({SOLID})?", comment, re.I) for comment in table.comments]
+    simulated, solid = any(marks), any(mark and mark[1] for mark in marks)
     known = {picture: said[0] for picture, mark in PICTURES.items() if (said := _said(table.comments, mark))}
     return measurements_of(
         [(f"line {line}", cells) for line, cells in table.rows],
@@ -91,6 +92,7 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
         table=str(path),
         source=sources[0] if sources else f"measurements from {path.name}",
         simulated=simulated,
+        solid=solid,
         pictures=known,
     )
 
@@ -102,6 +104,7 @@ def measurements_of(
     table: str,
     source: str,
     simulated: bool = False,
+    solid: bool = False,
     pictures: Mapping[str, str] = MappingProxyType({}),
 ) -> Observations:
     """Observations from a table; columns and defaults as in `read_measurements`.
@@ -112,6 +115,7 @@ def measurements_of(
         table: Name of the table in messages.
         source: One sentence on the origin of the numbers.
         simulated: True if no camera was involved.
+        solid: See `Observations`.
         pictures: How well the frames of the pictures of `PICTURES` are known, in words.
 
     Raises:
@@ -144,6 +148,7 @@ def measurements_of(
             visible=seen,
             source=source,
             simulated=simulated,
+            solid=solid,
             marker_radius=marker_radius,
             **known,
         )

@@ -1,4 +1,4 @@
-"""Simulated truths, and the marker displacements that are taken from them where no camera has measured any.
+"""Simulated truths: what differs from the drawn finger and the load that the solvers know.
 
 A truth is richer than the linear models that are judged by it: finite strain, a sliding indenter, other
 walls, laws and loads. The distance of those models from it is of the size and pattern of the paper's gap
@@ -7,27 +7,15 @@ between simulation and experiment.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import isfinite, radians, tan
 
-import numpy as np
-
-from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated
-from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.section import rib_feet, rib_pitch, rib_slope
-from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.geometry.observations import Observations
-from pinnray.runtime.cache import cache_folder, kept_if_possible
-from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.machine import package_versions
 from pinnray.solvers.elasticity import LawName
-from pinnray.solvers.problem import Load, LoadKind, Material, Problem
-from pinnray.solvers.registry import MissingLibraryError, make_solver
-from pinnray.solvers.solution import Solution
-from pinnray.solvers.solver import Progress, Solver, silent
+from pinnray.solvers.problem import Load, LoadKind, Material
 
 EVERY_TRUTH = "all"
 """The name that stands for every truth."""
@@ -55,6 +43,7 @@ class Truth:
         thicker: Additions to wall thicknesses, mm, by their names in `Design`.
         radius: Radius of a rigid cylinder, mm; a patch of the contact's width if None.
         friction: Coefficient of friction of the cylinder.
+        farther: Its stroke over the one that is asked for; solvers are given the longer one.
         slope: Displacement of the indenter along the front over the stroke; None lets a patch slide.
         solid: Whether the finger has its depth, with side faces free of traction, of which one is seen; else
             it is in plane strain.
@@ -72,6 +61,7 @@ class Truth:
     thicker: Mapping[str, float] = field(default_factory=dict)
     radius: float | None = None
     friction: float = 0.0
+    farther: float = 1.0
     slope: float | None = None
     solid: bool = False
 
@@ -99,6 +89,8 @@ class Truth:
                 raise UserError(f"{name}: {value:g}: give a factor above 0, or an addition in mm")
         if self.radius is not None and self.slope is None:
             raise UserError("a cylinder does not slide freely; give its slope, such as 0, and its friction")
+        if not (isfinite(self.farther) and self.farther > 0):
+            raise UserError(f"farther {self.farther:g}: give a factor of the stroke above 0")
         self.material(Material())
         self.load(1.0)
 
@@ -164,8 +156,13 @@ class Truth:
         poisson = material.poisson if self.poisson is None else self.poisson
         return Material(young=material.young, poisson=poisson, law=self.law).made_of(material.substance)
 
+    def reached(self, load: Load) -> Load:
+        """A load with the stroke that it asks for made `farther`."""
+        displacement = tuple(None if value is None else self.farther * value for value in load.displacement)
+        return load.model_copy(update={"displacement": displacement})
+
     def load(self, stroke: float) -> Load:
-        """Its load for a stroke into the finger, mm."""
+        """Its load for its own stroke into the finger, mm."""
         along = None if self.slope is None else self.slope * stroke
         kind: LoadKind = "patch" if self.radius is None else "cylinder"
         return Load(kind, displacement=(along, -stroke), radius=self.radius, friction=self.friction)
@@ -177,7 +174,7 @@ _THICK_BASE = {"base_thickness": 1.0}
 _PATCH = "contact patch that is pressed in by {:.4g} mm"
 _SLIDES = f"{_PATCH} and slides along x"
 _CYLINDER = "rigid cylinder of radius {} mm without friction that is pressed in by {{:.4g}} mm"
-_ROUGH = _CYLINDER.format(10).replace("without friction", "with friction 0.5")
+_ROUGH = _CYLINDER.replace("without friction", "with friction {}")
 _WALLS = "front wall and ribs printed 5 % thicker"
 _BASE = f"{_WALLS}, back wall 5 % thinner and base wall 1 mm thicker than drawn"
 
@@ -218,7 +215,7 @@ _TRUTHS = (
     ),
     Truth(
         "rubbing",
-        f"neo-Hookean, {_ROUGH}",
+        f"neo-Hookean, {_ROUGH.format(10, 0.5)}",
         radius=10.0,
         friction=0.5,
         slope=0.0,
@@ -227,6 +224,20 @@ _TRUTHS = (
         "3d",
         f"neo-Hookean finger in three dimensions, of which the side face is seen, {_SLIDES}",
         solid=True,
+    ),
+    Truth(
+        "wide",
+        f"neo-Hookean, {_ROUGH.format(25, 0.9)}",
+        radius=25.0,
+        friction=0.9,
+        slope=0.0,
+    ),
+    Truth(
+        "limit",
+        f"neo-Hookean, {_CYLINDER.format(10)}, beyond its largest force",
+        radius=10.0,
+        farther=2.2,
+        slope=0.0,
     ),
     Truth("sticking", f"neo-Hookean, {_PATCH}, sticks and cannot turn", slope=0.0),
 )
@@ -257,123 +268,3 @@ def check_walls(truth: Truth) -> None:
 
 def _keeping_walls() -> str:
     return ", ".join(name for name, truth in TRUTHS.items() if truth.keeps_walls)
-
-
-SOURCE = "simulated by {} ({}); no camera was involved"
-"""Provenance that is shown with the numbers, around solver and description of the truth."""
-
-SOLID_SIZE = 0.75
-"""Element size of a section in three dimensions, mm: some 170,000 unknowns for the default finger."""
-
-
-class UnfinishedExperimentError(UserError):
-    """The virtual experiment did not reach its full load."""
-
-
-def virtual_experiment(
-    problem: Problem, marker_radius: float, progress: Progress = silent, truth: Truth = SLIDING
-) -> tuple[Observations, Evaluation]:
-    """Simulate the displacements of the mesh's markers; kept in the cache folder.
-
-    Args:
-        problem: The finger and its load; the simulation has its own law and kind of load.
-        marker_radius: Radius of the design's markers, mm.
-        progress: Called with the fraction of the simulation.
-        truth: What is simulated; its walls must be as drawn. In three dimensions the section has elements of
-            `SOLID_SIZE`, for which the problem must know its finger.
-
-    Returns:
-        The observations, and the true fields on the problem's mesh.
-
-    Raises:
-        UserError: If the simulation cannot be run.
-        UnfinishedExperimentError: If it does not reach the full load.
-    """
-    try:
-        true = _true_fields(problem, progress, truth)
-    except UserError as error:
-        raise type(error)(f"{error}; or give measurements") from None
-    known = replace(
-        no_displacements(problem, marker_radius, experiment_source(problem, truth)), simulated=True
-    )
-    seen = np.ones_like(known.visible)
-    return replace(known, displacements=true.marker_displacement, visible=seen), true
-
-
-def _true_fields(problem: Problem, progress: Progress, truth: Truth) -> Evaluation:
-    """The fields of a truth on the problem's mesh, from the cache if they are there."""
-    check_walls(truth)
-    own = problem
-    if truth.solid:
-        if problem.finger is None:
-            raise UserError(f"truth {truth.name}: the problem has to know its finger, which is meshed anew")
-        own = replace(problem, mesh=finger_mesh(problem.finger, settings=MeshSettings(size=SOLID_SIZE)))
-    solver, richer = _richer(own, truth)
-    key = content_hash(
-        [
-            problem.mesh.digest,
-            solver.name,
-            richer.digest,
-            solver.settings(),
-            package_versions(),
-            sources_digest(__name__, type(solver).__module__),
-            SOURCE,
-        ]
-    )
-    entry = cache_folder() / f"experiment-{key}.npz"
-    if (kept := Evaluation.load(entry, key)) is not None:
-        progress(1.0, "from the cache")
-        return kept
-    evaluation = evaluated(_solved(solver, richer, progress), problem.mesh)
-    with kept_if_possible(entry.parent, "the virtual experiment"):
-        evaluation.save(entry, key)
-    return evaluation
-
-
-def no_displacements(problem: Problem, marker_radius: float, reason: str) -> Observations:
-    """The mesh's markers, none of whose displacements is known, for one reason."""
-    markers = problem.mesh.markers
-    zeros, hidden = np.zeros_like(markers), np.zeros(len(markers), dtype=bool)
-    return Observations(markers, zeros, zeros, hidden, reason, simulated=False, marker_radius=marker_radius)
-
-
-def simulate(
-    problem: Problem, progress: Progress = silent, truth: Truth = SLIDING, **settings: object
-) -> Solution:
-    """Solve the problem of `virtual_experiment` anew, on a mesh with the walls of the truth.
-
-    Raises:
-        UserError: If it cannot be run.
-        UnfinishedExperimentError: If it does not reach the full load.
-    """
-    return _solved(*_richer(problem, truth, **settings), progress)
-
-
-def experiment_source(problem: Problem, truth: Truth = SLIDING) -> str:
-    """Provenance of the simulated numbers, one sentence."""
-    return SOURCE.format(truth.solver, truth.description.format(-(problem.load.displacement[1] or 0.0)))
-
-
-def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
-    solution = solver.solve(richer, progress)
-    if not solution.status.converged:
-        raise UnfinishedExperimentError(f"the virtual experiment {solution.status.message}")
-    return solution
-
-
-def _richer(problem: Problem, truth: Truth, **settings: object) -> tuple[Solver, Problem]:
-    """The finite-strain solver and its problem."""
-    normal = problem.load.displacement[1]
-    if normal is None:
-        raise UserError("the virtual experiment presses on the finger: prescribe v")
-    if problem.load.position is not None:
-        raise UserError(
-            "the virtual experiment presses where the mesh has its contact: mesh the finger with its "
-            "contact_position there"
-        )
-    try:
-        solver = make_solver(truth.solver, **settings)
-    except MissingLibraryError as error:
-        raise UserError(f"the virtual experiment: {error}") from None
-    material, load = truth.material(problem.material), truth.load(-normal)
-    return solver, Problem(problem.mesh, material, load, finger=problem.finger)

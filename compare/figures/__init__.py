@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.runtime.errors import UserError
+from pinnray.solvers.shared_work import SharedWork
 
 FORMATS = ("svg", "pdf")
 """Formats of pictures for print."""
@@ -63,13 +64,15 @@ def draw_all(
     """
     from pinnray.comparison.figures.gallery import GALLERY
 
-    pictures, page = [], page_width(width, formats)
+    pictures, page, work = [], page_width(width, formats), SharedWork()
     # Figures have so many objects that a tenth of the time went into collecting garbage among older ones.
     gc.freeze()
     try:
         for number, (name, (what, draw)) in enumerate(GALLERY.items()):
             progress(number / len(GALLERY), what)
-            if drawing := draw(comparison, page):
+            with work.used():  # fields on the same mesh are rendered once
+                drawing = draw(comparison, page)
+            if drawing:
                 path = drawing.figure.save(folder / f"{name}.png", formats)
                 pictures.append(Picture(path, drawing.title, drawing.caption))
     finally:

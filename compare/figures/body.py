@@ -3,7 +3,7 @@
 A panel has a strip below the body for a note and a scale bar, so that neither lies on a body of any shape.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import matplotlib as mpl
@@ -59,10 +59,10 @@ def sequential(values: FloatArray, weights: FloatArray) -> ColourScale:
     )
 
 
-def symmetric(fields: Sequence[FloatArray], weights: FloatArray) -> ColourScale:
-    """A scale symmetric about zero that covers the percentile of the absolute value in each of the fields."""
-    limit = max((weighted_percentile(np.abs(values), weights, PERCENT) for values in fields), default=0.0)
-    return ColourScale(-_positive(limit), _positive(limit), mpl.colormaps[DIVERGING])
+def symmetric(values: FloatArray, weights: FloatArray) -> ColourScale:
+    """A scale symmetric about zero that covers the percentile of the absolute value, as `sequential`."""
+    limit = _positive(weighted_percentile(np.abs(values), weights, PERCENT))
+    return ColourScale(-limit, limit, mpl.colormaps[DIVERGING])
 
 
 def _positive(limit: float) -> float:

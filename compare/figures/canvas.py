@@ -1,4 +1,4 @@
-"""Triangles to pixels: PyVista off the screen, with a camera given exactly and no text.
+"""Triangles to pixels: VTK off the screen, with a camera given exactly and no text.
 
 VTK draws every triangle in its number, in quarters of pixels, and colours are given to the numbers: a body
 that is drawn in many colours is rendered once. Type, axes and legends are matplotlib's; both use the same
@@ -12,12 +12,14 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+import pyvista
 from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import vtkLogger, vtkUnsignedCharArray
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow
 
 # Draw without a display: VTK otherwise complains of a missing X server before it does so anyway.
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-import pyvista
-from vtkmodules.vtkCommonCore import vtkLogger
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  # how windows of `vtkRenderingCore` draw
 
 from pinnray.geometry.mesh.boundary import edge_paths
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -76,22 +78,33 @@ class Canvas:
         return surface
 
     @cached_property
-    def _plotter(self) -> Any:
-        pyvista.OFF_SCREEN = True
+    def _window(self) -> vtkRenderWindow:
+        """Twice as many pixels, each of one triangle: a mean of two numbers is the number of a third one.
+
+        PyVista's plotter would draw every picture twice, and take a second to import.
+        """
         extent, (height, width) = self.extent, self._size
-        with _without_warnings():
-            plotter = pyvista.Plotter(off_screen=True, window_size=[2 * width, 2 * height])
-            plotter.disable_anti_aliasing()  # a mean of two numbers is the number of a third triangle
-            plotter.add_mesh(self._surface, scalars="number", rgb=True, lighting=False)
-        camera = plotter.camera
+        mapper, actor, renderer = vtkPolyDataMapper(), vtkActor(), vtkRenderer()
+        mapper.SetInputData(self._surface)
+        actor.SetMapper(mapper)
+        actor.GetProperty().LightingOff()
+        renderer.AddActor(actor)
+        renderer.SetBackgroundAlpha(0.0)
+        camera = renderer.GetActiveCamera()
         middle = ((extent.left + extent.right) / 2, (extent.bottom + extent.top) / 2)
-        camera.parallel_projection = True
-        camera.focal_point = (*middle, 0.0)
-        camera.position = (*middle, 100.0)
-        camera.up = (0.0, 1.0, 0.0)
-        camera.parallel_scale = extent.height / 2
-        camera.clipping_range = (50.0, 150.0)
-        return plotter
+        camera.ParallelProjectionOn()
+        camera.SetFocalPoint(*middle, 0.0)
+        camera.SetPosition(*middle, 100.0)
+        camera.SetParallelScale(extent.height / 2)
+        camera.SetClippingRange(50.0, 150.0)
+        with _without_warnings():
+            window = vtkRenderWindow()
+        window.OffScreenRenderingOn()
+        window.SetMultiSamples(0)
+        window.SetAlphaBitPlanes(1)
+        window.SetSize(2 * width, 2 * height)
+        window.AddRenderer(renderer)
+        return window
 
     @cached_property
     def _at_rest(self) -> tuple[IntArray, IntArray]:
@@ -123,11 +136,11 @@ class Canvas:
             each of their quarters, shape (4, k): the count of triangles where there is none.
         """
         self._surface.points = np.pad(points, ((0, 0), (0, 1)))
-        self._plotter.render()
+        count, (height, width), image = self._surface.n_cells, self._size, vtkUnsignedCharArray()
         with _without_warnings():
-            image = self._plotter.screenshot(None, transparent_background=True, return_img=True)
-        count, (height, width) = self._surface.n_cells, self._size
-        words = np.ascontiguousarray(image, dtype=np.uint8).view("<u4")
+            self._window.Render()
+            self._window.GetRGBACharPixelData(0, 0, 2 * width - 1, 2 * height - 1, 0, image, 0)
+        words = np.asarray(pyvista.convert_array(image)).view("<u4").reshape(2 * height, -1)[::-1]
         number = np.where(words >> 24, words & 0xFFFFFF, count)
         quarters = number.reshape(height, 2, width, 2).transpose(1, 3, 0, 2).reshape(4, -1)
         pixels = np.flatnonzero((quarters < count).any(axis=0))

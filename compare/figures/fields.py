@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pinnray.comparison.evaluation.comparison import TRUTH, Results
-from pinnray.comparison.evaluation.differences import COMPONENTS, FieldDifference
+from pinnray.comparison.evaluation.differences import COMPONENTS, relative_l2
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import body
 from pinnray.comparison.figures.body import DIVERGING, ColourScale, sequential, symmetric
@@ -19,6 +19,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.figure import NARROW, WIDTH, Figure, figure
 from pinnray.runtime.tables import percent, significant
+from pinnray.solvers.shared_work import shared
 
 MARGIN = 0.1
 HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55
@@ -80,15 +81,7 @@ def triangle_values(quantity: FieldQuantity, evaluation: Evaluation) -> FloatArr
 def field_scale(quantity: FieldQuantity, mesh: TriangleMesh, reference: Evaluation) -> ColourScale:
     """The scale that every solver's field is drawn on: it covers the percentile of the reference's area."""
     values = triangle_values(quantity, reference)
-    return symmetric([values], mesh.areas) if quantity.signed else sequential(values, mesh.areas)
-
-
-def difference_scale(
-    quantity: FieldQuantity, mesh: TriangleMesh, evaluation: Evaluation, reference: Evaluation
-) -> ColourScale:
-    """The scale of a solver's difference, its own: beside one that is far away, a near one would be blank."""
-    difference = triangle_values(quantity, evaluation) - triangle_values(quantity, reference)
-    return symmetric([difference], mesh.areas)
+    return symmetric(values, mesh.areas) if quantity.signed else sequential(values, mesh.areas)
 
 
 def compared_with(comparison: Results) -> Evaluation:
@@ -102,7 +95,7 @@ def drawn_solvers(
     """The fields that a picture has room for: what they are compared with, the reference, then the others.
 
     Those that converged come before those that did not. `solvers` are the chosen ones; if empty, all but
-    those of `near_pairs`.
+    those of `Results.near_pairs`.
 
     Raises:
         UserError: If one of them is no solver of the comparison.
@@ -116,38 +109,12 @@ def drawn_solvers(
     extent = body.field_extent(comparison.mesh, width)
     panels = int((TALLEST - HEAD - FOOT) / (PANEL_TITLE + width * extent.height / extent.width)) * columns
     if not solvers:
-        near = near_pairs(comparison)
-        known = [each for each in known if each.solver not in near]
+        known = [each for each in known if each.solver not in comparison.near_pairs]
     chosen = fitting(
         known, comparison.reference, (panels - 1) // 2 if columns == 1 else panels // 2 - 1, solvers
     )
     chosen.sort(key=lambda each: (each.solver != comparison.reference.solver, not each.converged))
     return [base, *chosen]
-
-
-NEAR = 0.01
-"""Relative difference of two displacements below which one of them is drawn for both."""
-
-
-def near_pairs(comparison: Results) -> dict[str, tuple[str, float]]:
-    """Solvers whose displacement is near that of one before them, which is drawn, and how near, relative.
-
-    One that found the load is drawn in any case.
-    """
-    drawn: list[Evaluation] = [comparison.reference]
-    near = {}
-    for each in comparison.evaluations:
-        pairs = ((other.solver, _apart(each, other)) for other in drawn)
-        found = next((pair for pair in pairs if pair[1] < NEAR), None)
-        if found and each is not comparison.reference and each.identified is None:
-            near[each.solver] = found
-        else:
-            drawn.append(each)
-    return near
-
-
-def _apart(one: Evaluation, other: Evaluation) -> float:
-    return FieldDifference.of(one.displacement, other.displacement, other.weights).rel_l2
 
 
 def draw_field(
@@ -177,7 +144,7 @@ def draw_field(
         box = (MARGIN + column * (width + MARGIN), HEAD + PANEL_TITLE + place * row, width, row - PANEL_TITLE)
         return axes_at(drawn, box)
 
-    canvas = Canvas(mesh, extent, width=body.PIXELS // 2)
+    canvas = shared((mesh.digest, extent), lambda: Canvas(mesh, extent, width=body.PIXELS // 2))
     with figure(total, page) as drawn:
         write_heading(drawn, f"{quantity.title}, undeformed")
         for evaluation in ordered:
@@ -187,24 +154,23 @@ def draw_field(
             note = f"{largest} {significant(np.abs(means).max(), 3)} {quantity.unit}"
             body.panel(axes := next_axes(), canvas, mesh, scale.paint(means), name, note)
             if evaluation is not reference:
-                own = difference_scale(quantity, mesh, evaluation, reference)
-                distance = percent(FieldDifference.of(values, base, reference.weights).rel_l2, 2)
+                difference = evaluation.per_triangle(values - base)
+                own = symmetric(difference, mesh.areas)  # or a near solver would be blank beside a far one
+                distance = percent(relative_l2(values, base, reference.weights), 2)
                 title = f"minus {reference.solver}, ±{significant(own.high, 2)} {quantity.unit}"
-                colours = own.paint(evaluation.per_triangle(values - base))
-                body.panel(
-                    axes := next_axes(), canvas, mesh, colours, title, f"rel. L² {distance}", bold=False
-                )
+                colours, said = own.paint(difference), f"rel. L² {distance}"
+                body.panel(axes := next_axes(), canvas, mesh, colours, title, said, bold=False)
         body.scale_bar(axes, extent)
         differences = ColourScale(-1.0, 1.0, mpl.colormaps[DIVERGING])
         legends = [
             (scale, f"{quantity.title}, {quantity.unit}", "both" if quantity.signed else "max"),
             (differences, "difference, share of the panel’s scale", "both"),
         ]
-        for number, (shared, title, extend) in enumerate(legends[:bars]):
+        for number, (each, title, extend) in enumerate(legends[:bars]):
             place, column = divmod(number, columns)
             left = MARGIN + column * (width + MARGIN) + 0.1 * width
             axes = axes_at(drawn, (left, HEAD + rows * row + place * FOOT + 0.1, 0.8 * width, 0.09))
-            body.colour_bar(axes, shared, title, extend=extend)
+            body.colour_bar(axes, each, title, extend=extend)
     return drawn
 
 

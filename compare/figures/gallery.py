@@ -14,7 +14,6 @@ from pinnray.comparison.figures.fields import (
     FieldQuantity,
     draw_field,
     drawn_solvers,
-    near_pairs,
 )
 from pinnray.comparison.figures.force_charts import draw_force_displacement
 from pinnray.comparison.figures.overlay import Panels, draw_overlay
@@ -67,7 +66,7 @@ def _field(
         if len(comparison.shown_fields) > 1:
             where = "Below" if page < NARROW else "Right"
             caption += f" {where}: the field minus {reference}, each on the scale above its panel."
-        caption += _absent(comparison.shown_fields, drawn, near_pairs(comparison))
+        caption += _absent(comparison.shown_fields, drawn, comparison.near_pairs)
     return Illustration(draw_field(comparison, quantity, solvers, page), quantity.title, caption)
 
 

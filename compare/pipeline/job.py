@@ -47,7 +47,7 @@ class Job:
     """A comparison to make."""
 
     design: Finger
-    solvers: Sequence[Solver]  #: In the order of tables and pictures.
+    solvers: Sequence[Solver] = ()  #: In the order of tables and pictures.
     spare: Collection[str] = ()  #: Names of solvers to leave out if they do not support the problem.
     #: Element sizes; None for the mesh of the finger's file if it has one, else the default sizes.
     mesh: MeshSettings | None = None
@@ -78,8 +78,33 @@ class Job:
         return [solver.name for solver in self.solvers]
 
 
+def prepared(job: Job) -> Job:
+    """Refuse a job that no solver can do, and read its file of measurements; it may have no solvers yet.
+
+    Raises:
+        UserError: If the job cannot be done.
+    """
+    if not job.load.values.any():
+        raise UserError(
+            "the load does not move the contact: there is nothing to compare; give a stroke in mm"
+        )
+    if job.adapt is not None:
+        check_adaptable(job.adapt, job.load)
+    check_formats(job.picture_formats)
+    page_width(job.picture_width)
+    if job.truth is not None:
+        if job.measurements is not None:
+            raise UserError("a truth is for a simulated experiment; with measurements leave it out")
+        check_truths([job.truth], job.design)
+    check_walls(job.simulated)
+    if isinstance(job.measurements, Path):
+        radius = job.design.marker_radius
+        return replace(job, measurements=read_measurements(job.measurements, marker_radius=radius))
+    return job
+
+
 def checked(job: Job) -> Job:
-    """Refuse a job that cannot be done, and read its file of measurements.
+    """A `prepared` job whose solvers can do it.
 
     Raises:
         UserError: If the job cannot be done.
@@ -90,12 +115,7 @@ def checked(job: Job) -> Job:
         check_name(name)
     if len(set(job.names)) < len(job.names):
         raise UserError(f"a solver is named twice: {', '.join(job.names)}")
-    if not job.load.values.any():
-        raise UserError(
-            "the load does not move the contact: there is nothing to compare; give a stroke in mm"
-        )
-    if job.adapt is not None:
-        check_adaptable(job.adapt, job.load)
+    job = prepared(job)
     if job.reference is not None and job.reference not in job.names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
     for solver in job.solvers if job.resume else ():
@@ -104,16 +124,6 @@ def checked(job: Job) -> Job:
                 f"solver {solver.name} has no source file, so that an edit of its class cannot be told; do "
                 "not resume, or move the class from the notebook or shell into a module"
             )
-    check_formats(job.picture_formats)
-    page_width(job.picture_width)
-    if job.truth is not None:
-        if job.measurements is not None:
-            raise UserError("a truth is for a simulated experiment; with measurements leave it out")
-        check_truths([job.truth], job.design)
-    check_walls(job.simulated)
     check_law(job.solvers, job.material)
     supported_solvers(job.solvers, job.spare, job.material, job.load)
-    if isinstance(job.measurements, Path):
-        radius = job.design.marker_radius
-        return replace(job, measurements=read_measurements(job.measurements, marker_radius=radius))
-    return job
+    return job if job.measurements else replace(job, load=job.simulated.reached(job.load))

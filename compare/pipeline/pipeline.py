@@ -11,7 +11,7 @@ from pinnray.comparison.evaluation.deformed_body import with_body_checks
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.force_curves import force_curves, write_force_displacement
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-from pinnray.comparison.evaluation.truths import (
+from pinnray.comparison.evaluation.virtual_experiment import (
     UnfinishedExperimentError,
     no_displacements,
     virtual_experiment,

@@ -9,7 +9,7 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import Cell, write_csv
-from pinnray.solvers.fem.adaptive_refinement import Adaptation, check_adaptable
+from pinnray.solvers.fem.adaptive_refinement import Adaptation
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Solver
@@ -41,8 +41,6 @@ def shared_mesh(
     Raises:
         UserError: If the mesh cannot be made or adapted.
     """
-    if tolerance is not None:
-        check_adaptable(tolerance, load)
     with stages.stage("mesh"):
         mesh = finger_mesh(design, settings=settings)
         if check is not None:

@@ -14,13 +14,8 @@ from jinja2 import Template
 from pinnray.comparison.evaluation.comparison import TRUTH, Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
-from pinnray.comparison.figures.fields import (
-    VIEWED,
-    FieldQuantity,
-    difference_scale,
-    field_scale,
-    triangle_values,
-)
+from pinnray.comparison.figures.body import symmetric
+from pinnray.comparison.figures.fields import VIEWED, FieldQuantity, field_scale, triangle_values
 from pinnray.comparison.figures.overlay import contact_motion
 from pinnray.comparison.report import text
 from pinnray.comparison.report.numbers import seconds, share
@@ -50,7 +45,7 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
     quantities = VIEWED[: BUDGET // size if size else 0]
     if not quantities or not reference.finite:
         return None
-    packed = Packed()
+    packed, fields = Packed(), {each.solver: _fields(each, quantities) for each in shown}
     manifest = {
         **packed_body(mesh, packed),
         "reference": reference.label,
@@ -65,26 +60,24 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
             }
             for quantity in quantities
         ],
-        "solvers": [_solver(each, comparison, quantities, packed) for each in shown],
+        "solvers": [_solver(each, comparison, fields, packed) for each in shown],
         "name": comparison.design.name,
     }
     return {"manifest": manifest, "data": packed.text()}
 
 
+def _fields(evaluation: Evaluation, quantities: Sequence[FieldQuantity]) -> FloatArray:
+    """A field a row as it is drawn, shape (k, t)."""
+    return np.array([triangle_values(quantity, evaluation) for quantity in quantities])
+
+
 def _solver(
-    evaluation: Evaluation, comparison: Results, quantities: Sequence[FieldQuantity], packed: Packed
+    evaluation: Evaluation, comparison: Results, fields: Mapping[str, FloatArray], packed: Packed
 ) -> dict[str, Any]:
     """A solver's fields; of a solver that is not the reference, their differences from it."""
-    mesh, reference = comparison.mesh, comparison.reference
-    is_reference = evaluation is reference
-    fields = []
-    for quantity in quantities:
-        values = triangle_values(quantity, evaluation)
-        if is_reference:
-            fields.append(packed.add_steps(values))
-            continue
-        fields.append(packed.add_steps(values - triangle_values(quantity, reference)))
-    against = {"reference": reference, "truth": comparison.truth}
+    mesh, name = comparison.mesh, comparison.reference.solver
+    is_reference, own = evaluation is comparison.reference, fields[evaluation.solver]
+    against = {"reference": fields[name]} | ({"truth": fields[TRUTH]} if TRUTH in fields else {})
     start, end = contact_motion(comparison, evaluation)
     fractions, states, path = _load_path(evaluation)
     return {
@@ -92,14 +85,13 @@ def _solver(
         "isReference": is_reference,
         "isTruth": evaluation.solver == TRUTH,
         "scales": {
-            name: [difference_scale(quantity, mesh, evaluation, other).high for quantity in quantities]
-            for name, other in against.items()
-            if other is not None and other.finite
+            base: [symmetric(difference, mesh.areas).high for difference in own - others]
+            for base, others in against.items()
         },
         "contact": [start.tolist(), end.tolist()],
         "markers": _markers(evaluation, comparison),
         "observed": comparison.observed(evaluation).tolist(),
-        "fields": fields,
+        "fields": [packed.add_steps(each) for each in (own if is_reference else own - fields[name])],
         "fractions": fractions,
         "states": packed.add_steps(states),
         "path": path,

@@ -9,6 +9,10 @@ standard deviations s, of θ or of its logarithm, the estimate minimises
 the root of the misfit over its degrees of freedom, found together with θ, so that model error widens the
 confidence intervals. With A = (dy/dz) / φ σ the covariance of z is (A^T A + 1)^-1.
 
+Observations may be gross errors: normally distributed with a large deviation, at given odds. Those are left
+out, with whose leaving out the evidence grows the most, one after another: Laplace's approximation for the
+linear model, -n log φ - (misfit + z . z) / 2 - log det(A^T A + 1) / 2 over the n that are kept, and the odds.
+
 Sources: A. Tarantola, Inverse Problem Theory, SIAM 2005, chapter 3 (estimate, covariance,
 resolution); R. T. Birge, The calculation of errors by the method of least squares, Phys. Rev. 40 (1932)
 207-227 (φ).
@@ -82,6 +86,17 @@ def values_of(parameters: Sequence[Parameter], z: FloatArray) -> tuple[FloatArra
 
 
 @dataclass(frozen=True, eq=False)
+class GrossErrors:
+    """Groups of observations that may be wrong together."""
+
+    groups: IntArray  # Numbers of the observations of each, shape (g, k)
+    log_odds: FloatArray  # Of its being wrong, and of the density then over that of no misfit, shape (g,)
+
+
+NO_ERRORS = GrossErrors(np.zeros((0, 1), dtype=np.int64), np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """Estimates of p parameters from n observations."""
 
@@ -89,6 +104,7 @@ class Estimate:
     z: FloatArray  # Standardised values, shape (p,)
     sensitivities: FloatArray  # A, shape (n, p)
     residuals: FloatArray  # Predicted minus observed over φ σ, shape (n,)
+    kept: BoolArray  # Mask of the observations that are not left out as wrong, shape (n,)
     inflation: float  # φ
     evaluations: int  # Evaluations of the model
     converged: bool
@@ -96,8 +112,14 @@ class Estimate:
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of z, shape (p, p)."""
-        a = self.sensitivities
+        a = self.sensitivities[self.kept]
         return np.linalg.inv(a.T @ a + np.eye(a.shape[1]))
+
+    @property
+    def explained(self) -> bool:
+        """Whether noise explains the misfit."""
+        freedom = degrees_of_freedom(self.sensitivities[self.kept])
+        return self.inflation == 1 and inflation_of(self.residuals[self.kept], freedom) == 1
 
     @property
     def values(self) -> FloatArray:
@@ -117,7 +139,7 @@ class Estimate:
     @property
     def quantile(self) -> float:
         """Half a confidence interval of z at `LEVEL` over its standard deviation."""
-        return quantile_of(self.inflation, degrees_of_freedom(self.sensitivities))
+        return quantile_of(self.inflation, degrees_of_freedom(self.sensitivities[self.kept]))
 
     @property
     def intervals(self) -> FloatArray:
@@ -141,7 +163,7 @@ class Estimate:
 
         H is A (A^T A + 1)^-1 A^T (D. M. Allen, Technometrics 16 (1974) 125-127).
         """
-        own = self.sensitivities[rows]
+        own = self.sensitivities[rows] * self.kept[rows, None]
         return np.linalg.solve(np.eye(len(rows)) - own @ self.covariance @ own.T, self.residuals[rows])
 
 
@@ -151,6 +173,8 @@ def estimate(
     deviations: FloatArray,
     parameters: Sequence[Parameter],
     start: FloatArray | None = None,
+    errors: GrossErrors = NO_ERRORS,
+    kept: BoolArray | None = None,
     *,
     rounds: int = MAX_ROUNDS,
     steps: int = MAX_STEPS,
@@ -165,7 +189,9 @@ def estimate(
         deviations: Their standard deviations σ, shape (n,), all positive.
         parameters: The p parameters.
         start: Standardised values z from which the search starts, shape (p,); None: the priors' middles.
-        rounds: Fits at most, each with the last one's φ.
+        errors: Observations that may be wrong.
+        kept: Mask of those that are kept in the first round, shape (n,); all if None.
+        rounds: Fits at most, each with the last one's φ and without what was left out then.
         steps: Steps of one fit at most.
         cost_change: Relative change of the cost below which a fit has converged.
     """
@@ -189,10 +215,11 @@ def estimate(
     if not np.isfinite(whitened(z)[0]).all():
         z = np.clip(np.zeros(count), *bounds)
     inflation = 1.0  # a larger one from the start could leave the search where the priors are
+    kept = np.ones(len(observed), dtype=bool) if kept is None else kept
     for _ in range(rounds):
-        weight = 1 / inflation
+        used, weight = inflation, kept[:, None] / inflation
         fit = least_squares(
-            lambda z, weight=weight: np.concatenate([weight * whitened(z)[0], z, [expected]]),
+            lambda z, weight=weight: np.concatenate([weight[:, 0] * whitened(z)[0], z, [expected]]),
             z,
             lambda z, weight=weight: np.concatenate([weight * whitened(z)[1], one, [flat]]),
             bounds=bounds,
@@ -203,15 +230,16 @@ def estimate(
         )
         z = fit.x
         residuals, derivatives = whitened(z)
-        used, inflation = inflation, _linear_inflation(residuals, derivatives, z, inflation)
-        settled = abs(inflation / used - 1) < INFLATION_CHANGE
+        before, (inflation, kept) = kept, _linear_fit(residuals, derivatives, z, errors)
+        settled = abs(inflation / used - 1) < INFLATION_CHANGE and (kept == before).all()
         if settled and fit.success:
             break
     return Estimate(
         parameters=parameters,
         z=z,
-        sensitivities=weight * derivatives,
-        residuals=weight * residuals,
+        sensitivities=derivatives / used,
+        residuals=residuals / used,
+        kept=before,
         inflation=used,
         evaluations=evaluated.cache_info().misses,
         converged=bool(fit.success and settled),
@@ -224,18 +252,43 @@ def degrees_of_freedom(sensitivities: FloatArray) -> float:
     return max(len(sensitivities) - float((squares / (1 + squares)).sum()), 1.0)
 
 
-def _linear_inflation(residuals: FloatArray, derivatives: FloatArray, z: FloatArray, start: float) -> float:
-    """φ for a linear model, from the residuals over σ, shape (n,), and their derivatives at z, (p,)."""
-    inflation = start
+def _linear_fit(
+    residuals: FloatArray, derivatives: FloatArray, z: FloatArray, errors: GrossErrors
+) -> tuple[float, BoolArray]:
+    """φ, and the mask of the observations that are kept, for a linear model.
+
+    It is about z, (p,), with the residuals over σ, shape (n,), and their derivatives there, (n, p).
+    """
+    kept, groups = np.ones(len(residuals), dtype=bool), list(range(len(errors.groups)))
+    inflation, evidence = _linear_evidence(residuals, derivatives, z)
+    while inflation > 1 and groups:
+        trials = np.tile(kept, (len(groups), 1))
+        np.put_along_axis(trials, errors.groups[groups], values=False, axis=1)
+        found = [_linear_evidence(residuals[trial], derivatives[trial], z) for trial in trials]
+        gains = np.array([each for _, each in found]) + errors.log_odds[groups] - evidence
+        best = int(gains.argmax())
+        if gains[best] <= 0:
+            break
+        kept, (inflation, evidence) = trials[best], found[best]
+        groups.pop(best)
+    return inflation, kept
+
+
+def _linear_evidence(residuals: FloatArray, derivatives: FloatArray, z: FloatArray) -> tuple[float, float]:
+    """φ of a linear model and the logarithm of its evidence, as `_linear_fit`."""
+    inflation = 1.0
     for _ in range(MAX_ROUNDS):
         weighted = derivatives / inflation**2
-        step = np.linalg.solve(weighted.T @ derivatives + np.eye(len(z)), -weighted.T @ residuals - z)
+        matrix = weighted.T @ derivatives + np.eye(len(z))
+        step = np.linalg.solve(matrix, -weighted.T @ residuals - z)
         used = inflation
         freedom = degrees_of_freedom(derivatives / inflation)
         inflation = inflation_of(residuals + derivatives @ step, freedom)
         if abs(inflation / used - 1) < 0.1 * INFLATION_CHANGE:
             break
-    return inflation
+    left = residuals + derivatives @ step
+    misfit = float(left @ left) / inflation**2 + float((z + step) @ (z + step))
+    return inflation, -len(left) * log(inflation) - 0.5 * misfit - 0.5 * float(np.linalg.slogdet(matrix)[1])
 
 
 def quantile_of(inflation: float, freedom: float) -> float:

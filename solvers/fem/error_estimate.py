@@ -37,6 +37,7 @@ from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.elasticity import deformation_jacobian, lame_constants, piola_stress
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.shared_work import shared
 from pinnray.solvers.solution import ErrorEstimate, State
 
 
@@ -152,14 +153,18 @@ class ErrorEstimator:
 
     @cached_property
     def recovery(self) -> GradientRecovery:
-        """The smoothing."""
-        return GradientRecovery(self.space)
+        """The smoothing, one for all solvers on a mesh."""
+        key = ("smoothing", self.space.mesh.digest, self.space.degree)
+        return shared(key, lambda: GradientRecovery(self.space))
 
     def gradient_error(self, nodal: FloatArray) -> FloatArray:
         """Smoothed minus own gradient at the quadrature points, shape (q, 2, 2)."""
-        smoothed, own = self.recovery.gradient(nodal).reshape(-1, 4), self._derivatives
-        flat = self._shapes @ smoothed
-        return np.asarray(flat.reshape(-1, 2, 2) - np.stack([along @ nodal for along in own], axis=-1))
+        smoothed = self._shapes @ self.recovery.gradient(nodal).reshape(-1, 4)
+        return np.asarray(smoothed.reshape(-1, 2, 2) - self._gradient(nodal))
+
+    def _gradient(self, nodal: FloatArray) -> FloatArray:
+        """Own gradient at the quadrature points, shape (q, 2, 2)."""
+        return np.stack([along @ nodal for along in self._derivatives], axis=-1)
 
     def force(self, stress: FloatArray) -> FloatArray:
         """Nodal forces R^T of a stress at the quadrature points, shape (q, 2, 2), MPa: (N, 2), N/mm."""
@@ -174,8 +179,7 @@ class ErrorEstimator:
         `solve` gives the change of the nodal displacements, mm, under nodal forces, N/mm, both (N, 2), while
         the prescribed values at base and contact are constant.
         """
-        own = LagrangeField(self.space, nodal)
-        gradient, difference = own.gradient(self.rule.location), self.gradient_error(nodal)
+        gradient, difference = self._gradient(nodal), self.gradient_error(nodal)
         state = State.from_gradient(gradient, self.problem)
         stress, von_mises = self._changes(gradient, difference)
         displacement = solve(self.force(stress))
@@ -189,7 +193,7 @@ class ErrorEstimator:
                 self.space,
                 nodal + displacement,
                 self.recovery.gradient(nodal),
-                None if self.problem.material.law == "linear" else own,
+                None if self.problem.material.law == "linear" else LagrangeField(self.space, nodal),
             ),
         )
 

@@ -1,7 +1,7 @@
 """`fem-id`: contact, walls and law from the markers, by finite elements at finite strain with moved walls."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Literal
@@ -17,6 +17,7 @@ from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import Registration
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
+from pinnray.solvers.assimilation.estimation import COST_CHANGE
 from pinnray.solvers.elasticity import Lame, deformation_jacobian, energy_density_of
 from pinnray.solvers.fem.boundary_conditions import dirichlet_conditions
 from pinnray.solvers.fem.dolfinx_compat import DolfinxSpace, NodeFunction
@@ -26,6 +27,8 @@ from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.thick_body import ThickBody
 from pinnray.solvers.identification.body import Body, Linearised
+from pinnray.solvers.identification.contacts import Contacts
+from pinnray.solvers.identification.cylinder_model import CylinderModel
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
@@ -82,6 +85,13 @@ class FemBody:
     def shape(self) -> tuple[int, ...]:
         """(N, 2)."""
         return self._clamped.shape
+
+    @property
+    def front(self) -> FloatArray:
+        """Nodes of the front that are not held."""
+        return self.space.nodes[
+            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
+        ]
 
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""
@@ -192,13 +202,14 @@ def _both_components(values: FloatArray) -> FloatArray:
 class FemIdSolver(IdentifyingSolver):
     """Finite elements whose contact, walls and law are found from the markers.
 
-    Markers of a real finger are on a side face, which bulges. With `sides="free"` the last steps are by a
-    `ThickBody`, on elements of 1 mm where the mesh has finer ones, and the field is that of the side face.
-    Else they are in plane strain, and intervals have the doubt of that.
+    Markers of a real finger are on a side face, which bulges; those of most simulated ones are in plane
+    strain. Both are fitted and weighed by the markers; the side face by a `ThickBody`, on elements of 1 mm
+    where the mesh has finer ones. With `sides="plane"`, or where a drawing has no depth, only plane strain
+    is, and intervals have the doubt of that.
     """
 
     degree: int = 2  # Of the elements, 1 or 2
-    sides: Literal["unknown", "free"] = "unknown"  # "free": a side face without traction shows the markers
+    sides: Literal["weighed", "plane"] = "weighed"  # Whether free side faces are weighed against the plane
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
@@ -228,12 +239,16 @@ class FemIdSolver(IdentifyingSolver):
         Fits share the elements; each search starts from the last result. It takes a progress, too. On a fine
         mesh the unknowns are sought on a coarse one first.
         """
-        kept: dict[tuple[Registration, Registration], Identifier | NestedSearch] = {}
+        kept: dict[tuple[Registration, Registration], Contacts] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
             started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
             if frames not in kept:
-                kept[frames] = self._search(replace(problem, observations=observations))
+                own = replace(problem, observations=observations)
+                sought = [self.unknowns]
+                if problem.load.kind == "cylinder":
+                    sought.insert(0, self.under_cylinder)
+                kept[frames] = Contacts([self._search(own, names) for names in sought])
             found = kept[frames].identify(observations, progress)
             mesh = found.best.model.unknowns.problem.mesh
             stats = {
@@ -246,26 +261,29 @@ class FemIdSolver(IdentifyingSolver):
 
         return fitted
 
-    def _search(self, problem: Problem) -> Identifier | NestedSearch:
-        coarse = coarser(problem)
-        if self.sides == "free":
-            _check_depth(problem.finger)
-            fine: Callable[[Unknowns], Body] = partial(ThickBody, degree=self.degree)
-            coarse = problem = coarse or problem
-        else:
-            fine = partial(FemBody, degree=self.degree)
-        if coarse is None:
-            return Identifier(self, problem, fine)
-        rough = Identifier(self, coarse, partial(FemBody, degree=self.degree), cost_change=ROUGHLY)
+    def _search(self, problem: Problem, names: Sequence[str]) -> NestedSearch:
+        coarse, seen = coarser(problem), problem.observations
+        plane_seen = seen is not None and seen.plane
+        weighed = self.sides == "weighed" and not plane_seen and has_depth(problem.finger)
+        plane, thick = partial(FemBody, degree=self.degree), partial(ThickBody, degree=self.degree)
+        accuracy = ROUGHLY if coarse else COST_CHANGE
+        rough = Identifier(self, coarse or problem, plane, names, cost_change=accuracy, weighed=weighed)
+
+        def other(there: Problem, body: Callable[[Unknowns], Body]) -> Identifier:
+            return Identifier(self, there, body, names, flexibility=rough.flexibility, weighed=weighed)
+
         return NestedSearch(
-            rough, Identifier(self, problem, fine, flexibility=rough.flexibility), _interpolated
+            rough,
+            _interpolated,
+            fine=other(problem, plane) if coarse else None,
+            thick=other(coarse or problem, thick) if weighed else None,
         )
 
 
-def _check_depth(finger: Finger | None) -> None:
-    """Refuse a finger without a depth of its own."""
-    if finger is None or (isinstance(finger, DrawnFinger) and finger.sources.get("depth") == "proposed"):
-        raise UserError("fem-id.sides=free: the drawing has no depth; give depth, mm")
+def has_depth(finger: Finger | None) -> bool:
+    """Whether a finger has a depth of its own."""
+    proposed = isinstance(finger, DrawnFinger) and finger.sources.get("depth") == "proposed"
+    return finger is not None and not proposed
 
 
 def _interpolated(fit: Fit, model: ResponseModel) -> Response:
@@ -274,7 +292,13 @@ def _interpolated(fit: Fit, model: ResponseModel) -> Response:
     if not (isinstance(here, FemBody) and isinstance(there, FemBody | ThickBody)):
         raise TypeError("the bodies of fem-id are finite elements")
     weights = here.space.shape_functions(there.space.mesh.locate_on(here.space.mesh, there.space.nodes))
-    known = np.stack([weights @ values for values in (fit.response.state, *fit.response.slopes)])
-    states = np.zeros((len(known), *there.shape))
-    states[..., :2] = known
-    return replace(fit.response, state=states[0], slopes=states[1:])
+
+    def finer(states: FloatArray) -> FloatArray:
+        found = np.zeros((len(states), *there.shape))
+        found[..., :2] = [weights @ state for state in states]
+        return found
+
+    if isinstance(model, CylinderModel):
+        return model.carried(fit.response, here.front, finer)
+    state, *slopes = finer(np.stack([fit.response.state, *fit.response.slopes]))
+    return replace(fit.response, state=state, slopes=np.array(slopes))

@@ -2,10 +2,11 @@
 
 Between the middle plane, z = 0, and a side face without traction, z = h, the displacement is
 
-    u, v = Σ_d f_d(z) c_d(x, y)  with f of 1, z² and cosh(z/ℓ)        w: with f of z and sinh(z/ℓ)
+    u, v = Σ_d f_d(z) c_d(x, y)  with f of 1, cosh(z/ℓ), cosh(z/m)        w: with f of z, sinh(z/ℓ), sinh(z/m)
 
-even and odd in z: bending across the depth, and the layer below a side face, as thick as a wall. All f of u
-and v but the first one have the mean zero, so that their c_0 is the mean over the depth. With the factors
+even and odd in z, with the lengths ℓ and m of what a side face changes below it: 0.3 and 1 times the walls'
+thickness. All f of u and v but the first one have the mean zero, so that their c_0 is the mean over the
+depth. With the factors
 t_md = (f_d, f_d, f'_d) of the derivatives along x, y and z, integrals over z come first and leave the
 plane's: a tangent A_ijkl(x, y, z) gives for the functions d of component i and e of component k
 
@@ -34,12 +35,16 @@ from pinnray.solvers.identification.unknowns import Unknowns
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.symmetric_factors import Factors
 
-COMPONENT = np.array([0, 1, 0, 1, 0, 1, 2, 2])
+COMPONENT = np.array([0, 1, 0, 1, 0, 1, 2, 2, 2])
 """Number of the component, u, v or w, of each of the D functions of z."""
-MEAN = np.array([1.0, 1.0, 0, 0, 0, 0, 0, 0])
+MEAN = np.array([1.0, 1.0, 0, 0, 0, 0, 0, 0, 0])
 """Their means over the depth."""
+LENGTHS = 0.3, 1.0
+"""ℓ and m over the walls' mean thickness. With them stresses of the side face of the default finger are 4 %
+off those of ten layers of tetrahedra, with z² and one length 11 %, with z² and both 3 % for half as much
+work again."""
 INNER, LAYER = roots_legendre(3), roots_legendre(4)
-"""Gauss' rules in the middle of the depth, and in the layer of four ℓ below a side face."""
+"""Gauss' rules in the middle of the depth, and in the layer of two walls below a side face."""
 
 
 class Functions(NamedTuple):
@@ -49,17 +54,18 @@ class Functions(NamedTuple):
     slopes: FloatArray
 
     @classmethod
-    def of(cls, z: FloatArray, half: float, layer: float) -> "Functions":
-        """At places z, mm, for h and ℓ, mm."""
-        s, steep, whole = z / half, z / layer, np.cosh(half / layer)
-        rows = [
-            (np.ones_like(z), np.zeros_like(z)),
-            (s**2 - 1 / 3, 2 * s / half),
-            (np.cosh(steep) / whole - layer / half * np.tanh(half / layer), np.sinh(steep) / whole / layer),
-            (s, np.full_like(z, 1 / half)),
-            (np.sinh(steep) / whole, np.cosh(steep) / whole / layer),
-        ]
-        values, slopes = np.array(rows)[[0, 0, 1, 1, 2, 2, 3, 4]].transpose(1, 2, 0)
+    def of(cls, z: FloatArray, half: float, thickness: float) -> "Functions":
+        """At places z, mm, for half of the depth and the walls' thickness, mm."""
+        even = [(np.ones_like(z), np.zeros_like(z))]
+        odd = [(z / half, np.full_like(z, 1 / half))]
+        for length in thickness * np.array(LENGTHS):
+            largest = np.cosh(half / length)
+            mean = length / half * np.tanh(half / length)
+            wave, slope = np.cosh(z / length) / largest, np.sinh(z / length) / largest
+            even.append((wave - mean, slope / length))
+            odd.append((slope, wave / length))
+        rows = [each for each in even for _ in range(2)] + odd
+        values, slopes = np.array(rows).transpose(1, 2, 0)
         return cls(values, slopes)
 
 
@@ -88,12 +94,12 @@ class ThickBody:
         problem = unknowns.problem
         if problem.finger is None:
             raise UserError("a finger without a depth has no side face")
-        half, layer = 0.5 * problem.finger.depth, mean_thickness(problem.mesh)
-        below = max(half - 4 * layer, 0.5 * half)
+        half, thickness = 0.5 * problem.finger.depth, mean_thickness(problem.mesh)
+        below = max(half - 2 * thickness, 0.5 * half)
         ends = (INNER, 0.0, below), (LAYER, below, half)
         places = np.concatenate([a + 0.5 * (b - a) * (1 + x) for (x, _), a, b in ends])
         self._shares = np.concatenate([0.5 * (b - a) * w for (_, w), a, b in ends]) / half
-        self._across, self._face = (Functions.of(z, half, layer) for z in (places, np.array([half])))
+        self._across, self._face = (Functions.of(z, half, thickness) for z in (places, np.array([half])))
         self._law, self.space = problem.material.law, LagrangeSpace(problem.mesh, degree)
         rule = body_quadrature(problem.mesh, 2)
         self._weights, self._elements = rule.weights, len(problem.mesh.triangles)
@@ -112,6 +118,13 @@ class ThickBody:
     def shape(self) -> tuple[int, ...]:
         """(N, D)."""
         return len(self.space.nodes), len(COMPONENT)
+
+    @property
+    def front(self) -> FloatArray:
+        """Nodes of the front that are not held."""
+        return self.space.nodes[
+            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
+        ]
 
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""

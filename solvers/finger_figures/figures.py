@@ -14,6 +14,7 @@ from pinnray.solvers.finger_figures.measures import (
     contact_arc,
     force_curve,
     front_ends,
+    gradients,
     largest_away_from_corners,
     largest_strain,
     narrowest_gap,
@@ -214,7 +215,8 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
         for name, share in FRACTIONS.items()
     }
     tip_u, tip_v = solution.displacement(front_ends(problem)[1:])[0]
-    (stress, strain), (peak, radius) = largest_away_from_corners(solution), largest_strain(solution)
+    at = gradients(solution)
+    (stress, strain), (peak, radius) = largest_away_from_corners(solution, at), largest_strain(solution, at)
     angle, touching = contact_arc(solution)
     return FingerFigures(
         force=force,

@@ -23,6 +23,10 @@ AT_CORNER = 0.25
 """Distance of a node from a corner over the mean wall thickness up to which it is said to be at it."""
 
 
+Gradients = tuple[FloatArray, FloatArray, IntArray | None]
+"""Places, displacement gradients there and, in a body of several materials, triangles; see `gradients`."""
+
+
 class Extreme(NamedTuple):
     """A largest value and the node where it is, shape (2,), mm; both NaN if no node counts."""
 
@@ -60,7 +64,7 @@ def wrap_angle(solution: Solution) -> float:
     return turn(after) - turn(before)
 
 
-def largest_away_from_corners(solution: Solution) -> tuple[Extreme, Extreme]:
+def largest_away_from_corners(solution: Solution, at: Gradients) -> tuple[Extreme, Extreme]:
     """The largest von Mises stress, MPa, and principal strain at nodes away from singular points.
 
     At sharp corners both grow without bound as elements shrink. Nodes nearer than the body's mean wall
@@ -72,7 +76,7 @@ def largest_away_from_corners(solution: Solution) -> tuple[Extreme, Extreme]:
     problem = solution.problem
     mesh = problem.mesh
     singular = np.concatenate([singular_points(mesh), mesh.points[contact_nodes(problem)]])
-    places, gradient, cells = _gradients(solution)
+    places, gradient, cells = at
     far = cKDTree(singular).query(places)[0] > mean_thickness(mesh)
     if not far.any():
         nowhere = Extreme(np.nan, np.full(2, np.nan))
@@ -85,7 +89,7 @@ def largest_away_from_corners(solution: Solution) -> tuple[Extreme, Extreme]:
     return stress, strain
 
 
-def largest_strain(solution: Solution) -> tuple[Extreme, float]:
+def largest_strain(solution: Solution, at: Gradients) -> tuple[Extreme, float]:
     """The largest principal strain of all nodes, and the radius of the corner there, mm.
 
     The radius is zero at a sharp corner, an end of the clamp and a contact that is no cylinder's, where the
@@ -93,7 +97,7 @@ def largest_strain(solution: Solution) -> tuple[Extreme, float]:
     `largest_away_from_corners`.
     """
     problem, mesh = solution.problem, solution.problem.mesh
-    places, gradient, _ = _gradients(solution)
+    places, gradient, _ = at
     strain: FloatArray = np.moveaxis(np.array(strain_of(problem.material.law, gradient)), -1, 0)
     principal = _principal(strain[:, :2, :2])
     peak = Extreme(float(principal.max()), places[principal.argmax()])
@@ -151,7 +155,7 @@ def turn(points: FloatArray) -> float:
     return float(np.degrees(np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)))
 
 
-def _gradients(solution: Solution) -> tuple[FloatArray, FloatArray, IntArray | None]:
+def gradients(solution: Solution) -> Gradients:
     """Nodes, shape (n, 2), mm, and displacement gradients there.
 
     In a body of several materials the middles of triangles, and these, shape (n,).

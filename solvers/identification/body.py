@@ -9,7 +9,7 @@ motion. F is the derivative of E by the rest of c.
 """
 
 from collections.abc import Callable
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray
@@ -87,4 +87,14 @@ class Body(Protocol):
 
     def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
         """Displacement gradients (s, n, d, d) of states (s, *shape): d is 3 on a side face, else 2."""
+        ...
+
+
+@runtime_checkable
+class PressedBody(Body, Protocol):
+    """A body whose front a cylinder may press: each equilibrium takes its response to many forces."""
+
+    @property
+    def front(self) -> FloatArray:
+        """Points of the front, shape (m, 2), mm, at which a cylinder is kept out."""
         ...

@@ -14,7 +14,6 @@ from pinnray.solvers.elasticity import deformation_jacobian
 from pinnray.solvers.identification.body import Body
 from pinnray.solvers.identification.boundary import RigidMotion
 from pinnray.solvers.identification.model import Response, ResponseModel
-from pinnray.solvers.identification.unknowns import doubt_of_the_plane
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import State
 
@@ -37,8 +36,16 @@ class Snapshot:
     state: FloatArray  # Its displacement without the clamp's
     pictures: Pictures  # Frames of the observations' pictures
 
+    def located(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
+        """Points of the problem's mesh in that of the body, which may be a coarser one."""
+        drawn, own = self.problem.mesh, self.walls.mesh
+        if isinstance(points, LocatedPoints):
+            return points if own is drawn else drawn.locate_on(own, points.points)
+        return drawn.locate_on(own, points)
+
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement of the material drawn at points, shape (n, 2), mm."""
+        location = self.located(location)
         places = location.points + self.walls.shifts(location, self.changes)
         return self.clamp.moved(places + self.body.field(self.state).displacement(location)) - places
 
@@ -48,7 +55,7 @@ class Snapshot:
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Gradient of the displacement by the place before the load, shape (n, 2, 2)."""
-        return self._gradient(self.body.field(self.state).gradient(location), location)
+        return gradients([self], location)[0][:, :2, :2]
 
     def _gradient(self, drawn: FloatArray, location: LocatedPoints) -> FloatArray:
         """`gradient` from that by the drawn position without the clamp, both of shape (n, d, d)."""
@@ -67,6 +74,7 @@ def displacements_in_space(snapshots: Sequence[Snapshot], location: LocatedPoint
     The functions of the body at the points, most of the work for a network, are evaluated once for all.
     """
     body, states = snapshots[0].body, np.array([each.state for each in snapshots])
+    location = snapshots[0].located(location)
     found, drawn = (
         [],
         zip(body.displacements(states, location), body.gradients(states, location), strict=True),
@@ -78,20 +86,27 @@ def displacements_in_space(snapshots: Sequence[Snapshot], location: LocatedPoint
     return found
 
 
+def gradients(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
+    """Gradients by the place before the load of snapshots of one body, each of shape (n, d, d).
+
+    They are in three dimensions, d = 3, on a side face.
+    """
+    location = snapshots[0].located(location)
+    drawn = snapshots[0].body.gradients(np.array([each.state for each in snapshots]), location)
+    return [each._gradient(by, location) for each, by in zip(snapshots, drawn, strict=True)]
+
+
 def von_mises_stresses(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
     """Von Mises stress of snapshots of one body, each of shape (n,), MPa, as `displacements_in_space`."""
-    drawn = snapshots[0].body.gradients(np.array([each.state for each in snapshots]), location)
-    return [
-        State.from_gradient(each._gradient(gradient, location), each.problem).von_mises
-        for each, gradient in zip(snapshots, drawn, strict=True)
-    ]
+    found = zip(snapshots, gradients(snapshots, location), strict=True)
+    return [State.from_gradient(gradient, each.problem).von_mises for each, gradient in found]
 
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """The finger by one law."""
+    """The finger by one fit."""
 
-    probability: float  # Of the law
+    probability: float  # Of law and side faces
     found: Snapshot  # The finger that was found
     steps: Sequence[Snapshot]  # The finger `STEP` times each of p independent standard errors away
     response: Response
@@ -100,21 +115,21 @@ class Member:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedField(Snapshot):
-    """The displacement by the most probable law, with deviations.
+    """The displacement by the most probable fit, with deviations.
 
-    They include the distances of the other laws from it, but not the error of the discretisation.
+    They include the distances of the other fits from it.
     """
 
-    members: Sequence[Member]  # The most probable law first
+    members: Sequence[Member]  # The most probable first
 
     def standard_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of `displacement_in_space` at points (n, 2), mm: shape (n, 2), mm."""
-        location = self._located(points)
+        location = _on(self.problem, points)
         return self._deviation(lambda them: displacements_in_space(them, location))
 
     def shown_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of what pictures show of the displacement at points (n, 2), mm: (n, 2), mm."""
-        location = self._located(points)
+        location = _on(self.problem, points)
         return self._deviation(
             lambda them: [
                 each.pictures.shown(location.points, moved)
@@ -124,17 +139,14 @@ class IdentifiedField(Snapshot):
 
     def von_mises_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of the von Mises stress at points (n, 2), mm: shape (n,), MPa."""
-        location = self._located(points)
+        location = _on(self.problem, points)
         found = self._deviation(lambda them: von_mises_stresses(them, location))
-        if not (share := doubt_of_the_plane(self.problem, self.body.thick)):
+        if not (share := self.members[0].model.doubt.stress):
             return found
         (own,), mesh = von_mises_stresses([self], location), self.problem.mesh
         (all_over,) = von_mises_stresses([self], mesh.at_centroids())
         # Over a section bending differs from that of the plane also where the plane has little stress.
         return np.hypot(found, share * np.hypot(own, np.sqrt(np.average(all_over**2, weights=mesh.areas))))
-
-    def _located(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
-        return points if isinstance(points, LocatedPoints) else self.problem.mesh.locate(points)
 
     def _deviation(self, quantities: Callable[[Sequence[Snapshot]], list[FloatArray]]) -> FloatArray:
         """Standard deviation of a quantity, a function of snapshots of one body."""
@@ -150,25 +162,12 @@ class IdentifiedField(Snapshot):
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedSideFace(IdentifiedField):
-    """That of a side face, whose body may be on a coarser mesh than the problem; it is a `SolidField`."""
-
-    def displacement(self, location: LocatedPoints) -> FloatArray:
-        """See `Snapshot`."""
-        return super().displacement(self._located(location))
-
-    def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
-        """See `Snapshot`."""
-        return super().displacement_in_space(self._located(location))
-
-    def gradient(self, location: LocatedPoints) -> FloatArray:
-        """See `Snapshot`."""
-        return self.solid_gradient(location)[:, :2, :2]
+    """That of a side face; it is a `SolidField`."""
 
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Gradient of the displacement by the place before the load, shape (n, 3, 3)."""
-        own = self._located(location)
-        return self._gradient(self.body.gradients(self.state[None], own)[0], own)
+        return gradients([self], location)[0]
 
-    def _located(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
-        places = points.points if isinstance(points, LocatedPoints) else points
-        return self.problem.mesh.locate_on(self.walls.mesh, places)
+
+def _on(problem: Problem, points: ArrayLike | LocatedPoints) -> LocatedPoints:
+    return points if isinstance(points, LocatedPoints) else problem.mesh.locate(points)

@@ -8,23 +8,31 @@ residuals r over φ σ, the sensitivities A and the standardised values z of `Es
 Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
 
 from pinnray.geometry.mesh.boundary import mean_thickness
-from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
-from pinnray.solvers.identification.unknowns import CONTACT, LAW_ODDS, SHARE, Unknowns
+from pinnray.solvers.identification.unknowns import (
+    CONTACT,
+    CONTACT_ODDS,
+    CYLINDER,
+    INDENTATION,
+    LAW_ODDS,
+    SHARE,
+    Unknowns,
+)
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
 SOURCES = {
-    "third dimension": "the third dimension, which plane strain leaves out: take fem-id.sides=free, "
-    "or weigh one press, and multiply the forces of other presses by the ratio of weighed to found",
+    "third dimension": "the third dimension, which plane strain leaves out: take fem-id with a finger that "
+    "has a depth, or weigh one press, and multiply the forces of others by the ratio of weighed to found",
     "markers": "the errors of the markers: film nearer or sharper, or use more markers",
     "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
     "contact": "place, width and pressure of the contact: put markers nearer to it",
@@ -36,13 +44,30 @@ SOURCES = {
 """What the variance of a force comes from, and what would narrow its interval."""
 
 
+SIDE_ODDS = 150.0
+"""Of free side faces to plane strain before the markers are seen: what `LAW_ODDS` calls very strong evidence
+is asked for plane strain, which only simulated markers have."""
+
+
+class FoundParameter(NamedTuple):
+    """An unknown with its standard deviation, interval and resolution; see `Estimate`."""
+
+    name: str
+    unit: str
+    value: float
+    deviation: float
+    low: float
+    high: float
+    resolution: float
+
+
 class Fit(NamedTuple):
     """The best values of the unknowns under one law."""
 
     model: ResponseModel  # The finger of that law as a function of the unknowns
     estimate: Estimate  # Values, covariance, residuals
     response: Response  # The equilibrium there
-    measurement: MarkerData  # The markers that were believed
+    measurement: MarkerData
     exact: bool  # Whether the equilibrium was found to the last digit, and by the finest discretisation
 
     @property
@@ -51,18 +76,31 @@ class Fit(NamedTuple):
         return self.model.unknowns.problem.material.law
 
     @property
+    def contact(self) -> Literal["cylinder", "patch"]:
+        """What presses: `cylinder` or `patch`."""
+        return "cylinder" if self.response.way else "patch"
+
+    @property
     def log_evidence(self) -> float:
         """Logarithm of the evidence, up to a constant that all laws share."""
         found = self.estimate
-        a, r = found.sensitivities, found.residuals
+        a, r = found.sensitivities[found.kept], found.residuals[found.kept]
         _, volume = np.linalg.slogdet(a.T @ a + np.eye(a.shape[1]))
         misfit = float(r @ r + found.z @ found.z)
-        return -len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
+        wrong = float(self.measurement.errors.log_odds[self.doubted].sum())
+        return wrong - len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
+
+    @property
+    def doubted(self) -> IntArray:
+        """Numbers, among the markers that were seen, of those that were left out as wrong."""
+        return np.flatnonzero(~self.estimate.kept[: 2 * len(self.measurement.points) : 2])
 
     @property
     def log_posterior(self) -> float:
-        """Logarithm of the law's probability, up to a constant that all laws share."""
-        return self.log_evidence + float(np.log(LAW_ODDS.get(self.law, 1.0)))
+        """Logarithm of the probability of law, contact and side faces, up to a constant that all share."""
+        odds = LAW_ODDS.get(self.law, 1.0) * CONTACT_ODDS[self.contact]
+        odds *= SIDE_ODDS if self.model.body.thick else 1.0
+        return self.log_evidence + float(np.log(odds))
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -75,16 +113,34 @@ class Fit(NamedTuple):
         return np.asarray(wider * found.slopes[:, None] * np.linalg.cholesky(found.covariance))
 
     @property
+    def parameters(self) -> list[FoundParameter]:
+        """What was found of each unknown; of the indentation, the normal force that goes with it."""
+        found, response = self.estimate, self.response
+        known = zip(found.values.tolist(), found.deviations.tolist(), found.intervals.tolist(), strict=True)
+        listed = []
+        for parameter, (value, deviation, (low, high)), share in zip(
+            found.parameters, known, found.resolution.tolist(), strict=True
+        ):
+            name, unit = parameter.name, parameter.unit
+            if name == INDENTATION:
+                name, unit, value = "normal_force", "N/mm", response.normal
+                slopes = response.normal_slopes * found.slopes
+                deviation = float(np.sqrt(slopes @ found.covariance @ slopes))
+                low, high = value - found.quantile * deviation, value + found.quantile * deviation
+            listed.append(FoundParameter(name, unit, value, deviation, low, high, share))
+        return listed
+
+    @property
     def place(self) -> tuple[float, float] | None:
         """Abscissa on the drawn front at which the force acts, and its standard deviation, mm; if unknown."""
         unknowns = self.model.unknowns
         if "position" not in unknowns.names:
             return None
-        return place_of(unknowns, self.response.values, self.standard_errors)
+        return place_of(unknowns, self.response, self.standard_errors)
 
     def component(self, direction: FloatArray) -> tuple[float, float]:
         """Component of the indenter's force in a direction, (2,), and its standard deviation, N/mm."""
-        return component_of(self.model, self.response.values, self.standard_errors, direction)
+        return component_of(self.model, self.response, self.standard_errors, direction)
 
     def variances(self, direction: FloatArray) -> dict[str, float]:
         """Variance of that component, (N/mm)^2, by what it comes from: names of `SOURCES`.
@@ -93,34 +149,35 @@ class Fit(NamedTuple):
         is the sum of independent parts. Where φ is above one, all but 1 / φ^2 of the observations' is misfit.
         """
         found, unknowns = self.estimate, self.model.unknowns
-        slopes = unknowns.slopes(self.response.values).force @ direction * found.slopes
+        slopes = self.response.force_slopes @ direction * found.slopes
         spread = found.quantile / NORMAL * found.covariance @ slopes
-        noise, misfit = float(((found.sensitivities @ spread) ** 2).sum()), 1 - 1 / found.inflation**2
-        value = float(self.response.hypothesis.force @ direction)
+        noise = float(((found.sensitivities[found.kept] @ spread) ** 2).sum())
+        misfit = 1 - 1 / found.inflation**2
+        value = float(self.response.force @ direction)
         parts = dict.fromkeys(SOURCES, 0.0)
-        parts["third dimension"] = (self.model.doubt * value) ** 2
+        parts["third dimension"] = (self.model.doubt.force * value) ** 2
         parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
         for name, part in zip(unknowns.names, spread.tolist(), strict=True):
-            contact, frame = name in (*CONTACT, SHARE), name.startswith(("pressed", "drawn"))
+            contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
+            frame = name.startswith(("pressed", "drawn"))
             parts["contact" if contact else "frames" if frame else "finger"] += part**2
         return parts
 
 
 def component_of(
-    model: ResponseModel, values: FloatArray, errors: FloatArray, direction: FloatArray
+    model: ResponseModel, response: Response, errors: FloatArray, direction: FloatArray
 ) -> tuple[float, float]:
     """Component of the force in a direction, (2,), and its standard deviation, N/mm.
 
-    It is for values, shape (p,), with independent errors, shape (p, k).
+    It is of a response whose unknowns have independent errors, shape (p, k).
     """
-    component = float(model.unknowns.hypothesis(values).force @ direction)
-    slopes = model.unknowns.slopes(values).force @ direction
-    return component, float(np.hypot(np.linalg.norm(slopes @ errors), model.doubt * component))
+    component = float(response.force @ direction)
+    spread = response.force_slopes @ direction @ errors
+    return component, float(np.hypot(np.linalg.norm(spread), model.doubt.force * component))
 
 
-def place_of(unknowns: Unknowns, values: FloatArray, errors: FloatArray) -> tuple[float, float]:
+def place_of(unknowns: Unknowns, response: Response, errors: FloatArray) -> tuple[float, float]:
     """As `component_of`, the abscissa on the drawn front at which the force acts, mm."""
-    along = np.isin(unknowns.names, ("position", "eccentricity")).astype(np.float64)
     # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
     couple = 0.25 * mean_thickness(unknowns.problem.mesh)
-    return float(along @ values), float(np.hypot(np.linalg.norm(along @ errors), couple))
+    return response.place, float(np.hypot(np.linalg.norm(response.place_slopes @ errors), couple))

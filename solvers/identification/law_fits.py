@@ -6,17 +6,18 @@ from dataclasses import replace
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estimate
+from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estimate, values_of
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
+from pinnray.solvers.identification.unknowns import INDENTATION
 from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
 HELD = 1e-3
 """Factor of the standard deviation of a parameter that is held."""
 
 MOST_LOST = 8
-"""Hypotheses without equilibrium at which a search ends: near a limit load there are ever more of them."""
+"""Hypotheses without equilibrium at which a search ends: each costs all halvings of the way to it."""
 
 
 class LawFits:
@@ -48,6 +49,7 @@ class LawFits:
             measurement.noise,
             self.parameters,
             fit.estimate.z,
+            measurement.errors,
         )
         return fit._replace(
             estimate=found,
@@ -59,51 +61,50 @@ class LawFits:
         self,
         law: LawName,
         measurement: MarkerData,
-        near: Fit | None,
-        start: FloatArray | None = None,
+        near: Fit | FloatArray,
         *,
         held: Sequence[str] = (),
         **limits: int,
     ) -> Fit:
         """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`.
 
-        A wide contact that the start has is soon lost, while the frame and the walls are those of a narrow
-        one. What is `held` stays, and its value in the fit is zero.
+        The values are at rest: the indentation that a linear finger would need is added. What is `held`
+        stays, and its value in the fit is zero.
         """
         model = self._model(law)
         markers = MarkerModel(model, measurement)
-        model.restart(None if near is None else near.response)
+        model.restart(near.response if isinstance(near, Fit) else None)
 
         def predict(values: FloatArray) -> Prediction | None:
-            force = np.linalg.norm(model.unknowns.hypothesis(values).force)
-            self.progress(0.5, f"{law}: force {force:.4g} N/mm")
             found = model.response(values)
             if found is None and model.evaluations == first:  # another law's start was too far away
                 model.restart(None)
                 found = model.response(values)
             if found is not None:
+                self.progress(0.5, f"{law}: force {np.linalg.norm(found.force):.4g} N/mm")
                 reached[values.tobytes()] = found
                 return markers.predicted(found)
             lost.append(values)
-            nowhere = not reached and (explained_elsewhere or len(lost) > 1)  # nor where the priors are
+            nowhere = not reached and len(lost) > most  # nor, from values, where the priors are
             if nowhere or len(lost) > MOST_LOST:
                 raise nothing
             return None
 
-        if near is not None:
-            start = near.estimate.z
-        elif start is None:
-            start = self._pressed(model, markers)
+        kept, most = None, 1
+        if isinstance(near, Fit):  # where one law explains the markers, another one does as well, or nowhere
+            start, most = near.estimate.z, 0
+            if len(near.estimate.kept) == len(measurement.observed):
+                kept = near.estimate.kept
+        else:
+            start = self._pressed(model, markers, near)
         parameters = self.parameters
         if held:
             parameters = self._holding(held, start)
             start = np.where(np.isin(self._names, held), 0.0, start)
-        # Where one law explains the markers, another one does as well, or nowhere.
-        explained_elsewhere = near is not None and near.law != law and near.estimate.converged
         first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
         nothing = NoSolutionError(
-            f"no equilibrium of the {law} law was found near the markers, from rest or from the force of a "
-            "linear finger; see whether the markers are of this finger and load, or take a smaller prior"
+            f"no equilibrium of the {law} law was found near the markers, from rest or from where a linear "
+            "finger would be; see whether the markers are of this finger and load, or take a smaller prior"
         )
         found = estimate(
             predict,
@@ -111,6 +112,8 @@ class LawFits:
             measurement.noise,
             parameters,
             start,
+            measurement.errors,
+            kept,
             cost_change=self._cost_change,
             **limits,
         )
@@ -120,15 +123,17 @@ class LawFits:
         exact = model.response(found.values, EXACT)
         return Fit(model, found, exact or rough, measurement, exact is not None)
 
-    def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
-        """Standardised values with the normal force that a linear finger would need, the rest as expected."""
-        z = np.zeros(len(self._names))
-        at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
+    def _pressed(self, model: ResponseModel, markers: MarkerModel, start: FloatArray) -> FloatArray:
+        """Standardised values with the indentation of a linear finger; a cylinder has the start's travel."""
+        z = start.copy()
+        if INDENTATION not in self._names:
+            return z
+        at_rest = model.response(values_of(self.parameters, start)[0])
         if at_rest is not None:
-            which, noise = self._names.index("normal_force"), markers.measurement.noise
+            which, noise = self._names.index(INDENTATION), markers.measurement.noise
             slope = markers.predicted(at_rest)[1][:, which] / noise
-            force = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
-            z[which] = force / self.parameters[which].scale
+            pressed = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
+            z[which] = pressed / self.parameters[which].scale
         return z
 
     def _holding(self, held: Sequence[str], z: FloatArray) -> list[Parameter]:

@@ -5,7 +5,12 @@ is the place of the contact; with the tangent K there,
 
     K c' = (f · b + m · ∂b/∂x)' - ∂F/∂θ
 
-where the base is held; at its feet c' is their motion, and ∂F/∂θ the force of that alone.
+where the base is held; at its feet c' is their motion, and ∂F/∂θ the force of that alone. Where the unknowns
+have an indentation d in place of the normal force N, with a load N p + q, N follows from n · b · c = d:
+
+    ΔN = (d - n · b · (c + Δc)) / (n · b · K⁻¹ p)        Δc = K⁻¹ (N p + q - F)
+
+which has a solution where K is singular, too: where N is largest, and beyond.
 
 A marker is at a fixed place P of the drawn body; where the walls have moved by W, the material there was
 drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
@@ -13,26 +18,30 @@ drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and
 """
 
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.estimation import Prediction
+from pinnray.solvers.assimilation.estimation import GrossErrors, Prediction
 from pinnray.solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
 from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
-from pinnray.solvers.identification.unknowns import Hypothesis, Unknowns, doubt_of_the_plane
+from pinnray.solvers.identification.front_contact import Stage
+from pinnray.solvers.identification.unknowns import RESOLVED, Doubt, Hypothesis, Unknowns
 from pinnray.solvers.solver import NoSolutionError
 
 MAX_ITERATIONS, HALVINGS = 8, 4
 """Newton iterations before a guess counts as too far away; times that the way there is then halved."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
+WRONG, OFF = 100.0, 1.0
+"""Markers of which one is not where it seems to be, and the size of its error, mm, or far more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,22 +55,31 @@ class Response:
     motion: RigidMotion  # Of the clamp
     contact: FloatArray  # Mean displacement of the contact, shape (2,), mm
     contact_slopes: FloatArray  # Shape (p, 2)
+    normal: float  # Normal force, N/mm
+    normal_slopes: FloatArray  # Shape (p,)
+    force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
+    force_slopes: FloatArray  # Shape (p, 2)
+    place: float  # Abscissa on the drawn front at which it acts, mm
+    place_slopes: FloatArray  # Shape (p,)
+    way: tuple[Stage, ...] = ()  # Of a cylinder, from its first stage to this equilibrium
 
 
 class ResponseModel:
-    """Responses of a discretised finger to the unknowns; each starts from the last one."""
+    """Responses of a discretised finger to the unknowns; each starts from the last one.
 
-    def __init__(self, body: Body, unknowns: Unknowns) -> None:
+    Args:
+        body: The finger.
+        unknowns: Their values are what it responds to.
+        weighed: Whether plane strain and free side faces are weighed by the markers.
+    """
+
+    def __init__(self, body: Body, unknowns: Unknowns, *, weighed: bool = False) -> None:
         self.body, self.unknowns = body, unknowns
+        self.doubt = RESOLVED if weighed else Doubt.of_the_plane(unknowns.problem)
         self._clamp = Clamp(unknowns.problem.mesh)
         self._last: Response | None = None
         self._marker_rows: dict[tuple[bytes, float], tuple[FloatArray, FloatArray]] = {}
         self.evaluations = 0
-
-    @property
-    def doubt(self) -> float:
-        """See `doubt_of_the_plane`."""
-        return doubt_of_the_plane(self.unknowns.problem, self.body.thick)
 
     def flexibility(self) -> float:
         """Displacement of the drawn contact into the finger under a unit force, mm per N/mm."""
@@ -113,13 +131,18 @@ class ResponseModel:
     def extrapolated(self, about: Response, values: FloatArray) -> Response:
         """The response at values of the unknowns, shape (p,), to first order about another one."""
         step = values - about.values
+        normal = about.normal + float(step @ about.normal_slopes)
+        hypothesis = self.unknowns.hypothesis(values, normal)
         return replace(
             about,
             values=values.copy(),
-            hypothesis=self.unknowns.hypothesis(values),
+            hypothesis=hypothesis,
             state=about.state + np.tensordot(step, about.slopes, axes=1),
             motion=about.motion.extrapolated(step),
             contact=about.contact + step @ about.contact_slopes,
+            normal=normal,
+            force=hypothesis.force,
+            place=about.place + float(step @ about.place_slopes),
         )
 
     def marker_rows(self, points: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
@@ -161,15 +184,18 @@ class ResponseModel:
         self, values: FloatArray, tolerance: float, iterations: int, slopes: FloatArray | None
     ) -> Response | None:
         """The response by Newton's method from the last one, extrapolated along its derivatives."""
-        hypothesis = self.unknowns.hypothesis(values)
-        state = np.zeros(self.body.shape)
+        state, normal = np.zeros(self.body.shape), 0.0
         if self._last is not None:
-            state = self._last.state + np.tensordot(values - self._last.values, self._last.slopes, axes=1)
+            there = values - self._last.values
+            state = self._last.state + np.tensordot(there, self._last.slopes, axes=1)
+            normal = self._last.normal + float(there @ self._last.normal_slopes)
+        hypothesis = self.unknowns.hypothesis(values)
         feet = self.body.feet
         state = np.where(feet.any(axis=0), np.tensordot(hypothesis.feet, feet, axes=1), state)
         traction = self._traction(hypothesis.position, hypothesis.width)
-        load = np.tensordot(hypothesis.force, traction[0], axes=1)
-        load += np.tensordot(hypothesis.couple, traction[1], axes=1)
+        load = self._load(hypothesis, traction)
+        push = self._load(self.unknowns.hypothesis(values, 1.0), traction) - load  # zero if N is given
+        into = np.tensordot(self.unknowns.directions[0], traction[0], axes=1)
         before, step = np.inf, np.zeros(self.body.shape)
         for _ in range(iterations):
             length = 1.0
@@ -181,10 +207,16 @@ class ResponseModel:
             if linearised is None:
                 return None
             state = state + length * step
-            balance = load - linearised.force
-            step = linearised.solve(balance[None])[0]
+            balance = load + normal * push - linearised.force
+            if push.any():
+                free, pushed = linearised.solve(np.stack([balance, push]))
+                gap = hypothesis.indentation - float((into * (state + free)).sum())
+                more = gap / float((into * pushed).sum())
+                normal, balance, step = normal + more, balance + more * push, free + more * pushed
+            else:
+                step = linearised.solve(balance[None])[0]
             # The least work, N mm/mm, moves a finger by some ten nanometres.
-            work = max(abs(float((load * state).sum())), 1e-10)
+            work = max(abs(float(((load + normal * push) * state).sum())), 1e-10)
             size = float(np.sqrt(abs((step * balance).sum()) / work)) if balance.any() else 0.0
             # Large steps must not grow: the guess is too far away.
             if not np.isfinite(size) or size > max(before, 0.1):
@@ -192,22 +224,30 @@ class ResponseModel:
             if size < tolerance:
                 if self.body.admissible(state + step, hypothesis.changes):
                     state = state + step
+                by_normal = np.zeros(len(values)) if self._last is None else self._last.normal_slopes
                 if slopes is None:
-                    slopes = self._slopes(values, hypothesis, state, linearised, traction)
-                return self._response(values, hypothesis, state, slopes, traction)
+                    slopes, by_normal = self._slopes(values, normal, state, linearised, traction, push)
+                return self._response(values, (normal, by_normal), state, slopes, traction)
             before = size
         return None
+
+    def _load(self, hypothesis: Hypothesis, traction: FloatArray) -> FloatArray:
+        """The load of a contact, of the shape of a state."""
+        along = np.tensordot(hypothesis.force, traction[0], axes=1)
+        return np.asarray(along + np.tensordot(hypothesis.couple, traction[1], axes=1))
 
     def _slopes(
         self,
         values: FloatArray,
-        hypothesis: Hypothesis,
+        normal: float,
         state: FloatArray,
         linearised: Linearised,
         traction: FloatArray,
-    ) -> FloatArray:
-        """C' at a state."""
-        force, couple, slope = hypothesis.force, hypothesis.couple, self.unknowns.slopes(values)
+        push: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """C' and the derivatives of N, shape (p,), at a state."""
+        hypothesis, slope = self.unknowns.hypothesis(values, normal), self.unknowns.slopes(values, normal)
+        force, couple = hypothesis.force, hypothesis.couple
         parts = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
         right = np.tensordot(slope.force, traction[0], axes=1)
         right += np.tensordot(slope.couple, traction[1], axes=1)
@@ -216,17 +256,29 @@ class ResponseModel:
             right += np.multiply.outer(by, change)
         for by, part in zip((slope.changes, slope.moduli, slope.feet), parts, strict=True):
             right -= np.tensordot(by, part, axes=1)
-        return linearised.solve(right) + np.tensordot(slope.feet, self.body.feet, axes=1)
+        held = np.tensordot(slope.feet, self.body.feet, axes=1)
+        if not push.any():
+            return linearised.solve(right) + held, np.zeros(len(values))
+        *free, pushed = linearised.solve(np.concatenate([right, push[None]]))
+        free = np.asarray(free) + held
+        rows = np.tensordot(self.unknowns.directions[0], traction[:3], axes=(0, 1))
+        _, by_position, by_width = np.tensordot(rows, state, axes=state.ndim)
+        gaps = slope.indentation - slope.position * by_position - slope.width * by_width
+        gaps -= np.tensordot(free, rows[0], axes=state.ndim)
+        by_normal = gaps / float((rows[0] * pushed).sum())
+        return free + np.multiply.outer(by_normal, pushed), by_normal
 
     def _response(
         self,
         values: FloatArray,
-        hypothesis: Hypothesis,
+        normal: tuple[float, FloatArray],
         state: FloatArray,
         slopes: FloatArray,
         traction: FloatArray,
     ) -> Response:
-        force, slope = hypothesis.force, self.unknowns.slopes(values)
+        """The response at a state; the normal force comes with its derivatives."""
+        hypothesis, slope = self.unknowns.hypothesis(values, normal[0]), self.unknowns.slopes(values, *normal)
+        force = hypothesis.force
         inner = tuple(range(1, slopes.ndim))
         contact, by_position, by_width = np.asarray(np.tensordot(traction[:3], state, axes=state.ndim))
         contact_slopes: FloatArray = np.tensordot(slopes, traction[0], axes=(inner, inner))
@@ -238,7 +290,20 @@ class ResponseModel:
         motion = self._clamp.motion(
             (hypothesis.softness, slope.softness), (force, slope.force), (places[0] + contact, place_slopes)
         )
-        return Response(values.copy(), hypothesis, state, slopes, motion, contact, contact_slopes)
+        return Response(
+            values.copy(),
+            hypothesis,
+            state,
+            slopes,
+            motion,
+            contact,
+            contact_slopes,
+            *normal,
+            force,
+            slope.force,
+            hypothesis.position + hypothesis.eccentricity,
+            slope.position + slope.eccentricity,
+        )
 
     def _traction(self, position: float, width: float) -> FloatArray:
         """Rows (5, 2, *shape) of the traction and its derivatives; see `FrontTraction.weights`."""
@@ -254,7 +319,6 @@ class MarkerData:
     displacements: FloatArray  # Shape (m, 2), mm
     deviations: FloatArray  # Their standard deviations, shape (m, 2), mm
     radius: float  # Of the discs over which the displacement is averaged, mm
-    kept: IntArray  # Numbers of the markers among those that were seen, ascending, shape (m,)
     # Force of the indenter along y per depth, with its standard deviation, N/mm
     reaction: tuple[float, float] | None = None
 
@@ -275,20 +339,14 @@ class MarkerData:
             observations.displacements[observations.visible],
             standard_deviations(observations),
             radius_within(mesh, points, observations.marker_radius if radius is None else radius),
-            np.arange(len(points)),
             reaction,
         )
 
-    def only(self, numbers: IntArray) -> "MarkerData":
-        """The measurement of some of its markers, by their numbers among those that were seen."""
-        chosen = np.isin(self.kept, numbers)
-        return replace(
-            self,
-            points=self.points[chosen],
-            displacements=self.displacements[chosen],
-            deviations=self.deviations[chosen],
-            kept=self.kept[chosen],
-        )
+    @property
+    def errors(self) -> GrossErrors:
+        """Markers that may be elsewhere."""
+        rows = np.arange(2 * len(self.points)).reshape(-1, 2)
+        return GrossErrors(rows, np.log(self.deviations / OFF).sum(axis=1) - log(WRONG))
 
     @property
     def observed(self) -> FloatArray:
@@ -339,4 +397,4 @@ class MarkerModel:
         values, derivatives = moved.ravel(), moved_slopes.reshape(len(moved_slopes), -1).T
         if self.measurement.reaction is None:
             return values, derivatives
-        return np.append(values, hypothesis.force[1]), np.vstack([derivatives, by.force[:, 1]])
+        return np.append(values, response.force[1]), np.vstack([derivatives, response.force_slopes[:, 1]])

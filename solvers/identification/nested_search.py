@@ -1,17 +1,19 @@
-"""The unknowns sought by a coarse discretisation of the finger and carried to a fine one."""
+"""The unknowns sought by a coarse discretisation of the finger and carried to others."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from pinnray.geometry.observations import Observations
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
-from pinnray.solvers.identification.result import Identified
+from pinnray.solvers.identification.result import CONTRADICTED, Identified
 from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.solver import Progress, silent
 
 IMPROBABLE = 8.0
-"""Logarithm of the ratio of probabilities by a coarse discretisation from which on a law is not carried to a
-fine one: the fine one changed it by up to 3.5, and a law of one in a hundred has no weight."""
+"""Logarithm of the ratio of probabilities from which on a fit is not carried to a finer discretisation: that
+changed it by up to 3.5, and a law of one in a hundred has no weight."""
 
 ROUGHLY = 1e-2
 """Relative change of the cost below which a coarse search has converged: the steps of the fine one are as
@@ -19,34 +21,53 @@ large, and by a coarse one the force's place makes the cost rough."""
 
 
 class NestedSearch:
-    """Finds the unknowns by a coarse discretisation and carries them to a fine one; see `Identifier`.
+    """Finds the unknowns by a coarse discretisation and carries them to others; see `Identifier`.
 
     Args:
         coarse: Seeks by coarse finite elements.
-        fine: Of the same laws, discretised finely.
-        carried: The response of a coarse fit, with its derivatives, in the discretisation of a fine model.
+        carried: The response of a coarse fit, with its derivatives, in the discretisation of another model.
+        fine: Of the same laws, discretised finely; None where the coarse elements are fine enough.
+        thick: Of the same laws, with free side faces, which are weighed against the plane; None if the
+            finger has no depth.
     """
 
     def __init__(
-        self, coarse: Identifier, fine: Identifier, carried: Callable[[Fit, ResponseModel], Response]
+        self,
+        coarse: Identifier,
+        carried: Callable[[Fit, ResponseModel], Response],
+        *,
+        fine: Identifier | None = None,
+        thick: Identifier | None = None,
     ) -> None:
-        self._coarse, self._fine, self._carried = coarse, fine, carried
+        self._coarse, self._carried, self._fine, self._thick = coarse, carried, fine, thick
 
-    def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
-        """The unknowns under every law, and the laws' probabilities; see `Identifier`."""
+    def identify(
+        self, observations: Observations, progress: Progress = silent, rival: float = -np.inf
+    ) -> Identified:
+        """The unknowns under every law, with free side faces and without, and their probabilities.
 
-        def polished(fit: Fit) -> Fit:
-            progress(0.6, f"{fit.law}: finer")
-            model = self._fine.model(fit.law)
-            start = fit._replace(model=model, response=self._carried(fit, model))
-            return self._fine.polished(start, observations)
+        What is far less probable than a rival of a logarithm is not carried to other elements.
+        """
+
+        def carried(fits: Sequence[Fit], other: Identifier, said: str, least: float = -np.inf) -> list[Fit]:
+            found = []
+            for fit in fits:
+                progress(0.6, f"{fit.law}: {said}")
+                model = other.model(fit.law)
+                start = fit._replace(model=model, response=self._carried(fit, model))
+                found.append(other.polished(start, observations, least))
+            return found
 
         found = self._coarse.identify(observations, lambda share, text: progress(0.6 * share, text))
-        fits = [polished(found.best)]
-        least = min(found.best.log_posterior, fits[0].log_posterior) - IMPROBABLE
-        fits += [polished(fit) if fit.log_posterior > least else fit for fit in found.fits[1:]]
-        return Identified.ranked(fits, found.doubtful, found.lost)
+        least = max(found.best.log_posterior, rival) - IMPROBABLE
+        likely = [fit for fit in found.fits if fit.log_posterior > least]
+        rest, thick = found.fits[len(likely) :], list[Fit]()
+        plane = likely if self._fine is None else carried(likely, self._fine, "finer")
+        if self._thick is not None and likely and found.best.estimate.inflation < CONTRADICTED:
+            least = plane[0].log_posterior - IMPROBABLE
+            thick = carried(likely, self._thick, "with free side faces", least)
+        return Identified.ranked([*plane, *thick, *rest], found.lost)
 
     def updated(self, found: Identified, observations: Observations) -> Identified:
         """The unknowns for observations near those of fits, to first order; see `Identifier`."""
-        return self._fine.updated(found, observations)
+        return self._coarse.updated(found, observations)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.estimation import LEVEL
+from pinnray.solvers.assimilation.estimation import LEVEL, MIN_RESOLUTION
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.field import (
@@ -44,24 +44,19 @@ PROBABLE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """The fits of all laws to one measurement."""
+    """The fits to one measurement, one for each law in plane strain and with free side faces."""
 
-    fits: Sequence[Fit]  # The most probable law first
-    probabilities: FloatArray  # Of the laws, shape (number of fits,)
-    # Markers that contradict the others and were not used: number among those seen, and their computed
-    # minus their observed displacement, shape (2,), mm
-    doubtful: Mapping[int, FloatArray]
+    fits: Sequence[Fit]  # The most probable first
+    probabilities: FloatArray  # Shape (number of fits,)
     lost: Sequence[LawName] = ()  # Laws of which no equilibrium was found near the markers
 
     @classmethod
-    def ranked(
-        cls, fits: Sequence[Fit], doubtful: Mapping[int, FloatArray], lost: Sequence[LawName] = ()
-    ) -> "Identified":
+    def ranked(cls, fits: Sequence[Fit], lost: Sequence[LawName] = ()) -> "Identified":
         """The fits, given in any order."""
         ordered = sorted(fits, key=lambda fit: -fit.log_posterior)
         logs = np.array([fit.log_posterior for fit in ordered])
         weights = np.exp(logs - logs.max())
-        return cls(ordered, weights / weights.sum(), doubtful, lost)
+        return cls(ordered, weights / weights.sum(), lost)
 
     @property
     def best(self) -> Fit:
@@ -85,7 +80,14 @@ class Identified:
             self._mean(places) if places else None,
             shares,
             f"{100 * share:.0f} % of the variance of the force comes from {SOURCES[first]}.",
+            self.best.contact,
         )
+
+    def _cylinder(self) -> float | None:
+        """Probability of the contact of a cylinder; None where the load has none."""
+        if self.best.model.unknowns.problem.load.kind != "cylinder":
+            return None
+        return float(self.probabilities @ np.array([fit.contact == "cylinder" for fit in self.fits]))
 
     def _mean(self, found: Sequence[tuple[float, float]]) -> Estimated:
         """The mean over the laws of a value with its standard deviation by each."""
@@ -110,7 +112,7 @@ class Identified:
         best = self.best
         hypothesis = best.response.hypothesis
         unstable = best.model.unstable(best.response)
-        missed, left_out = self._residuals()
+        missed, without = self._residuals()
         members = [
             _member(fit, float(probability), problem)
             for fit, probability in zip(self.fits, self.probabilities, strict=True)
@@ -125,7 +127,7 @@ class Identified:
             problem=field.problem,
             field=field,
             energy=best.model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
-            reaction=hypothesis.force,
+            reaction=best.response.force,
             status=Status(
                 best.estimate.converged and best.exact and not unstable and not contradicted,
                 f"{unstable_phrase(unstable)}; {sentence}" if unstable else sentence,
@@ -136,7 +138,7 @@ class Identified:
                 ],
             ),
             stats={**stats, **self.stats(), "unstable_directions": unstable},
-            left_out=leave_one_out_displacements(problem, left_out),
+            left_out=leave_one_out_displacements(problem, -without),
             uncertainty=Uncertainty(
                 field.standard_deviation, field.von_mises_deviation, field.shown_deviation if loose else None
             ),
@@ -145,26 +147,31 @@ class Identified:
         )
 
     def _residuals(self) -> tuple[FloatArray, FloatArray]:
-        """Misfit of the markers that were believed, computed minus observed, shape (m, 2), mm.
+        """Misfit of the markers that were seen, computed minus observed, and without each, (m, 2), mm."""
+        best = self.best
+        rows = np.arange(2 * len(best.measurement.points)).reshape(-1, 2)
+        scale = best.estimate.inflation * best.measurement.noise[rows]
+        without = np.array([best.estimate.residuals_without(each) for each in rows])
+        return best.estimate.residuals[rows] * scale, without * scale
 
-        And for all markers that were seen: observed minus predicted without the marker.
-        """
-        estimate, kept = self.best.estimate, self.best.measurement.kept
-        scale = estimate.inflation * self.best.measurement.noise
-        missed = (estimate.residuals * scale)[: 2 * len(kept)].reshape(-1, 2)
-        left_out = np.zeros((len(kept) + len(self.doubtful), 2))
-        for place, marker in enumerate(kept):
-            rows = np.array([2 * place, 2 * place + 1])
-            left_out[marker] = -estimate.residuals_without(rows) * scale[rows]
-        for marker, off in self.doubtful.items():
-            left_out[marker] = -off
-        return missed, left_out
+    def _laws(self) -> dict[LawName, float]:
+        """Probability of every law, the most probable fit's first."""
+        found = dict.fromkeys((fit.law for fit in self.fits), 0.0)
+        for fit, probability in zip(self.fits, self.probabilities.tolist(), strict=True):
+            found[fit.law] += probability
+        return found
+
+    def _free_sides(self) -> float | None:
+        """Probability of free side faces; None if they were not weighed against plane strain."""
+        free = np.array([fit.model.body.thick for fit in self.fits])
+        return float(self.probabilities @ free) if free.any() else None
 
     def _contradictions(self) -> list[str]:
-        """A clause on each marker that was not believed."""
+        """A clause on each marker that was left out."""
+        missed, _ = self._residuals()
         return [
-            f"MARKER {number + 1} of those seen CONTRADICTS the others by {np.linalg.norm(off):.2g} mm"
-            for number, off in self.doubtful.items()
+            f"MARKER {each + 1} of those seen CONTRADICTS the others by {np.linalg.norm(missed[each]):.2g} mm"
+            for each in self.best.doubted
         ]
 
     def _unexplained(self) -> list[str]:
@@ -204,16 +211,10 @@ class Identified:
             "evaluations": found.evaluations,
             "inflation": found.inflation,
         }
-        columns = zip(
-            found.parameters, found.values, found.deviations, found.intervals, found.resolution, strict=True
-        )
-        for parameter, value, deviation, (low, high), resolution in columns:
-            numbers |= {
-                parameter.name: float(value),
-                f"{parameter.name}_deviation": float(deviation),
-                f"{parameter.name}_low": float(low),
-                f"{parameter.name}_high": float(high),
-                f"{parameter.name}_resolution": float(resolution),
+        for name, _, value, *rest in self.best.parameters:
+            columns = ("deviation", "low", "high", "resolution")
+            numbers |= {name: value} | {
+                f"{name}_{column}": each for column, each in zip(columns, rest, strict=True)
             }
         force, low, high = self.force().force
         numbers |= {
@@ -222,19 +223,22 @@ class Identified:
             "force_low": low,
             "force_high": high,
         }
-        for fit, probability in zip(self.fits, self.probabilities, strict=True):
-            numbers |= {
-                f"probability {fit.law}": float(probability),
-                f"log_evidence {fit.law}": fit.log_evidence,
-            }
-        return numbers | {"doubtful_markers": len(self.doubtful)}
+        for name, probability in self._laws().items():
+            numbers[f"probability {name}"] = probability
+        for fit in reversed(self.fits):  # that of the best one stays
+            numbers[f"log_evidence {fit.law}"] = fit.log_evidence
+        if (sides := self._free_sides()) is not None:
+            numbers["probability free sides"] = sides
+        if (cylinder := self._cylinder()) is not None:
+            numbers["probability cylinder"] = cylinder
+        return numbers | {"doubtful_markers": len(self.best.doubted)}
 
     def sentence(self, missed: FloatArray) -> str:
         """The status: force, parameters, law, goodness of fit, doubtful markers, undetermined parameters.
 
-        `missed` are displacements of the markers that were believed, computed minus observed, (m, 2), mm.
+        `missed` are displacements of the markers, computed minus observed, shape (m, 2), mm.
         """
-        found, parts = self.best.estimate, []
+        found, parameters, parts = self.best.estimate, self.best.parameters, []
         if not found.converged:
             parts.append("the minimum was not found: take fewer parameters or a smaller prior")
         elif not self.best.exact:
@@ -244,27 +248,34 @@ class Identified:
             )
         force, low, high = self.force().force
         parts.append(f"force {force:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
-        columns = zip(found.parameters, found.values, found.intervals, strict=True)
         parts.append(
             ", ".join(
-                f"{u.name} {value:.4g} ({low:.4g} to {high:.4g}) {u.unit}".rstrip()
-                for u, value, (low, high) in columns
+                f"{u.name} {u.value:.4g} ({u.low:.4g} to {u.high:.4g}) {u.unit}".rstrip() for u in parameters
             )
         )
-        if len(self.fits) > 1:
-            shares = zip(self.fits, self.probabilities, strict=True)
-            parts.append("law " + ", ".join(f"{fit.law} {share:.1%}" for fit, share in shares) + " probable")
+        if len(laws := self._laws()) > 1:
+            shares = ", ".join(f"{law} {share:.1%}" for law, share in laws.items())
+            parts.append(f"law {shares} probable")
+        if (cylinder := self._cylinder()) is not None:
+            other = "" if cylinder else ", which was not fitted or has no equilibrium there,"
+            parts.append(
+                f"contact of the cylinder{other} {cylinder:.1%} probable, of a patch {1 - cylinder:.1%}"
+            )
+        seen = self.best.model.unknowns.problem.observations
+        if (sides := self._free_sides()) is not None:
+            parts.append(f"free side faces {sides:.1%} probable, plane strain {1 - sides:.1%}")
+        elif seen is None or not seen.plane:
+            parts.append("in plane strain: the third dimension takes fem-id and a finger with a depth")
         parts += [f"no equilibrium of the {law} law was found near the markers" for law in self.lost]
         parts += [f"{said}: not used" for said in self._contradictions()]
+        missed = np.delete(missed, self.best.doubted, axis=0)
         parts.append(f"markers missed by {np.sqrt((missed**2).mean()):.2g} mm (root mean square)")
         if found.inflation > 1:
             parts.append(
                 f"{found.inflation:.3g} times their standard deviations; intervals are as much wider"
             )
         if unresolved := [
-            f"{u.name} ({share:.0%})"
-            for u, share, known in zip(found.parameters, found.resolution, found.resolved, strict=True)
-            if not known
+            f"{u.name} ({u.resolution:.0%})" for u in parameters if u.resolution < MIN_RESOLUTION
         ]:
             parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
         return "; ".join(parts)

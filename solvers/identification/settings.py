@@ -7,7 +7,7 @@ import numpy as np
 
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.identification.transfer import transferred
-from pinnray.solvers.identification.unknowns import DEFAULT, parse_unknowns
+from pinnray.solvers.identification.unknowns import CONTACT, CYLINDER, DEFAULT, parse_unknowns
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import FieldSettings
@@ -60,3 +60,8 @@ class IdentifyingSolver(FieldSettings):
     def unknowns(self) -> tuple[str, ...]:
         """Names of the unknowns."""
         return parse_unknowns(self.name, self.parameters, self.sought) if self.parameters else self.sought
+
+    @property
+    def under_cylinder(self) -> tuple[str, ...]:
+        """Those with the unknowns of a cylinder in place of a patch's."""
+        return *CYLINDER, *(name for name in self.unknowns if name not in CONTACT)

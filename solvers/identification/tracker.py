@@ -29,7 +29,7 @@ from pinnray.solvers.assimilation.estimation import (
 )
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
 from pinnray.solvers.identification.fit import NORMAL, component_of, place_of
-from pinnray.solvers.identification.model import MarkerData, MarkerModel, ResponseModel
+from pinnray.solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
 from pinnray.solvers.identification.unknowns import CONTACT, SHARE
 from pinnray.solvers.solution import Estimated, stroke_axes
 
@@ -66,6 +66,7 @@ class _Linearised(NamedTuple):
     z: FloatArray
     predicted: FloatArray
     slopes: FloatArray
+    response: Response  # The equilibrium
 
 
 class _Prior(NamedTuple):
@@ -91,15 +92,18 @@ class ForceTracker:
         model: The finger, with `normal_force` and `position` among its unknowns.
         points: The m markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of their discs, mm; less is taken where one is nearer to the boundary.
+        stiffness: Of the finger over that of the model.
     """
 
-    def __init__(self, model: ResponseModel, points: FloatArray, radius: float) -> None:
+    def __init__(
+        self, model: ResponseModel, points: FloatArray, radius: float, stiffness: float = 1.0
+    ) -> None:
         self._unknowns, names = model.unknowns, model.unknowns.names
-        self._model, self.law = model, model.unknowns.problem.material.law
+        self._stiffness, self._model, self.law = stiffness, model, model.unknowns.problem.material.law
         self._parameters = model.unknowns.parameters(model.flexibility())
         self._bounds = tuple(np.array([parameter.bounds for parameter in self._parameters]).T)
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
-        measurement = MarkerData(points, still, still, inside, np.arange(len(points)))
+        measurement = MarkerData(points, still, still, inside)
         self._markers = MarkerModel(model, measurement)
         self._of_finger = ~np.isin(names, (*CONTACT, SHARE, *model.unknowns.feet.names))
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
@@ -194,7 +198,7 @@ class ForceTracker:
         if (response := self._model.response(values, tolerance=0.02)) is None:
             return None
         predicted, slopes = self._markers.predicted(response)
-        return _Linearised(z, predicted, slopes * derivatives)
+        return _Linearised(z, predicted, slopes * derivatives, response)
 
     def _learn(self, found: _Posterior, *, anew: bool) -> None:
         """Make the finger in a frame the prior of other frames, or average it with the prior.
@@ -214,11 +218,12 @@ class ForceTracker:
     def _reading(self, found: _Posterior, status: str) -> ForceReading:
         values, derivatives = values_of(self._parameters, found.z)
         errors = found.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(found.covariance)
+        response = self._model.extrapolated(self._last.response, values)
         force, across = (
-            _estimated(*component_of(self._model, values, errors, axis))
+            _estimated(*component_of(self._model, response, errors, self._stiffness * axis))
             for axis in stroke_axes(self._unknowns.problem.load)
         )
-        place, around = place_of(self._unknowns, values, errors)
+        place, around = place_of(self._unknowns, response, errors)
         ends = np.clip(place + NORMAL * around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
         return replace(
             self._unknown(status),

@@ -11,6 +11,7 @@ import numpy as np
 
 from pinnray.solvers.identification.field import IdentifiedField
 from pinnray.solvers.identification.model import EXACT, Response, ResponseModel
+from pinnray.solvers.identification.unknowns import INDENTATION
 from pinnray.solvers.problem import Problem, contact_ends
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import NoSolutionError
@@ -45,7 +46,7 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
             state=response.state,
         ),
         energy=member.model.body.energy(response.state, hypothesis.lame, hypothesis.changes),
-        reaction=hypothesis.force,
+        reaction=response.force,
         left_out=None,
         uncertainty=None,
         identified=None,
@@ -53,24 +54,24 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
 
 
 def _response(model: ResponseModel, start: Response, share: float, shift: float) -> Response:
-    """The response at a share of the contact's displacement, the contact shifted along x by mm.
+    """The response at a share of the contact's indentation, the contact shifted along x by mm.
 
-    The size of the force is found by Newton's method, to 1e-5 mm of the contact's displacement.
+    What grows with the normal force follows it, to a millionth, by iteration; a cylinder has that share of
+    its travel, on a way of its own.
     """
-    names, into = model.unknowns.names, model.unknowns.directions[0]
-    target = share * float(start.contact @ into)
-    force = np.isin(names, ("normal_force", "shear_force", *model.unknowns.feet.names))
-    direction, values = np.where(force, start.values, 0.0), np.where(force, 0.0, start.values)
+    names = model.unknowns.names
+    values = start.values.copy()
+    values[names.index("travel" if start.way else INDENTATION)] *= share
+    growing = np.isin(names, ("shear_force", *model.unknowns.feet.names))
     if "position" in names:
         values[names.index("position")] += shift
-    model.restart(start)
+    model.restart(None if start.way else start)
     scale = share
     for _ in range(12):
-        response = model.response(values + scale * direction, EXACT)
+        response = model.response(np.where(growing, scale * values, values), EXACT)
         if response is None:
             break
-        missed = target - float(response.contact @ into)
-        if abs(missed) < 1e-5:
+        before, scale = scale, response.normal / start.normal
+        if start.way or abs(scale - before) < 1e-6:
             return response
-        scale += missed / float(direction @ response.contact_slopes @ into)
     raise NoSolutionError("no equilibrium of the identified finger was found at the other load")

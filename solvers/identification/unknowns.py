@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import log
+from math import ceil, log
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Parameter
 from pinnray.solvers.assimilation.picture_frames import picture_parameters, pictures_of
+from pinnray.solvers.cylinder_contact import FRICTION_STEP, touching_centre
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
 from pinnray.solvers.identification.boundary import Feet, FrontTraction
 from pinnray.solvers.problem import Material, Problem, contact_ends
@@ -21,6 +22,13 @@ from pinnray.solvers.problem import Material, Problem, contact_ends
 CONTACT = ("position", "width", "normal_force", "shear_force", "eccentricity")
 SHARE = "shear_share"
 """Shear over normal force: it takes the place of `shear_force` where friction bounds it."""
+INDENTATION = "indentation"
+"""Mean displacement of the contact into the front: it takes the place of `normal_force` in a search, since a
+force that falls while the finger is pressed farther cannot be prescribed."""
+TRAVEL = 0.2
+"""Standard deviation of the travel of a cylinder over the load's stroke."""
+CYLINDER = ("position", "travel", "friction")
+"""The unknowns of a cylinder, in place of those of `CONTACT`: friction along the way makes its force."""
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson", "feet")
 """What is found unless other names are given; the table of docs/how-to/force.md describes each. `feet` stands
@@ -38,14 +46,34 @@ chapter 5), and in plane strain so does every incompressible body of Mooney and 
 are one there. With odds of 3 to 1, noise decided, and the force of a film was 12 % off."""
 LAWS = tuple(LAW_ODDS)
 
+CONTACT_ODDS = {"cylinder": 150.0, "patch": 1.0}
+"""Odds of the contacts before the markers are seen: who gives a cylinder has seen it, so that very strong
+evidence is asked for a patch, as for a law of `LAW_ODDS`."""
 
-def doubt_of_the_plane(problem: Problem, thick: bool) -> float:
-    """Deviation of force and stress of a finger with a depth from those of the plane, as a share.
 
-    Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger is
-    in neither state, and its markers do not tell. A body that is only a plane has none, nor a thick one.
-    """
-    return 0.0 if problem.finger is None or thick else 0.5 * problem.material.poisson**2
+class Doubt(NamedTuple):
+    """Deviations of a finger's force and stress from those of its model, as shares."""
+
+    force: float
+    stress: float
+
+    @classmethod
+    def of_the_plane(cls, problem: Problem) -> "Doubt":
+        """Of plane strain alone, where markers are not known to be in it and the finger has a depth.
+
+        Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger
+        is in neither state.
+        """
+        seen = problem.observations
+        if problem.finger is None or (seen is not None and seen.plane):
+            return RESOLVED
+        share = 0.5 * problem.material.poisson**2
+        return cls(share, share)
+
+
+RESOLVED = Doubt(0.01, 0.05)
+"""Where the markers tell plane strain from free side faces, or there are none: what elements of 1 mm and few
+functions of the depth leave on the default finger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +83,12 @@ class Hypothesis:
     position: float  # Abscissa of the contact's middle, mm
     width: float  # Its length along x, mm
     force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
+    eccentricity: float  # Of the normal force from the middle, mm
+    indentation: float  # Mean displacement of the contact into the front where the force follows from it, mm
     couple: FloatArray  # Normal force times its eccentricity, shape (2,), N: the dipole of the traction
+    centre: FloatArray  # Of a cylinder where it touches the front, shape (2,), mm
+    travel: FloatArray  # Of the cylinder from there, shape (2,), mm
+    friction: float  # Its coefficient
     lame: Lame  # Lamé constants, MPa
     changes: FloatArray  # Of the walls' thickness, shape (k,), mm
     softness: float  # Compliance of the base over Young's modulus, mm/MPa
@@ -69,7 +102,12 @@ class HypothesisSlopes(NamedTuple):
     position: FloatArray
     width: FloatArray
     force: FloatArray
+    eccentricity: FloatArray
+    indentation: FloatArray
     couple: FloatArray
+    centre: FloatArray
+    travel: FloatArray
+    friction: FloatArray
     moduli: FloatArray
     changes: FloatArray
     softness: FloatArray
@@ -118,6 +156,30 @@ class Unknowns:
         tx, ty = self.traction.tangent(self.place[0])
         return np.array([[ty, -tx], [tx, ty]])
 
+    @property
+    def radius(self) -> float:
+        """Of the cylinder, mm."""
+        return float(self.problem.load.radius or 0.0)
+
+    def _centre(self, position: float) -> FloatArray:
+        """Of a cylinder that touches the front at an abscissa, mm; zero for another contact."""
+        return touching_centre(self.problem, position) if "travel" in self.names else np.zeros(2)
+
+    @property
+    def stages(self) -> int:
+        """Steps to the full travel, within each of which slip has one direction."""
+        return max(4, ceil(self._stroke / (FRICTION_STEP * self.radius) - 1e-9))
+
+    @property
+    def _stroke(self) -> float:
+        """The load's, mm."""
+        return float(np.linalg.norm(self.problem.load.values))
+
+    @property
+    def _way(self) -> FloatArray:
+        """Unit vector along it, shape (2,)."""
+        return np.array([value or 0.0 for value in self.problem.load.displacement]) / self._stroke
+
     def parameters(self, flexibility: float, prior: float = 1.0) -> list[Parameter]:
         """The unknowns with their priors.
 
@@ -135,8 +197,11 @@ class Unknowns:
             Parameter("position", "mm", middle, 0.05 * front.extent * prior, *front.ends),
             Parameter("width", "mm", width, log(2.5) * prior, narrowest, logarithmic=True),
             Parameter("normal_force", "N/mm", 0.0, size * prior),
+            Parameter(INDENTATION, "mm", 0.0, 0.5 * front.extent * prior),
             Parameter("shear_force", "N/mm", 0.0, size * prior),
             Parameter("eccentricity", "mm", 0.0, 0.5 * width * prior),
+            Parameter("travel", "mm", self._stroke, TRAVEL * self._stroke * prior, 0.1 * self._stroke),
+            Parameter("friction", "", friction or 0.5, 0.3 * prior, 0.0, max(1.0, 2 * friction)),
             Parameter("base_compliance", "mm", 0.02, log(10) * prior, logarithmic=True),
             Parameter("poisson", "", material.poisson, 0.03 * prior, 0.0, 0.49),
             Parameter("young", "MPa", material.young, 0.3 * prior, logarithmic=True),
@@ -152,17 +217,22 @@ class Unknowns:
         by_name = {parameter.name: parameter for parameter in [*known, *self._pictures]}
         return [by_name[name] for name in self.names]
 
-    def hypothesis(self, values: FloatArray) -> Hypothesis:
-        """The finger and the contact of values, shape (p,)."""
-        named, material = self._named(values), self.material(values)
+    def hypothesis(self, values: FloatArray, normal: float = 0.0) -> Hypothesis:
+        """The finger and the contact of values, shape (p,), and of a normal force that is none of them."""
+        named, material = {"normal_force": normal} | self._named(values), self.material(values)
         middle, width = self.place
-        normal = named.get("normal_force", 0.0)
+        normal = named["normal_force"]
         sizes = normal, named.get("shear_force", 0.0) + named.get(SHARE, 0.0) * normal
         return Hypothesis(
             position=named.get("position", middle),
             width=named.get("width", width),
             force=np.array(sizes) @ self.directions,
+            eccentricity=named.get("eccentricity", 0.0),
+            indentation=named.get(INDENTATION, 0.0),
             couple=named.get("eccentricity", 0.0) * normal * self.directions[0],
+            centre=self._centre(named.get("position", middle)),
+            travel=named.get("travel", self._stroke) * self._way,
+            friction=named.get("friction", self.problem.load.friction),
             lame=material.lame,
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
@@ -170,17 +240,25 @@ class Unknowns:
             pictures=pictures_of(self.centre, named),
         )
 
-    def slopes(self, values: FloatArray) -> HypothesisSlopes:
-        """Derivatives of the hypothesis of values, shape (p,)."""
-        named, material = self._named(values), self.material(values)
+    def slopes(
+        self, values: FloatArray, normal: float = 0.0, by_normal: FloatArray | None = None
+    ) -> HypothesisSlopes:
+        """Derivatives of the hypothesis of values, shape (p,), and of a normal force with its own, (p,)."""
+        named, material = {"normal_force": normal} | self._named(values), self.material(values)
         count = len(self.names)
         by: dict[str, FloatArray] = defaultdict(lambda: np.zeros(count))
+        if by_normal is not None:
+            by["normal_force"] = by_normal
         by |= zip(self.names, np.eye(count), strict=True)
         young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
-        normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
+        normal, eccentricity = named["normal_force"], named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
         along = by["shear_force"] + normal * by[SHARE] + named.get(SHARE, 0.0) * by["normal_force"]
+
+        position, small = named.get("position", self.place[0]), 1e-4 * self.traction.extent
+        ahead, behind = (self._centre(position + way * small) for way in (1, -1))
+        centre_slope = (ahead - behind) / (2 * small)
 
         def stacked(names: Sequence[str]) -> FloatArray:
             """Derivatives (p, k) of k numbers, of which those that are no unknowns have none."""
@@ -190,7 +268,12 @@ class Unknowns:
             position=by["position"],
             width=by["width"],
             force=np.stack([by["normal_force"], along], axis=1) @ self.directions,
+            eccentricity=by["eccentricity"],
+            indentation=by[INDENTATION],
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
+            centre=np.outer(by["position"], centre_slope),
+            travel=np.outer(by["travel"], self._way),
+            friction=by["friction"],
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
             changes=stacked(self.motion.names),
             softness=by["base_compliance"] / young - compliance / young**2 * by["young"],

@@ -99,18 +99,21 @@ def _keep_freed_memory() -> None:
 PATCH = 192
 """Points in a patch: with fewer, a window is in more patches; with more, it is far from some points."""
 
+SUMMED = 448
+"""Points in a patch of a sum over the windows, where a far window costs less: 0.7 of the time by `PATCH`."""
+
 MANY, MOST = 1000, 1024
 """Number of patches above which they grow, and the most points in one."""
 
 
-def cut_into_patches(points: FloatArray) -> list[IntArray]:
-    """Numbers of the points (n, 2) in each patch; every point is in one patch.
+def cut_into_patches(points: FloatArray, most: int = PATCH) -> list[IntArray]:
+    """Numbers of the points (n, 2) in each patch, `most` at most; every point is in one patch.
 
     Very many points are so dense that larger patches, which cost less a point, are still small.
     """
     if not len(points):
         return []
-    size = min(max(PATCH, len(points) // MANY), MOST)
+    size = min(max(most, len(points) // MANY), MOST)
     found, todo = [], [cKDTree(points, leafsize=size, balanced_tree=False, compact_nodes=False).tree]
     while todo:
         node: Any = todo.pop()

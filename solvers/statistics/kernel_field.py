@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray
@@ -50,7 +51,7 @@ def correlation(points: FloatArray, others: FloatArray, length: float) -> FloatA
 
 def derivative_by_log_length(points: FloatArray, others: FloatArray, length: float) -> FloatArray:
     """Derivative of `correlation` by the length's logarithm, shape (n, m): -r dk/dr at a distance r."""
-    squares = ((points[:, None] - others) ** 2).sum(axis=2)
+    squares = cdist(points, others, "sqeuclidean")
     return np.asarray(squares * _derivative_factor(points, others, length))
 
 
@@ -62,7 +63,7 @@ def _derivative_factor(points: FloatArray, others: FloatArray, length: float) ->
 
 def _distance(points: FloatArray, others: FloatArray, length: float) -> FloatArray:
     """√5 |x - x'| / length: shape (n, m)."""
-    return np.asarray(np.linalg.norm(points[:, None] - others, axis=2) * np.sqrt(5.0) / length)
+    return np.asarray(cdist(points, others) * np.sqrt(5.0) / length)
 
 
 def with_markers_left_out(

@@ -10,7 +10,7 @@ from secrets import token_hex
 import numpy as np
 
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-from pinnray.comparison.evaluation.truths import experiment_source
+from pinnray.comparison.evaluation.virtual_experiment import experiment_source
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -148,7 +148,8 @@ def _noisy(
         points = study.markers[layout]
         known = study.frame if at == 0 else FIXED
         shown = true if known.fixed else study.pressed_picture(points, seed).moved(points + true) - points
-        source = experiment_source(problem, study.chosen_truths[truth])
+        own = study.chosen_truths[truth]
+        source = experiment_source(replace(problem, load=own.reached(problem.load)), own)
         return Observations(
             points=points,
             displacements=shown + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
@@ -156,6 +157,7 @@ def _noisy(
             visible=np.ones(len(true), dtype=bool),
             source=f"{source}, with {study.noise:g} mm of noise",
             simulated=True,
+            solid=study.chosen_truths[truth].solid,
             marker_radius=study.design.marker_radius,
             pressed=known,
         )

@@ -12,7 +12,7 @@ from pinnray.comparison.evaluation.deformed_body import DeformedBody
 from pinnray.comparison.evaluation.truths import SLIDING, Truth
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.problem import Problem
+from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import Solution, indenter_forces
 from pinnray.solvers.solver import (
     Solver,
@@ -54,6 +54,10 @@ class SolverTask:
     folds: Mapping[int, Mapping[str, Fold]]
     truth: Truth | None = SLIDING
 
+    def told(self, load: Load) -> Load:
+        """The load that the solver is given for one that is asked for."""
+        return load if self.truth is None else self.truth.reached(load)
+
 
 def run_folds(task: SolverTask, report: Callable[..., None]) -> list[Measurement]:
     """Run a solver through its folds, and report the sample of each as soon as it is known.
@@ -86,7 +90,8 @@ class FoldRunner:
     def __init__(self, task: SolverTask, solver: Solver) -> None:
         self._task, self._solver = task, solver
         mesh, material = task.problem.mesh, task.problem.material
-        self.problem = replace(task.problem, material=with_law(material, solver))
+        load = task.told(task.problem.load)
+        self.problem = replace(task.problem, material=with_law(material, solver), load=load)
         self._true_law = replace(self.problem, material=(task.truth or SLIDING).material(material))
         markers = task.observations[0][0]
         self.sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
@@ -181,7 +186,7 @@ class FoldRunner:
         return there + (sampled + here * -1.0) * share
 
     def _at(self, case: int) -> Problem:
-        return replace(self.problem, load=self._task.load_cases[case].load)
+        return replace(self.problem, load=self._task.told(self._task.load_cases[case].load))
 
     def _without_markers(self, case: int) -> tuple[Solution, SampledField]:
         """The solver's solution without markers at a load case, and its field; solved once."""

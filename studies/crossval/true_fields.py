@@ -7,7 +7,8 @@ from functools import lru_cache, partial
 import numpy as np
 
 from pinnray.comparison.evaluation.differences import FieldDifference
-from pinnray.comparison.evaluation.truths import Truth, simulate
+from pinnray.comparison.evaluation.truths import Truth
+from pinnray.comparison.evaluation.virtual_experiment import simulate
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
@@ -169,7 +170,7 @@ def simulate_truth(task: TruthTask, _: object = None) -> dict[str, TrueField]:
     study, truth, shared = task.study, task.truth, task.mesh
     drawn = study.design.at_contact(task.case.contact)
     design = truth.finger(drawn)
-    stroke = -task.case.share * float(study.load.displacement[1] or 0.0)
+    stroke = -task.case.share * float(truth.reached(study.load).displacement[1] or 0.0)
     parts = [
         design.digest,
         study.mesh and study.mesh.model_dump(),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pinnray.cli import main
-from pinnray.comparison.evaluation.truths import simulate
+from pinnray.comparison.evaluation.virtual_experiment import simulate
 from pinnray.film.filmed_force import LONGEST_STEP, filmed_course, true_forces
 from pinnray.geometry.finger.design import Design
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver

@@ -63,15 +63,20 @@ def test_a_row_has_forces_for_the_depth_and_nothing_where_nothing_is_known():
     assert first.keys() == second.keys()
 
 
-def test_the_interval_counts_that_a_finger_is_not_plane():
-    """As that of `fem-id`: half of the difference between the plane states."""
+def test_a_finger_with_side_faces_is_less_stiff_than_in_plane_strain():
+    """Between plane strain and plane stress, whose moduli differ by 1 - ν²."""
     finger = Design()
     mesh = finger_mesh(finger, settings=MeshSettings(size=3.0))
     moved = FemSolver(estimate=False).solve(Problem(mesh, load=Load(displacement=(None, -3.0)))).at_markers()
-    tracker = force_tracker(mesh, finger, Material(), finger.markers)
     seen, deviations = np.ones(len(moved), dtype=bool), np.full_like(moved, 0.005)
-    found = tracker.update(moved, deviations, seen)
-    assert found.force.high - found.force.value > 1.95 * 0.5 * 0.4**2 * found.force.value
+    plane, filmed = (
+        force_tracker(mesh, finger, Material(), finger.markers, plane=plane).update(moved, deviations, seen)
+        for plane in (True, False)
+    )
+    stiffness = filmed.force.value / plane.force.value
+    assert 1 - Material().poisson ** 2 < stiffness < 0.98
+    assert filmed.tangential_force.value == pytest.approx(stiffness * plane.tangential_force.value)
+    assert filmed.force.high - filmed.force.value < 0.2 * filmed.force.value
 
 
 class Recorder:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks
-from pinnray.comparison.evaluation.truths import TRUTHS, Truth, virtual_experiment
+from pinnray.comparison.evaluation.truths import TRUTHS, Truth
+from pinnray.comparison.evaluation.virtual_experiment import virtual_experiment
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.mesher import build_mesh
 from pinnray.geometry.mesh.settings import MeshSettings

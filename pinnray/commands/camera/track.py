@@ -88,7 +88,7 @@ def command(
                 with stages.stage("mesh"):
                     mesh = finger_mesh(design, settings=settings)
             if mesh is not None and material and live:
-                tracker = force_tracker(mesh, design, material, design.markers)
+                tracker = force_tracker(mesh, design, material, design.markers, plane=film.simulated)
                 following = LiveForce(tracker, design.depth)
             watch = frame_lines(following, publish=publish) if live else None
             with stages.stage("track") as report:
@@ -99,7 +99,8 @@ def command(
                 forces, passed_over = following.finished(), following.passed_over
             elif mesh is not None and material:
                 with stages.stage("force") as report:
-                    tracker = force_tracker(mesh, design, material, observations.points)
+                    points, plane = observations.points, observations.plane
+                    tracker = force_tracker(mesh, design, material, points, plane=plane)
                     forces = forces_of(tracking, tracker, report)
         made = {"versions": package_versions(), "machine": machine()}
         provenance = {"options": given, "design": design.definition(), **made}

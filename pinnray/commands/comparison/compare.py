@@ -2,6 +2,7 @@
 
 import re
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -86,13 +87,13 @@ def command(
         resume: Reuse solutions that an earlier run finished.
         json_: Print metrics.json and nothing else.
     """
-    from pinnray.comparison.pipeline.job import Job
+    from pinnray.comparison.pipeline.job import Job, prepared
     from pinnray.comparison.pipeline.pipeline import run
     from pinnray.comparison.pipeline.solving import second_process, worth_starting
     from pinnray.comparison.report.tables import body_table, marker_table
     from pinnray.options.preset_jobs import job_defaults
     from pinnray.options.solver_choice import spare_solvers
-    from pinnray.runtime.output_folder import RUN_FILE, check_same_job
+    from pinnray.runtime.output_folder import RUN_FILE, check_output, check_same_job
     from pinnray.runtime.stages import Stages
 
     earlier = read_options_file(from_) if from_ else None
@@ -109,28 +110,30 @@ def command(
     folder = out or _own_folder(design.name, measurements)
     if out is None and not resume:
         check_same_job(folder, given, usual_options(finger, physics, options, film))
+    job = Job(
+        design=design,
+        mesh=mesh,
+        adapt=adapt,
+        material=material,
+        load=load,
+        truth=truth,
+        measurements=_measurements(measurements, film),
+        reference=reference,
+        out=folder,
+        resume=resume,
+        picture_formats=comma_list(pictures),
+        picture_width=read_millimetres(width),
+        options=given,
+    )
+    check_output(folder)
+    job = prepared(job)  # before the solvers are made, which takes seconds
     with nullcontext() if cores() < 2 else second_process(comma_list(names)) as pool:
         if pool and worth_starting(design, mesh):
             pool.start()  # which takes as long as to make the solvers here
         made, set_up = options.read(names), {text.partition(".")[0] for text in options.solver_set}
         finger.check_cost(design, mesh, made, simulated=measurements is None)
-        job = Job(
-            design=design,
-            solvers=made,
-            spare=spare_solvers(made, reference, options.preset, set_up),
-            mesh=mesh,
-            adapt=adapt,
-            material=material,
-            load=load,
-            truth=truth,
-            measurements=_measurements(measurements, film),
-            reference=reference,
-            out=folder,
-            resume=resume,
-            picture_formats=comma_list(pictures),
-            picture_width=read_millimetres(width),
-            options=given,
-        )
+        spare = spare_solvers(made, reference, options.preset, set_up)
+        job = replace(job, solvers=made, spare=spare)
         try:
             with Stages(Console(stderr=True), quiet=json_) as stages:
                 comparison = run(job, stages, pool)

@@ -17,7 +17,7 @@ from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from pinnray.solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
-from pinnray.solvers.pinn.threading import boxes_around, cut_into_patches, imap_in_threads
+from pinnray.solvers.pinn.threading import PATCH, SUMMED, boxes_around, cut_into_patches, imap_in_threads
 
 Windows = ShepardWindows | GateTree
 """A partition of unity by windows."""
@@ -69,9 +69,11 @@ class FiniteBasis:
         bias = rng.uniform(-1, 1, shape) - np.einsum("xmc,cx->mc", weights, centres)
         return cls(windows, torch.from_numpy(np.concatenate([weights, bias[None]])), constraint)
 
-    def patches(self, points: FloatArray) -> list[tuple[IntArray, torch.Tensor, torch.Tensor]]:
+    def patches(
+        self, points: FloatArray, most: int = PATCH
+    ) -> list[tuple[IntArray, torch.Tensor, torch.Tensor]]:
         """Patches of points (n, 2), mm: their numbers, their places and the windows that reach them."""
-        numbers = cut_into_patches(points)
+        numbers = cut_into_patches(points, most)
         places = [torch.from_numpy(points[patch]) for patch in numbers]
         return list(zip(numbers, places, self.windows.near(boxes_around(places)), strict=True))
 
@@ -183,7 +185,7 @@ class FiniteBasis:
             _, places, near = patch
             return torch.einsum(sums, functions(places, near), outputs[..., near, :, :]).numpy()
 
-        patches = self.patches(points)
+        patches = self.patches(points, SUMMED)
         found: FloatArray = np.concatenate(list(imap_in_threads(task, patches)))
         result: FloatArray = np.empty_like(found)
         result[np.concatenate([patch for patch, *_ in patches])] = found

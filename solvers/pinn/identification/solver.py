@@ -94,7 +94,7 @@ class PinnIdSolver(IdentifyingSolver):
                 again = search.updated(found, _with_error(observations))
                 return self._solution(replace(problem, observations=observations), again, started)
             solution, search, found = self._solved(problem, observations, silent)
-            if observations.visible.all() and not found.doubtful:
+            if observations.visible.all() and not len(found.best.doubted):
                 kept[:] = [(observations, search, found)]
             return solution
 
@@ -109,7 +109,7 @@ class PinnIdSolver(IdentifyingSolver):
         network = Identifier(
             self, problem, self._body, cost_change=COST_CHANGE, flexibility=elements.flexibility
         )
-        search = NestedSearch(elements, network, _projected)
+        search = NestedSearch(elements, _projected, fine=network)
         found = search.identify(_with_error(observations), progress)
         return self._solution(problem, found, started), search, found
 

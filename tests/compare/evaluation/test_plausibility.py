@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.plausibility import check_positions, displacement_remarks, problem_remarks
-from pinnray.comparison.evaluation.truths import virtual_experiment
+from pinnray.comparison.evaluation.virtual_experiment import virtual_experiment
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.solvers.problem import Load, Material, Problem
@@ -95,6 +95,25 @@ def test_a_reversed_u_is_warned_of_at_a_small_stroke(measured, problem):
     moved = virtual_experiment(small, 0.8)[0].displacements
     (remark,) = displacement_remarks(replace(measured, displacements=moved * [-1, 1]), small)
     assert "u goes against that of fem" in remark
+
+
+def test_a_finger_that_is_pressed_far_is_not_warned_of(measured, problem):
+    """A cylinder of radius 15 mm by 22 mm at x = 45 mm by `fem-nonlinear`: u goes against that of `fem`."""
+    moved = np.array(
+        [
+            (-0.79, -5.35),
+            (-4.43, -5.11),
+            (-3.41, -13.64),
+            (-5.35, -14.23),
+            (-5.11, -20.42),
+            (-4.97, -20.30),
+            (-5.29, -21.89),
+            (-4.70, -21.70),
+            (-5.31, -20.24),
+        ]
+    )
+    far = replace(problem, load=Load(displacement=(None, -22.0), position=45.0))
+    assert displacement_remarks(replace(measured, displacements=moved), far) == []
 
 
 def test_markers_that_hardly_move_in_fem_say_nothing_of_directions(measured, problem):

@@ -13,9 +13,8 @@ from pinnray.comparison.evaluation.truths import (
     TRUTHS,
     WALLS,
     Truth,
-    experiment_source,
-    simulate,
 )
+from pinnray.comparison.evaluation.virtual_experiment import experiment_source, simulate
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.section import rib_axes

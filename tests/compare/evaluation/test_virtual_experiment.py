@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.comparison import Results
-from pinnray.comparison.evaluation.truths import TRUTHS, UnfinishedExperimentError, virtual_experiment
+from pinnray.comparison.evaluation.truths import TRUTHS
+from pinnray.comparison.evaluation.virtual_experiment import UnfinishedExperimentError, virtual_experiment
 from pinnray.comparison.figures.gallery import GALLERY
 from pinnray.comparison.pipeline.job import Job
 from pinnray.geometry.cache import finger_mesh
@@ -26,6 +27,7 @@ from tests.compare.tables import rows_of
 from tests.meshes import permuted
 
 pytestmark = pytest.mark.usefixtures("few_elements_throughout")
+MODULE = virtual_experiment.__module__
 
 
 @pytest.fixture
@@ -113,9 +115,9 @@ def test_another_problem_is_simulated_again(problem, solutions, changes, simulat
 
 def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(problem, solutions, monkeypatch):
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr("pinnray.comparison.evaluation.truths.package_versions", lambda: {"numpy": "9"})
+    monkeypatch.setattr(f"{MODULE}.package_versions", lambda: {"numpy": "9"})
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr("pinnray.comparison.evaluation.truths.sources_digest", lambda *_: "other")
+    monkeypatch.setattr(f"{MODULE}.sources_digest", lambda *_: "other")
     virtual_experiment(problem, 0.8)
     assert len(solutions) == 3
 
@@ -147,7 +149,7 @@ def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache
 @pytest.mark.slow
 def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, monkeypatch):
     """It is sampled on the shared mesh, and differs from plane strain as the depth makes it differ."""
-    monkeypatch.setattr("pinnray.comparison.evaluation.truths.SOLID_SIZE", 2.5)
+    monkeypatch.setattr(f"{MODULE}.SOLID_SIZE", 2.5)
     design = Design(height=40, rib_count=0, tip_length=12, contact_position=18)
     short = finger_mesh(design, settings=MeshSettings(size=2.0))
     known = Problem(short, load=Load(displacement=(0.0, -0.5)), finger=design)

@@ -13,7 +13,7 @@ from pinnray.comparison.evaluation.certifier import with_certificates
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import FORMATS, draw_all, page_width
-from pinnray.comparison.figures.fields import QUANTITIES, draw_field, near_pairs
+from pinnray.comparison.figures.fields import QUANTITIES, draw_field
 from pinnray.comparison.figures.gallery import GALLERY, Illustration, draw
 from pinnray.comparison.figures.overlay import overlay_extent
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -284,7 +284,7 @@ def test_one_of_two_near_fields_is_drawn_and_both_that_found_the_load(fem, pinn,
     near = evaluate("pinn-near", 1.001)
     found = [replace(pinn, solver=name, in_sample=True, identified=force) for name in ("fem-id", "pinn-id")]
     comparison = compared(fem, near, pinn, *found)
-    assert near_pairs(comparison) == {"pinn-near": ("fem", pytest.approx(0.001))}
+    assert comparison.near_pairs == {"pinn-near": ("fem", pytest.approx(0.001))}
     drawing = draw(comparison, "von_mises")
     assert "near another’s: pinn-near (0.10\N{NO-BREAK SPACE}% from fem)." in drawing.caption
     text = page_of(drawing.figure).text

@@ -13,6 +13,7 @@ from scipy.stats import chi2, lognorm, norm, t
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import (
     Estimate,
+    GrossErrors,
     Parameter,
     Prediction,
     degrees_of_freedom,
@@ -48,6 +49,24 @@ def test_a_linear_model_has_the_estimate_of_the_normal_equations(slopes):
     np.testing.assert_allclose(found.deviations**2, np.diag(np.linalg.inv(precision)), rtol=1e-7)
     assert found.inflation == 1
     assert found.converged
+
+
+def test_a_wrong_observation_is_left_out_and_a_wrong_model_loses_none(slopes):
+    """Of twelve, in pairs, with odds of e^-15, one pair is 3 off: the rest has the estimate without it."""
+    errors = GrossErrors(np.arange(COUNT).reshape(-1, 2), np.full(COUNT // 2, -15.0))
+    noise = 0.1 * np.random.default_rng(1).normal(size=COUNT)
+    observed, sigma = slopes @ (START + 0.3 * SCALE) + noise, np.full(COUNT, 0.1)
+    off = observed + 3.0 * np.isin(np.arange(COUNT), (4, 5))
+    found = estimate(linear(slopes), off, sigma, PARAMETERS, errors=errors)
+    assert found.inflation == 1
+    np.testing.assert_array_equal(np.flatnonzero(~found.kept), [4, 5])
+    without = fitted(np.delete(slopes, [4, 5], axis=0), np.delete(observed, [4, 5]))
+    np.testing.assert_allclose(found.values, without.values, rtol=1e-6)
+    np.testing.assert_allclose(found.deviations, without.deviations, rtol=1e-6)
+    np.testing.assert_allclose(found.residuals_without(np.array([4, 5])), found.residuals[[4, 5]])
+    wrong = estimate(linear(slopes), observed + 300 * noise, sigma, PARAMETERS, errors=errors)
+    assert wrong.inflation > 100
+    assert wrong.kept.all()
 
 
 def test_what_is_not_observed_is_held_by_its_prior(slopes):
@@ -136,7 +155,16 @@ def test_a_positive_parameter_has_no_bound_at_zero_or_below() -> None:
 def as_found(sensitivities: FloatArray, inflation: float = 1.0, z: float = 0.0) -> Estimate:
     count, parameters = len(sensitivities), [LENGTH, FACTOR, ONE][: sensitivities.shape[1]]
     places = np.full(len(parameters), z)
-    return Estimate(parameters, places, sensitivities, np.zeros(count), inflation, 1, converged=True)
+    return Estimate(
+        parameters,
+        places,
+        sensitivities,
+        np.zeros(count),
+        np.ones(count, dtype=bool),
+        inflation,
+        1,
+        converged=True,
+    )
 
 
 def test_a_parameter_is_resolved_from_half_of_its_prior_on() -> None:

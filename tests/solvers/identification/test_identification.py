@@ -1,5 +1,6 @@
 """Contact, walls and law from the markers: twin experiments, deviations, other loads."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.model import EXACT
 from pinnray.solvers.identification.search import Identifier
-from pinnray.solvers.identification.unknowns import DEFAULT, PARTS  # type: ignore[attr-defined]
+from pinnray.solvers.identification.unknowns import DEFAULT, PARTS, Doubt  # type: ignore[attr-defined]
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Load
 from tests.solvers.conftest import observed_at
@@ -100,13 +101,21 @@ def test_a_finger_with_a_depth_is_in_no_plane_state(identified):
     """Half of the difference of the plane moduli widens force and stress, also where there is no stress."""
     solution = identified[2]
     field, mesh = solution.field, solution.problem.mesh
-    deep = replace(field, problem=replace(field.problem, finger=Design()))
+    share = 0.5 * solution.problem.material.poisson**2
+    doubt = Doubt.of_the_plane(replace(field.problem, finger=Design()))
+    assert doubt == (share, share)
+
+    def deviation(doubt: Doubt) -> np.ndarray:
+        model = copy(field.members[0].model)
+        model.doubt = doubt
+        members = [replace(field.members[0], model=model), *field.members[1:]]
+        return replace(field, members=members).von_mises_deviation(there)
+
     there = mesh.at_centroids()
     stress = solution.state(there).von_mises
     usual = np.sqrt(np.average(stress**2, weights=mesh.areas))
-    added = 0.5 * solution.problem.material.poisson**2 * np.hypot(stress, usual)
-    expected = np.hypot(field.von_mises_deviation(there), added)
-    np.testing.assert_allclose(deep.von_mises_deviation(there), expected, rtol=1e-9)
+    added = share * np.hypot(stress, usual)
+    np.testing.assert_allclose(deviation(doubt), np.hypot(deviation(Doubt(0.0, 0.0)), added), rtol=1e-9)
 
 
 @pytest.mark.slow
@@ -189,21 +198,23 @@ def test_a_reaction_finds_young(problem):
 
 
 def test_a_finger_is_carried_to_another_load(identified, problem):
-    """At half the travel, the displacement of the contact is half of what was found."""
+    """At half the travel, the indentation is half of what was found, and the force has its direction."""
     observed, _, solution = identified
     other = replace(problem, load=Load(displacement=(None, -3.0)))
     solver = FemIdSolver(degree=1)
     transferred = solver.transferred(solution, replace(problem, observations=observed), other)
-    member = solution.field.members[0]
-    values = member.response.values.copy()
-    share = np.linalg.norm(transferred.reaction) / np.linalg.norm(solution.reaction)
-    assert 0.4 < share < 0.6
-    for name in ("normal_force", "shear_force"):
-        values[member.model.unknowns.names.index(name)] *= share
-    response = member.model.response(values, EXACT)
+    share = transferred.reaction / solution.reaction
+    assert 0.4 < share[0] < 0.6
+    assert share[1] == pytest.approx(share[0], rel=1e-5)
+    model = solution.field.members[0].model
+    forced = model_of(model.unknowns.problem, DEFAULT)
+    values = solution.field.members[0].response.values.copy()
+    values[forced.unknowns.names.index("normal_force")] = transferred.reaction @ model.unknowns.directions[0]
+    values[forced.unknowns.names.index("shear_force")] *= share[0]
+    response = forced.response(values, EXACT)
     assert response is not None
-    into = member.model.unknowns.directions[0]
-    assert response.contact @ into == pytest.approx(0.5 * member.response.contact @ into, abs=1e-4)
+    indentation = solution.field.members[0].response.contact @ model.unknowns.directions[0]
+    assert response.contact @ model.unknowns.directions[0] == pytest.approx(0.5 * indentation, abs=1e-4)
 
 
 def test_only_an_identified_finger_is_carried_and_only_to_where_it_has_an_equilibrium(identified, problem):

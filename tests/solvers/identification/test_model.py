@@ -8,21 +8,9 @@ import pytest
 from pinnray.geometry.picture_frame import Registration
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel
-from pinnray.solvers.identification.unknowns import CONTACT, DEFAULT, PARTS  # type: ignore[attr-defined]
+from pinnray.solvers.identification.unknowns import CONTACT, DEFAULT, INDENTATION, PARTS  # type: ignore[attr-defined]
 from tests.solvers.conftest import observed_at
 from tests.solvers.identification.twins import NAMES, NOISE, VALUES, model_of, values_of
-
-
-def test_a_measurement_of_some_markers_is_the_one_without_the_others(problem):
-    """A marker that was dropped as doubtful stays dropped where the fit goes on with other deviations."""
-    moved = np.arange(18.0).reshape(9, 2)
-    seen = np.arange(9) != 4
-    observed = replace(observed_at(problem.mesh.markers, moved, NOISE), visible=seen)
-    kept = np.array([0, 2, 3, 6, 7])
-    found = MarkerData.of(problem.mesh, observed, None, None).only(kept)
-    np.testing.assert_array_equal(found.kept, kept)
-    np.testing.assert_array_equal(found.displacements, moved[seen][kept])
-    assert found.noise.shape == (10,)
 
 
 def test_a_last_step_that_turns_a_point_inside_out_is_not_taken(problem, monkeypatch):
@@ -148,6 +136,27 @@ def test_a_finger_beside_its_drawing_shows_what_lies_where_the_markers_are(probl
     np.testing.assert_allclose(found, shown, atol=5e-4)
     start = markers.predicted(loose.response(values_of(loose.unknowns, VALUES), EXACT))[0].reshape(-1, 2)
     assert np.abs(start - shown).max() > 3e-3
+
+
+def test_an_indentation_is_the_equilibrium_under_the_force_that_makes_it(problem):
+    """Derivatives, too: by the chain rule through the force, which holds the indentation."""
+    forced = model_of(problem)
+    known = forced.response(values_of(forced.unknowns), EXACT)
+    names = forced.unknowns.names
+    model = model_of(problem, [INDENTATION if name == "normal_force" else name for name in names])
+    which, into = names.index("normal_force"), model.unknowns.directions[0]
+    indentation = {INDENTATION: float(known.contact @ into)}
+    found = model.response(values_of(model.unknowns, VALUES | indentation), EXACT)
+    # The last Newton step is a millionth, and with it what it leaves.
+    np.testing.assert_allclose(found.force, known.force, rtol=1e-6)
+    np.testing.assert_allclose(found.state, known.state, atol=1e-6)
+    np.testing.assert_allclose(found.contact_slopes @ into, np.eye(len(names))[which], atol=1e-6)
+    by_force, held = known.slopes[which], known.slopes.copy()
+    held[which] = 0.0
+    held += np.multiply.outer(found.normal_slopes, by_force)
+    np.testing.assert_allclose(found.slopes, held, atol=1e-5 * np.abs(held).max())
+    directions = forced.unknowns.directions[0]
+    np.testing.assert_allclose(found.force_slopes @ directions, found.normal_slopes, atol=1e-12)
 
 
 @pytest.mark.slow

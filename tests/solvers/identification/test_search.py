@@ -14,7 +14,7 @@ from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.law_fits import MOST_LOST, LawFits
 from pinnray.solvers.identification.model import ResponseModel
 from pinnray.solvers.identification.result import Identified
-from pinnray.solvers.identification.search import Identifier
+from pinnray.solvers.identification.search import STARTS, Identifier
 from pinnray.solvers.identification.unknowns import LAW_ODDS, LAWS
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solver import NoSolutionError
@@ -32,7 +32,7 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     logs = [by_law[law].log_evidence + np.log(odds) for law, odds in LAW_ODDS.items()]
     share = dict(zip(LAW_ODDS, np.exp(logs - np.logaddexp(*logs)), strict=True))
     np.testing.assert_allclose(found.probabilities, [share[fit.law] for fit in found.fits])
-    even = Identified(found.fits, np.array([0.25, 0.75]), {})
+    even = Identified(found.fits, np.array([0.25, 0.75]))
     forces, deviations = np.array([fit.component(np.array([0.0, -1.0])) for fit in found.fits]).T
     force = even.force()
     mean = 0.25 * forces[0] + 0.75 * forces[1]
@@ -66,7 +66,7 @@ def test_the_variance_of_the_force_is_the_sum_of_what_it_comes_from(identified):
         assert all(part >= 0 for part in parts.values())
         shares[finger is not None] = found.force().shares
         assert sum(found.force().shares.values()) == pytest.approx(1)
-    assert shares[False]["third dimension"] == 0
+    assert shares[False]["third dimension"] < 0.1  # by what few elements leave
     assert next(iter(shares[True])) == "third dimension"
     # The observations of a body without a depth are most of the rest, and no frame was to be found.
     assert shares[False]["markers"] > 0.2
@@ -88,14 +88,14 @@ def test_a_wrong_marker_is_found_and_not_used(identified, problem):
 
 
 def test_a_law_that_gets_lost_on_the_way_leaves_it_to_the_other(identified, problem, monkeypatch):
-    settled = Identifier._settled
+    started = Identifier._started
 
-    def lost(self, fit):
-        if fit.law == "neo-hookean":
+    def lost(self, law, measurement):
+        if law == "neo-hookean":
             raise NoSolutionError("no equilibrium near the markers")
-        return settled(self, fit)
+        return started(self, law, measurement)
 
-    monkeypatch.setattr(Identifier, "_settled", lost)
+    monkeypatch.setattr(Identifier, "_started", lost)
     solution = sought(problem, identified[0])
     assert solution.problem.material.law == "st-venant-kirchhoff"
     assert "no equilibrium of the neo-hookean law" in solution.status.message
@@ -123,7 +123,7 @@ def test_a_search_ends_where_few_hypotheses_have_an_equilibrium(identified, prob
     monkeypatch.setattr(ResponseModel, "response", response)
     with pytest.raises(NoSolutionError, match="see whether the markers are of this finger and load"):
         sought(problem, identified[0], law="given")
-    assert len(asked) <= 2 + 1 + MOST_LOST + 1  # the last one at rest, to see whether the order is another
+    assert len(asked) <= MOST_LOST + 4 * len(STARTS)
 
 
 def test_a_law_without_an_equilibrium_where_another_one_has_it_is_left_out_at_once(problem, monkeypatch):

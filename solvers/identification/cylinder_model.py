@@ -1,0 +1,280 @@
+"""Equilibria of a finger that a rigid cylinder presses, with friction, on the way to its full travel.
+
+Friction depends on the way there: each response has the stages of its own, and the next one starts every
+stage from them, extrapolated along their derivatives. These are exact, from stage to stage, with what
+touches, sticks and slips held.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.solvers.constrained_elimination import ConstrainedElimination
+from pinnray.solvers.identification.body import Body, PressedBody
+from pinnray.solvers.identification.front_contact import Cylinder, FrontContact, Stage
+from pinnray.solvers.identification.model import Response, ResponseModel
+from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
+from pinnray.solvers.solver import NoSolutionError
+
+NEAR = 0.04
+"""Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
+FARTHEST = 2.0
+"""Longest step of Newton's method over the travel of the stage; a longer one leads astray."""
+ALMOST = 0.015
+ITERATIONS, HALVINGS = 15, 3
+"""Newton iterations of a stage, and times that the way to it is halved where they do not settle."""
+
+
+class CylinderModel(ResponseModel):
+    """Responses of a discretised finger to the unknowns of a cylinder; see `ResponseModel`."""
+
+    def __init__(self, body: PressedBody, unknowns: Unknowns, *, weighed: bool = False) -> None:
+        super().__init__(body, unknowns, weighed=weighed)
+        self._points = body.front
+        rows = body.traction_rows(self._points, np.eye(len(self._points)))
+        self._rows = csr_matrix(rows.reshape(2 * len(self._points), -1))
+
+    def unstable(self, response: Response) -> int:
+        """As the patch has it, with what touches held along the normal, and what sticks altogether."""
+        hypothesis, stage = response.hypothesis, response.way[-1]
+        there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
+        if there is None:
+            raise NoSolutionError("the finger that was found is inside out")
+        cylinder = self._cylinder(hypothesis, 1.0)
+        normal = (self._moved(response.state) - cylinder.centre) / cylinder.radius
+        along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        sticks = stage.touches & (stage.slips == 0)
+        ways = np.concatenate([_held(normal, stage.touches), _held(along, sticks)])
+        rows = (ways @ self._rows).reshape(-1, *self.body.shape)
+        negative = there.negative()
+        return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
+
+    def extrapolated(self, about: Response, values: FloatArray) -> Response:
+        """See `ResponseModel`; the force, too, is of first order."""
+        force = about.force + (values - about.values) @ about.force_slopes
+        return replace(super().extrapolated(about, values), force=force)
+
+    def carried(
+        self, response: Response, points: FloatArray, finer: Callable[[FloatArray], FloatArray]
+    ) -> Response:
+        """The response of a coarse model, whose front has the points (n, 2), by these elements.
+
+        Of its stages the last two: the last but one, where slip begins, stays that of the coarse elements.
+        """
+        order = points[:, 0].argsort()
+        units = np.eye(len(points))[order].T
+        weights = np.array([np.interp(self._points[:, 0], points[order, 0], unit) for unit in units]).T
+        shared = len(points) / len(weights) * weights  # of a force on more points
+
+        def carried(stage: Stage, *, final: bool) -> Stage:
+            state, *slopes = finer(np.stack([stage.state, *stage.slopes]))
+            return replace(
+                stage,
+                state=state,
+                forces=shared @ stage.forces,
+                places=weights @ stage.places,
+                touches=weights @ stage.touches > 0.5,
+                slips=np.round(weights @ stage.slips),
+                slopes=np.array(slopes),
+                force_slopes=shared @ stage.force_slopes,
+                place_slopes=stage.place_slopes @ weights.T,
+                final=final,
+            )
+
+        before, last = carried(response.way[-2], final=True), carried(response.way[-1], final=False)
+        return replace(response, state=last.state, slopes=last.slopes, way=(before, last))
+
+    def _reached(
+        self, values: FloatArray, tolerance: float, iterations: int, halvings: int, slopes: FloatArray | None
+    ) -> Response | None:
+        """The response, by way of the stages of the last one."""
+        known = () if self._last is None else self._last.way
+        step = values if self._last is None else values - self._last.values
+        hypothesis, by = self.unknowns.hypothesis(values), self.unknowns.slopes(values)
+        way = [self._rest(hypothesis, by)]
+
+        def reached(share: float, near: Stage | None, halvings: int) -> bool:
+            if near is not None and near.final:
+                way.append(near.moved(step))
+                return True
+            guesses = [self._ahead(way, share)]
+            if near is not None:
+                guesses.insert(0, near.moved(step))
+            for guess in guesses:
+                found = self._settled(guess, way[-1], share, hypothesis, by, tolerance)
+                if found is not None:
+                    way.append(found)
+                    return True
+            middle = 0.5 * (way[-1].share + share)
+            return halvings > 0 and reached(middle, None, halvings - 1) and reached(share, None, halvings - 1)
+
+        equal = np.arange(1, self.unknowns.stages + 1) / self.unknowns.stages
+        known_or_none: list[Stage | None] = [*known] or [None] * len(equal)
+        shares = [each.share for each in known] or equal.tolist()
+        if not all(reached(share, near, HALVINGS) for share, near in zip(shares, known_or_none, strict=True)):
+            return None
+        return self._pressed(values, hypothesis, by, way[1:])
+
+    def _cylinder(self, hypothesis: Hypothesis, share: float) -> Cylinder:
+        centre = hypothesis.centre + share * hypothesis.travel
+        return Cylinder(self.unknowns.radius, centre, hypothesis.friction)
+
+    def _moved(self, state: FloatArray) -> FloatArray:
+        """Places of the front, shape (m, 2), mm."""
+        return np.asarray(self._points + (self._rows @ state.ravel()).reshape(-1, 2))
+
+    def _moves(self, states: FloatArray) -> FloatArray:
+        """Displacements (p, m, 2) of the front by states (p, *shape)."""
+        return np.asarray((self._rows @ states.reshape(len(states), -1).T).T.reshape(len(states), -1, 2))
+
+    def _rest(self, hypothesis: Hypothesis, by: HypothesisSlopes) -> Stage:
+        cylinder, count = self._cylinder(hypothesis, 0.0), len(self._points)
+        still = np.zeros((len(by.friction), count, 2))
+        return Stage(
+            0.0,
+            np.zeros(self.body.shape),
+            still[0],
+            cylinder.places(self._points),
+            np.zeros(count, dtype=np.bool_),
+            np.zeros(count),
+            np.zeros((len(still), *self.body.shape)),
+            still,
+            -by.centre @ cylinder.place_slopes(self._points).T,
+        )
+
+    def _ahead(self, way: list[Stage], share: float) -> Stage:
+        """The last stage or, from the second one on, the state on the line through the last two."""
+        last = way[-1]
+        if len(way) < 3:
+            return last
+        ahead = (share - last.share) / (last.share - way[-2].share)
+        return replace(last, state=last.state + ahead * (last.state - way[-2].state))
+
+    def _settled(
+        self,
+        guess: Stage,
+        before: Stage,
+        share: float,
+        hypothesis: Hypothesis,
+        by: HypothesisSlopes,
+        tolerance: float,
+    ) -> Stage | None:
+        """The equilibrium at a share of the travel by Newton's method; None where it does not settle."""
+        body, cylinder = self.body, self._cylinder(hypothesis, share)
+        base = body.feet.any(axis=0)
+        state = np.where(base, share * np.tensordot(hypothesis.feet, body.feet, axes=1), guess.state)
+        forces, touches, slips = guess.forces, guess.touches, guess.slips
+        longest = FARTHEST * (share - before.share) * float(np.linalg.norm(hypothesis.travel))
+        for _ in range(ITERATIONS):
+            linearised = body.linearised(state, hypothesis.lame, hypothesis.changes)
+            if linearised is None:
+                return None
+            points = self._moved(state)
+            near = touches | (cylinder.gaps(points) < NEAR * cylinder.radius)
+            rows = self._rows[np.repeat(near, 2)]
+            asked = np.concatenate([rows.toarray().reshape(-1, *body.shape), linearised.force[None]])
+            answers = linearised.solve(asked)
+            answers, free = answers[:-1], state - answers[-1]
+            compliance = rows @ answers.reshape(len(answers), -1).T
+            contact = FrontContact(cylinder, compliance, points[near], forces[near], before.places[near])
+            loose = self._moved(free)[near]
+            pressed = contact.pressed(loose, touches[near], slips[near])
+            if pressed is None:
+                return None
+            forces, touches, slips = np.zeros_like(forces), np.zeros_like(touches), np.zeros_like(slips)
+            forces[near], touches[near], slips[near] = pressed.forces, pressed.touches, pressed.slips
+            load = (pressed.forces.ravel() @ rows).reshape(body.shape)
+            step = free + np.tensordot(pressed.forces.ravel(), answers, axes=1) - state
+            if np.abs(step).max() > longest:
+                return None
+            length = 1.0
+            while not body.admissible(state + length * step, hypothesis.changes):
+                if (length := length / 2) < 2.0**-6:
+                    return None
+            work = max(abs(float((load * state).sum())), 1e-10)
+            size = float(np.sqrt(abs((step * (load - linearised.force)).sum()) / work))
+            state = state + length * step
+            inside = cylinder.gaps(self._moved(state))[~near].min(initial=1.0) < 0
+            if size < max(tolerance, min(10 * tolerance, ALMOST)) and length == 1 and not inside:
+                break
+        else:
+            return None
+        parts = body.force_slopes(state, hypothesis.lame, hypothesis.changes)
+        right = np.zeros((len(by.friction), *body.shape))
+        for slope, part in zip((by.changes, by.moduli, share * by.feet), parts, strict=True):
+            right -= np.tensordot(slope, part, axes=1)
+        slopes = linearised.solve(right) + share * np.tensordot(by.feet, body.feet, axes=1)
+        centre = by.centre + share * by.travel
+        moved = self._moves(slopes)
+        force_slopes = np.zeros((len(slopes), *forces.shape))
+        force_slopes[:, near] = contact.slopes(
+            pressed, moved[:, near], centre, by.friction, before.place_slopes[:, near]
+        )
+        slopes += np.tensordot(force_slopes[:, near].reshape(len(slopes), -1), answers, axes=1)
+        moved = self._moves(slopes) - centre[:, None]
+        points = self._moved(state)
+        return Stage(
+            share,
+            state,
+            forces,
+            cylinder.places(points),
+            touches,
+            slips,
+            slopes,
+            force_slopes,
+            np.einsum("pmi,mi->pm", moved, cylinder.place_slopes(points)),
+        )
+
+    def _pressed(
+        self, values: FloatArray, hypothesis: Hypothesis, by: HypothesisSlopes, way: list[Stage]
+    ) -> Response:
+        last, into = way[-1], self.unknowns.directions[0]
+        force, force_slopes = last.forces.sum(axis=0), last.force_slopes.sum(axis=1)
+        # Points weigh in the place by the force into the finger; without contact there is none.
+        total = float(force @ into) or 1.0
+        weights = last.forces @ into / total
+        weight_slopes = (last.force_slopes @ into - np.outer(force_slopes @ into, weights)) / total
+        displacements = self._moved(last.state) - self._points
+        moved = self._moves(last.slopes)
+        contact, place = weights @ displacements, weights @ self._points
+        contact_slopes = weight_slopes @ displacements + np.einsum("m,pmi->pi", weights, moved)
+        place_slopes = weight_slopes @ self._points
+        motion = self._clamp.motion(
+            (hypothesis.softness, by.softness),
+            (force, force_slopes),
+            (place + contact, place_slopes + contact_slopes),
+        )
+        return Response(
+            values.copy(),
+            hypothesis,
+            last.state,
+            last.slopes,
+            motion,
+            contact,
+            contact_slopes,
+            float(force @ into),
+            force_slopes @ into,
+            force,
+            force_slopes,
+            float(place[0]),
+            place_slopes[:, 0],
+            tuple(way),
+        )
+
+
+def response_model(body: Body, unknowns: Unknowns, *, weighed: bool) -> ResponseModel:
+    """The model of the contact that the unknowns have."""
+    if "travel" not in unknowns.names:
+        return ResponseModel(body, unknowns, weighed=weighed)
+    if not isinstance(body, PressedBody):
+        raise TypeError("a cylinder presses bodies of finite elements")
+    return CylinderModel(body, unknowns, weighed=weighed)
+
+
+def _held(ways: FloatArray, held: BoolArray) -> FloatArray:
+    """Rows (k, 2 m) of the displacement along directions (m, 2) of the k points of a mask."""
+    rows = np.eye(len(held))[held]
+    return (rows[:, :, None] * ways).reshape(len(rows), 2 * len(ways))
