@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pinnray.runtime.atomic import write_text
-from pinnray.runtime.tables import NONE, TextTable, latex, number, percent
+from pinnray.runtime.tables import NONE, TextTable, number, percent
 from pinnray.studies.benchmark.benchmark import ENTRIES, Benchmark
 from pinnray.studies.benchmark.entry import Entry, EntryRow
 from pinnray.studies.benchmark.picture import draw_front
@@ -13,7 +13,7 @@ from pinnray.studies.benchmark.problems import BenchmarkProblem
 from pinnray.studies.benchmark.references import Reference
 from pinnray.studies.sweep.page import write_page
 
-PAGE, FIGURES, LATEX = "benchmark.html", "figures.csv", "tables.tex"
+PAGE, FIGURES = "benchmark.html", "figures.csv"
 COLUMNS: Mapping[str, tuple[str, Callable[[float], str]]] = {
     "displ.,\n%": ("displacement", lambda value: percent(value, 2, sign=False)),
     "v. Mises,\n%": ("von_mises", lambda value: percent(value, 2, sign=False)),
@@ -33,10 +33,9 @@ LAWS = {True: "linear", False: "finite strain"}
 
 
 def write_benchmark(found: Benchmark, folder: Path, record: Mapping[str, Any]) -> list[Path]:
-    """Write the page, its picture, the table of all figures and the tables for LaTeX; returns the paths."""
+    """Write the page, its picture and the table of all figures; returns the paths."""
     tables = [summary_table(found), *problem_tables(found)]
     write_text(folder / FIGURES, found.table().to_csv(index=False, lineterminator="\n", float_format="%.6g"))
-    write_text(folder / LATEX, "\n".join(map(latex, tables)))
     caption = (
         "Median error over median time; the numbers are those of the table below. Line: the front, which no "
         "entry beats in both. Hollow: not every problem of the law was solved."
@@ -47,9 +46,9 @@ def write_benchmark(found: Benchmark, folder: Path, record: Mapping[str, Any]) -
         sentences(found),
         [broken_table(found), *tables],
         {"front": (draw_front(found), caption)},
-        f"{FIGURES}, {LATEX}, {ENTRIES}/*.json (an entry each, to send in). Started {record['started']}.",
+        f"{FIGURES}, {ENTRIES}/*.json (an entry each, to send in). Started {record['started']}.",
     )
-    return [*pages, folder / FIGURES, folder / LATEX]
+    return [*pages, folder / FIGURES]
 
 
 def sentences(found: Benchmark) -> list[str]:

@@ -113,7 +113,6 @@ def test_an_entry_is_a_file_and_those_of_other_sets_are_left_out(tmp_path, two):
     found = pr.benchmark([Scaled(1.07)], entries=None, out=tmp_path / "out")
     page = (tmp_path / "out" / "benchmark.html").read_text()
     assert page.index("Claims that are not true") < page.index("Medians over")
-    assert r"\toprule" in (tmp_path / "out" / "tables.tex").read_text()
     (entry,) = found.entries
     assert Entry.load(tmp_path / "out" / "entries" / "scaled-small.json") == entry
     replace(entry, label="old", problems={**entry.problems, "version": 0}).save(tmp_path)
