@@ -24,6 +24,8 @@ NEAR = 0.04
 FARTHEST = 2.0
 """Longest step of Newton's method over the travel of the stage; a longer one leads astray."""
 ALMOST = 0.015
+"""Largest step, relative in the energy norm, that is the last one while unknowns are sought: the error that
+it leaves is about its square."""
 ITERATIONS, HALVINGS = 15, 3
 """Newton iterations of a stage, and times that the way to it is halved where they do not settle."""
 

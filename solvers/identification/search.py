@@ -111,14 +111,17 @@ class Identifier:
     def _started(self, law: LawName, measurement: MarkerData) -> Fit:
         """The fit of the largest evidence from a contact of `STARTS`, till noise explains the markers.
 
-        The feet are held: they would turn far to make up for a contact that is not found yet.
+        The feet are held: they would turn far to make up for a contact that is not found yet. That of a
+        cylinder is known nearly.
         """
+        if INDENTATION not in self._names:
+            return self._fits.fit(law, measurement, np.zeros(len(self._names)))
         best: Fit | None = None
-        contacts = [{"position": position, "width": width} for position, width in STARTS]
-        # A cylinder has no width, so that some are the same.
-        for start in dict.fromkeys(tuple(each.get(name, 0.0) for name in self._names) for each in contacts):
+        for position, width in STARTS:
+            contact = {"position": position, "width": width}
+            start = np.array([contact.get(name, 0.0) for name in self._names])
             try:
-                fit = self._fits.fit(law, measurement, np.array(start), held=self._feet, rounds=ROUNDS)
+                fit = self._fits.fit(law, measurement, start, held=self._feet, rounds=ROUNDS)
             except NoSolutionError as error:
                 reason = error
                 continue

@@ -63,5 +63,6 @@ class IdentifyingSolver(FieldSettings):
 
     @property
     def under_cylinder(self) -> tuple[str, ...]:
-        """Those with the unknowns of a cylinder in place of a patch's."""
-        return *CYLINDER, *(name for name in self.unknowns if name not in CONTACT)
+        """Those with the unknowns of a cylinder in place of a patch's, of which the place may be none."""
+        own = (name for name in CYLINDER if name not in CONTACT or name in self.unknowns)
+        return *own, *(name for name in self.unknowns if name not in CONTACT)

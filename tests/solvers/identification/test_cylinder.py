@@ -94,3 +94,8 @@ def test_two_methods_find_the_same_complement():
         np.testing.assert_allclose(z * w, 0.0, atol=1e-9)
     np.testing.assert_allclose(one, other, atol=1e-9)
     assert lemke(-np.eye(2), np.array([-1.0, -2.0])) is None
+
+
+def test_a_cylinder_has_its_unknowns_in_place_of_those_of_a_patch():
+    assert FemIdSolver(parameters="normal_force,poisson").under_cylinder == ("travel", "friction", "poisson")
+    assert FemIdSolver(parameters="position,normal_force").under_cylinder == CYLINDER

@@ -1,12 +1,15 @@
 """A base of two feet, each of which gives and turns, and a tangential force that friction bounds."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.boundary import Feet
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel
+from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.identification.unknowns import DEFAULT, SHARE, Unknowns
 from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.bodies import body_mesh
@@ -138,5 +141,6 @@ def test_markers_that_ask_for_more_than_friction_get_as_much_as_it_allows(rubbed
     response = free.response(values_of(free.unknowns, {"normal_force": 0.16, "shear_force": -0.08}), EXACT)
     shown = observed_at(rubbed.mesh.markers, markers.predicted(response)[0].reshape(-1, 2), NOISE)
     slippery = replace(rubbed, load=rubbed.load.model_copy(update={"friction": 0.1}))
-    found = sought(slippery, shown, law="given", parameters="normal_force,shear_force")
-    assert found.stats[SHARE] == pytest.approx(-0.1, abs=1e-3)
+    solver = FemIdSolver(degree=1, law="given", parameters="normal_force,shear_force")
+    patch = Identifier(solver, slippery, partial(FemBody, degree=1)).identify(shown)
+    assert patch.stats()[SHARE] == pytest.approx(-0.1, abs=1e-3)

@@ -30,6 +30,7 @@ class Scaled:
         if not self.factor:
             raise ZeroDivisionError("no factor")
         found = FemSolver().solve(problem)
+        assert isinstance(found.field, LagrangeField)
         field = LagrangeField(found.field.space, self.factor * found.field.values)
         error = found.error and replace(found.error, displacement=self.estimate * found.error.displacement)
         return replace(
