@@ -68,10 +68,9 @@ def arrow(
     style: str = "-|>,head_width=0.18,head_length=0.35",
     colour: str = INK,
     width: float = 1.0,
-    gap: float = 0.0,
 ) -> None:
-    """An arrow between two points in the axes' coordinates; `gap` is left at its end, points."""
-    shape = {"arrowstyle": style, "color": colour, "lw": width, "shrinkA": 0, "shrinkB": gap}
+    """An arrow between two points in the axes' coordinates."""
+    shape = {"arrowstyle": style, "color": colour, "lw": width, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=shape, zorder=6)
 
 

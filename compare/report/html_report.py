@@ -142,7 +142,15 @@ def report_html(
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
     """
     design, scores = comparison.design, comparison.scores
-    entries = [_entry(evaluation, comparison) for evaluation in comparison.evaluations]
+    entries: list[dict[str, Any]] = [
+        {
+            "label": each.label,
+            "evaluation": each,
+            "own": (own := scores[each.solver]),
+            "seconds": seconds(own),
+        }
+        for each in comparison.evaluations
+    ]
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
@@ -152,7 +160,9 @@ def report_html(
         table_one=table_one(scores),
         printed=printed_rows(design),
         entries=entries,
-        certified=[entry for entry in entries if _distant(entry["evaluation"])],
+        certified=[
+            entry for entry in entries if (found := entry["evaluation"].certificate) and found.has_excess
+        ],
         missing=[said for each in comparison.evaluations if (said := text.missed_energy(each))],
         has_symbols=any(symbol for _, symbol, _ in design.facts()),
         text=text,
@@ -170,19 +180,3 @@ def _template() -> Template:
     filters = (number, distance, share)
     environment.filters |= {each.__name__: each for each in filters}
     return environment.get_template("report.html.j2")
-
-
-def _entry(evaluation: Evaluation, comparison: Results) -> dict[str, Any]:
-    """One solver's part of the tables."""
-    own = comparison.scores[evaluation.solver]
-    return {
-        "label": evaluation.label,
-        "evaluation": evaluation,
-        "own": own,
-        "seconds": seconds(own),
-    }
-
-
-def _distant(evaluation: Evaluation) -> bool:
-    """Whether a solution has a certificate that says more than that it is the one of `fem`."""
-    return evaluation.certificate is not None and evaluation.certificate.has_excess

@@ -24,7 +24,7 @@ from pinnray.runtime.arrays import FloatArray, IntArray
 CHUNK = 2**14
 """Numbers in one array of a chunk: an eighth of a megabyte."""
 
-_POOL: ContextVar["ThreadPoolExecutor | _ThisThread | None"] = ContextVar("_POOL", default=None)
+_POOL: ContextVar[Callable[..., Iterator[Any]] | None] = ContextVar("_POOL", default=None)
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -35,29 +35,18 @@ def slices(points: int, size: int) -> list[slice]:
     return [slice(start, min(start + size, points)) for start in range(0, max(points, 1), size)]
 
 
-def map_in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """`task` of every item, in the items' order, on every thread."""
-    return list(imap_in_threads(task, items))
-
-
 def imap_in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """The same, each result released as soon as the next one is asked for."""
-    with pool() as threads:
-        yield from threads.map(task, items)
-
-
-class _ThisThread:
-    """A pool of one thread, the calling one: another would take 50 microseconds more for every item."""
-
-    def map(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        return map(task, items)
+    """`task` of every item, in order, on every thread; each is released when the next one is asked for."""
+    with pool() as mapped:
+        yield from mapped(task, items)
 
 
 @contextmanager
-def pool() -> Iterator[ThreadPoolExecutor | _ThisThread]:
-    """A pool of as many threads as torch may use; torch and its BLAS have one thread each meanwhile.
+def pool() -> Iterator[Callable[..., Iterator[Any]]]:
+    """The `map` of as many threads as torch may use; torch and its BLAS have one thread each meanwhile.
 
-    The functions of this module use the pool that they are called in. On busy cores torch's own threads wait
+    The functions of this module use the pool that they are called in. One thread is the calling one: another
+    would take 50 microseconds more for every item. On busy cores torch's own threads wait
     for one another after every small operation, which was measured to cost more than half of the time. With
     DOLFINx in the process torch's matrix products may be OpenBLAS's, whose threads let callers wait for one
     another: measured three times as slow.
@@ -71,10 +60,10 @@ def pool() -> Iterator[ThreadPoolExecutor | _ThisThread]:
     with threadpool_limits(1, user_api="blas"), ExitStack() as stack:
         stack.callback(torch.set_num_threads, threads)
         torch.set_num_threads(1)
-        made: ThreadPoolExecutor | _ThisThread = _ThisThread()
+        made: Callable[..., Iterator[Any]] = map
         if threads > 1:
             executor = ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,))
-            made = stack.enter_context(executor)
+            made = stack.enter_context(executor).map
         token = _POOL.set(made)
         try:
             yield made

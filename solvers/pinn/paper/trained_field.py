@@ -11,7 +11,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.energy_and_force import energy_and_force
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
 from pinnray.solvers.pinn.paper.training import Training
-from pinnray.solvers.pinn.threading import CHUNK, map_in_threads, slices
+from pinnray.solvers.pinn.threading import CHUNK, imap_in_threads, slices
 from pinnray.solvers.problem import Problem, contact_functional
 from pinnray.solvers.solution import DisplacementField, Status
 
@@ -40,7 +40,7 @@ class MlpField:
             return quantity(self.parameters, points[rows]).transpose(0, 1)
 
         rows = slices(len(points), max(CHUNK // self.network.width, 8))
-        return np.asarray(torch.cat(map_in_threads(evaluate, rows)).numpy())
+        return np.asarray(torch.cat(list(imap_in_threads(evaluate, rows))).numpy())
 
 
 ENERGY_CHANGE = 0.01
