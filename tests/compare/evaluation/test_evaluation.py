@@ -64,12 +64,6 @@ def test_deviations_are_those_that_the_solver_estimates(mesh, stress, tmp_path):
     )
 
 
-def test_another_key_is_another_result(pinn, tmp_path):
-    pinn.save(tmp_path / "pinn.npz", "digest")
-    assert Evaluation.load(tmp_path / "pinn.npz", "another digest") is None
-    assert Evaluation.load(tmp_path / "none.npz", "digest") is None
-
-
 def test_a_solution_found_on_another_mesh_is_sampled_at_the_same_places(mesh):
     """Where an element has another number there, the values must still be those of the place."""
     own, other = (

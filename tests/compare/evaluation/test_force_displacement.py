@@ -32,12 +32,6 @@ def test_force_is_the_component_along_the_stroke(followed):
     np.testing.assert_allclose(oblique.tangential_force, 0.8 * 0.2 * STEPS - 0.6 * 3.0 * STEPS**2)
 
 
-def test_a_free_component_has_no_stroke(followed):
-    sliding = ForceCurve.of(followed, Load(kind="patch", displacement=(None, -4.0)))
-    np.testing.assert_allclose(sliding.stroke, 4.0 * STEPS)
-    np.testing.assert_allclose(sliding.force, 3.0 * STEPS**2)
-
-
 def test_linear_solvers_are_straight_lines_beside_one_that_follows_the_load(followed, fem, evaluate):
     end_only = replace(evaluate("pinn-std"), law="neo-hookean")
     curves = force_curves([fem, followed, end_only], Load())
