@@ -293,7 +293,7 @@ def test_a_damaged_file_is_refused_by_the_worker(tmp_path):
     path = tmp_path / "cut.stp"
     path.write_bytes((FINRAY / "Finray_8.stp").read_bytes()[:3000])
     with pytest.raises(UserError, match="it is damaged or cut off"):
-        drawn_finger(path, Description(), cache_dir=tmp_path / "cache")
+        drawn_finger(path, Description())
 
 
 def test_no_other_file_is_read(tmp_path, monkeypatch):

@@ -8,7 +8,6 @@ from shapely.geometry import LineString, Point, Polygon
 
 from pinnray.geometry import Design, finger_section, marker_positions
 from pinnray.geometry.finger.section import cells, rib_axes, ribs
-from tests.meshes import body_area, body_perimeter, polygon_area
 
 THICKNESS = {"front": "front_thickness", "back": "back_thickness", "base": "base_thickness"}
 
@@ -28,17 +27,15 @@ def as_shapely(design: Design) -> Polygon:
 def test_area_and_perimeter_agree_with_shapely(design: Design) -> None:
     section, body = finger_section(design), as_shapely(design)
     assert section.area == pytest.approx(body.area, rel=1e-7)
-    assert section.area == pytest.approx(body_area(design), rel=1e-12)
     perimeter = sum(loop.lengths.sum() for loop in section.loops)
     assert perimeter == pytest.approx(body.length, rel=1e-7)
-    assert perimeter == pytest.approx(body_perimeter(design), rel=1e-12)
 
 
 def test_section_has_one_cell_more_than_ribs_and_none_touches_another(design: Design) -> None:
     found = [Polygon(corners) for corners in cells(design)]
     assert len(found) == len(ribs(design)) + 1 == design.rib_count + 1
     outer = Polygon(design.section.outline.points)
-    assert all(cell.is_valid and polygon_area(np.array(cell.exterior.coords[:-1])) > 0 for cell in found)
+    assert all(cell.is_valid and cell.exterior.is_ccw for cell in found)
     assert all(outer.contains(cell) for cell in found)
     assert all(first.distance(second) > 0 for first, second in pairwise(found))
 
