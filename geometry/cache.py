@@ -27,11 +27,7 @@ MAKERS = ("cadquery", "cadquery-ocp", "ezdxf", "gmsh", "numpy", "svgelements")
 
 
 def finger_mesh(
-    finger: Finger,
-    *,
-    settings: MeshSettings | None = None,
-    across: int | None = None,
-    keep: bool = True,
+    finger: Finger, *, settings: MeshSettings | None = None, across: int | None = None, keep: bool = True
 ) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before.
 
@@ -95,12 +91,7 @@ def drawn_finger(file: Path, description: Description) -> DrawnFinger:
     return found
 
 
-def cad_files(
-    finger: Finger,
-    folder: Path,
-    *,
-    formats: Sequence[str] = CAD_FORMATS,
-) -> list[Path]:
+def cad_files(finger: Finger, folder: Path, *, formats: Sequence[str] = CAD_FORMATS) -> list[Path]:
     """Write a finger's CAD files: solid as STEP and STL (body and markers), section as DXF.
 
     Args:

@@ -13,12 +13,7 @@ import numpy as np
 import shapely
 from scipy.sparse import coo_matrix, diags
 
-from pinnray.geometry.mesh.boundary import (
-    CORNER_ANGLE,
-    boundary_loops,
-    mean_thickness,
-    walls_and_ribs,
-)
+from pinnray.geometry.mesh.boundary import CORNER_ANGLE, boundary_loops, mean_thickness, walls_and_ribs
 from pinnray.geometry.mesh.extension import Extension, barycentric_gradients
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh

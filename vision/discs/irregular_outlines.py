@@ -30,12 +30,7 @@ from pinnray.vision.discs.disc_image_model import (
     outline_centroid,
 )
 from pinnray.vision.discs.fit_priors import MISSING, Known, prior_and_limits
-from pinnray.vision.discs.least_squares import (
-    DiscFit,
-    fit_disc_model,
-    misfit,
-    refined_fit,
-)
+from pinnray.vision.discs.least_squares import DiscFit, fit_disc_model, misfit, refined_fit
 from pinnray.vision.discs.pixel_windows import PixelWindows
 from pinnray.vision.discs.straight_edges import with_edges
 

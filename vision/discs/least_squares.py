@@ -234,11 +234,7 @@ def refined_fit(
             break
         used, before = chosen, prior
         part, left = fit_disc_model(
-            window.at(moving),
-            result.parameters[moving],
-            prior.at(moving),
-            limits[moving],
-            chosen[moving],
+            window.at(moving), result.parameters[moving], prior.at(moving), limits[moving], chosen[moving]
         )
         result.put(moving, part)
         residuals[moving] = left

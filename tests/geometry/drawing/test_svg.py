@@ -42,10 +42,7 @@ def test_what_svg_does_not_draw_is_left_out(tmp_path, undrawn):
 
 
 @pytest.mark.parametrize(
-    ("drawn", "bounds"),
-    [
-        (f'<mask>{HOLE}</mask><use href="#hole" x="5" y="1"/>', (25, 4, 35, 8)),
-    ],
+    ("drawn", "bounds"), [(f'<mask>{HOLE}</mask><use href="#hole" x="5" y="1"/>', (25, 4, 35, 8))]
 )
 def test_copies_are_where_they_are_used(tmp_path, drawn, bounds):
     path = write_svg(tmp_path / "a.svg", f'<rect width="100" height="60"/>{drawn}')
