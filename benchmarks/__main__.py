@@ -10,10 +10,6 @@ from pinnray.runtime.errors import UserError
 
 BENCHMARKS = {
     "results": "results.default_run:main",
-    "default": "results.default_time:main",
-    "fields": "results.fields:loads",
-    "friction": "results.fields:friction",
-    "fingers": "results.fields:fingers",
     "entries": "entries.run:small",
     "full-entries": "entries.run:full",
     "page": "entries.run:page",

@@ -221,7 +221,7 @@ def compare(
     job = Job(
         design=finger,
         solvers=chosen,
-        spare=spare_solvers(chosen, reference, preset) if solvers is None else (),
+        spare=spare_solvers(chosen, reference, preset),
         mesh=mesh_settings(size),
         adapt=adapt,
         material=elastic,

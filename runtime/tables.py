@@ -279,33 +279,6 @@ def terminal_table(
     return table
 
 
-def latex(table: TextTable) -> str:
-    """A table for LaTeX with the package booktabs; breaks of lines in headings are blanks there."""
-    letters = "".join("l" if heading in table.left else "r" for heading in table.headings)
-    lines = [" & ".join(map(_latex_text, row)) + r" \\" for row in (table.headings, *table.rows)]
-    caption = _latex_text(f"{table.title}. {table.caption}".strip())
-    return "\n".join(
-        [
-            *(r"\begin{table}", rf"\caption{{{caption}}}", rf"\begin{{tabular}}{{{letters}}}", r"\toprule"),
-            *(lines[0], r"\midrule", *lines[1:], r"\bottomrule", r"\end{tabular}", r"\end{table}", ""),
-        ]
-    )
-
-
-def _latex_text(text: str) -> str:
-    """A text with the letters that mean something to LaTeX escaped."""
-    known = {
-        "−": "$-$",
-        "×": r"$\times$",
-        "≤": r"$\leq$",
-        "±": r"$\pm$",
-        "\N{NO-BREAK SPACE}": "~",
-        "\n": " ",
-    }
-    known |= {letter: rf"\{letter}" for letter in "%&#_$"} | {"<": "$<$", ">": "$>$"}
-    return "".join(known.get(letter, letter) for letter in text)
-
-
 def significant(value: float, digits: int) -> str:
     """A number with so many significant digits, without an exponent below a million."""
     return f"{float(f'{value:.{digits}g}'):g}"

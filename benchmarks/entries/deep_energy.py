@@ -41,11 +41,11 @@ class DeepEnergySolver:
 
     width: int = 50
     layers: int = 4
-    adam: int = 1000
-    lbfgs: int = 500
-    rate: float = 1e-3
+    adam: int = 200
+    lbfgs: int = 300
+    rate: float = 5e-3
     features: int = 0
-    scale: float = 4.0
+    scale: float = 1.0
     quadrature: int = 1
     seed: int = 0
     laws = ("linear", "neo-hookean")

@@ -36,10 +36,10 @@ class DeepXdeEntry:
         seed: Of the random numbers.
     """
 
-    width: int = 50
-    layers: int = 4
-    adam: int = 400
-    lbfgs: int = 400
+    width: int = 30
+    layers: int = 3
+    adam: int = 200
+    lbfgs: int = 200
     rate: float = 1e-3
     penalty: float = 100.0
     seed: int = 0

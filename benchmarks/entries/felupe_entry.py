@@ -7,9 +7,10 @@ import felupe
 import numpy as np
 
 from benchmarks.entries.linear_system import solved_directly
+from pinnray.solvers.cylinder_contact import touching_centre
 from pinnray.solvers.energy_and_force import energy_and_force
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
-from pinnray.solvers.problem import Problem, front_points
+from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import Progress, UnsupportedProblemError, check_problem, silent
 
@@ -54,8 +55,7 @@ class FelupeEntry:
         space = LagrangeSpace(problem.mesh, 2)
         points, centre = space.nodes, len(space.nodes)
         if load.kind == "cylinder":
-            middle = front_points(problem.mesh, np.array([problem.mesh.points[problem.mesh.contact_node, 0]]))
-            points = np.concatenate([points, middle + np.array([0.0, load.radius])])
+            points = np.concatenate([points, touching_centre(problem)[None]])
         mesh = felupe.Mesh(points, space.cell_nodes, "triangle6")
         region = felupe.Region(mesh, QuadraticTriangle(), felupe.TriangleQuadrature(order=2))
         field = felupe.FieldContainer([felupe.FieldPlaneStrain(region, dim=2)])

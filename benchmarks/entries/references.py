@@ -3,6 +3,8 @@
 Their error is bounded by the difference between two meshes: it falls at least in proportion to the elements.
 """
 
+from pathlib import Path
+
 import numpy as np
 from rich.table import Table
 from scipy.spatial import cKDTree
@@ -12,13 +14,14 @@ from pinnray.geometry.mesh.boundary import mean_thickness, singular_points
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.atomic import atomic_path
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import terminal_table
 from pinnray.solvers.problem import contact_nodes, front_points
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import Solution
 from pinnray.studies.benchmark.problems import BenchmarkProblem, problem_set
-from pinnray.studies.benchmark.references import MEASURES, Reference, Sampled, packed, unpacked
+from pinnray.studies.benchmark.references import MEASURES, STEPS, Reference, Sampled, unpacked
 
 POINTS = MeshSettings(size=2.0)
 """Of the mesh with one element across each wall whose quadrature points are the fixed points."""
@@ -35,7 +38,7 @@ def main(rows: str = "") -> Table:
     for problem in problem_set("full").problems:
         if rows in problem.name:
             made = make_reference(problem)
-            made.save(problem.reference_file)
+            save(made, problem.reference_file)
             cells.append(
                 (problem.name, str(len(made.points)), *(f"{made.bounds[name]:.1e}" for name in MEASURES))
             )
@@ -85,3 +88,24 @@ def _touched(solution: Solution) -> FloatArray:
     if solution.problem.load.kind != "cylinder" or contact is None:
         return drawn
     return front_points(mesh, np.linspace(contact.start, contact.end, 100))
+
+
+def save(reference: Reference, file: Path) -> None:
+    """Write it compressed; fields and points in whole steps of their range."""
+    exact, arrays = reference.exact, {}
+    for name, values in {
+        "points": reference.points,
+        "u": exact.displacement,
+        "von_mises": exact.von_mises,
+    }.items():
+        arrays[name], arrays[f"{name}_range"] = packed(values)
+    arrays["numbers"] = [exact.force, exact.energy, *(reference.bounds[name] for name in MEASURES)]
+    arrays["weights"], arrays["away"] = reference.weights.astype(np.float32), np.packbits(reference.away)
+    with atomic_path(file) as partial, partial.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)
+
+
+def packed(values: FloatArray) -> tuple[np.ndarray, FloatArray]:
+    """Values as whole steps of their range, and its ends."""
+    low, high = float(values.min()), float(values.max())
+    return np.round((values - low) / (high - low) * STEPS).astype(np.uint16), np.array([low, high])

@@ -1,1 +1,1 @@
-"""The default run: its tables on the pages, its time, and readings of the paper's open choices."""
+"""The default run: its tables on the pages."""

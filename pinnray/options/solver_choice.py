@@ -44,10 +44,10 @@ def made_solvers(
 def spare_solvers(
     solvers: Sequence[Solver], reference: str | None, preset: str | None, named: Collection[str] = ()
 ) -> list[str]:
-    """Names of the solvers of a comparison's own choice that it leaves out where they cannot do the job.
+    """Names of the solvers that a comparison leaves out where they cannot do the job.
 
     Args:
-        solvers: All that it chose.
+        solvers: All of them.
         reference: The one to compare with, which is asked for.
         preset: What is asked for of those that have it.
         named: Others that are asked for.

@@ -42,7 +42,8 @@ class Identifier:
 
     Args:
         settings: Unknowns, priors, radius of the markers and reaction.
-        problem: The finger; of its load only the drawn contact counts, of its law nothing unless it is given.
+        problem: The finger; of its load the drawn contact and a cylinder count, of its law nothing unless
+            it is given.
         body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
         names: Of the unknowns; those of the settings by default.
         cost_change: Relative change of the cost below which a search has converged.

@@ -120,8 +120,8 @@ class Unknowns:
     """The p unknowns of a problem, in order, and the hypothesis that their values describe.
 
     Args:
-        problem: It has the values of everything else; its load only gives the drawn contact and the friction,
-            its observations only how well the frames of their pictures are known.
+        problem: It has the values of everything else; its load only gives the drawn contact, or a cylinder
+            and its way, and the friction, its observations how well the frames of their pictures are known.
         names: Some of `DEFAULT`, and `young`; a finger without cavities has no walls to be found, a base in
             one piece no feet.
     """

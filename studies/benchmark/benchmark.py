@@ -23,6 +23,8 @@ from pinnray.studies.sweep.sweep import OUT_OF_TIME, run_tasks
 
 DEFINITION = "definition.json"
 ENTRIES = "entries"
+FIGURES = ("displacement", "von_mises", "von_mises_away", "force", "energy", "times_fem", "memory")
+"""Numbers of a row that have a median."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,9 +64,16 @@ class Benchmark:
 
     def table(self) -> pd.DataFrame:
         """A row for each entry and problem; see `EntryRow`."""
-        return pd.DataFrame(
-            [{"entry": each.label, **vars(row)} for each in self.entries for row in each.rows]
-        ).drop(columns="claimed")
+        rows = [{"entry": each.label, **vars(row)} for each in self.entries for row in each.rows]
+        return pd.DataFrame(rows, columns=["entry", *EntryRow.__dataclass_fields__]).drop(columns="claimed")
+
+    def medians(self) -> pd.DataFrame:
+        """By entry and law: medians of the figures where it solved a problem, how many, and broken claims."""
+        table = self.table()
+        table["linear"] = table["problem"].map({each.name: each.linear for each in self.problems.problems})
+        table["broken"] = table["broken"].map(len)
+        solved = table[table["displacement"].notna()].groupby(["entry", "linear"], sort=False)
+        return solved[list(FIGURES)].median().assign(solved=solved.size(), broken=solved["broken"].sum())
 
 
 def run_benchmark(job: BenchmarkJob, stages: Stages | None = None) -> Benchmark:

@@ -2,11 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 from pinnray.runtime.atomic import write_text
-from pinnray.runtime.tables import NONE, TextTable, latex, number, percent
+from pinnray.runtime.tables import NONE, TextTable, number, percent
 from pinnray.studies.benchmark.benchmark import ENTRIES, Benchmark
 from pinnray.studies.benchmark.entry import Entry, EntryRow
 from pinnray.studies.benchmark.picture import draw_front
@@ -14,7 +13,7 @@ from pinnray.studies.benchmark.problems import BenchmarkProblem
 from pinnray.studies.benchmark.references import Reference
 from pinnray.studies.sweep.page import write_page
 
-PAGE, FIGURES, LATEX = "benchmark.html", "figures.csv", "tables.tex"
+PAGE, FIGURES = "benchmark.html", "figures.csv"
 COLUMNS: Mapping[str, tuple[str, Callable[[float], str]]] = {
     "displ.,\n%": ("displacement", lambda value: percent(value, 2, sign=False)),
     "v. Mises,\n%": ("von_mises", lambda value: percent(value, 2, sign=False)),
@@ -34,10 +33,9 @@ LAWS = {True: "linear", False: "finite strain"}
 
 
 def write_benchmark(found: Benchmark, folder: Path, record: Mapping[str, Any]) -> list[Path]:
-    """Write the page, its picture, the table of all figures and the tables for LaTeX; returns the paths."""
+    """Write the page, its picture and the table of all figures; returns the paths."""
     tables = [summary_table(found), *problem_tables(found)]
     write_text(folder / FIGURES, found.table().to_csv(index=False, lineterminator="\n", float_format="%.6g"))
-    write_text(folder / LATEX, "\n".join(map(latex, tables)))
     caption = (
         "Median error over median time; the numbers are those of the table below. Line: the front, which no "
         "entry beats in both. Hollow: not every problem of the law was solved."
@@ -48,9 +46,9 @@ def write_benchmark(found: Benchmark, folder: Path, record: Mapping[str, Any]) -
         sentences(found),
         [broken_table(found), *tables],
         {"front": (draw_front(found), caption)},
-        f"{FIGURES}, {LATEX}, {ENTRIES}/*.json (an entry each, to send in). Started {record['started']}.",
+        f"{FIGURES}, {ENTRIES}/*.json (an entry each, to send in). Started {record['started']}.",
     )
-    return [*pages, folder / FIGURES, folder / LATEX]
+    return [*pages, folder / FIGURES]
 
 
 def sentences(found: Benchmark) -> list[str]:
@@ -80,15 +78,12 @@ def broken_table(found: Benchmark) -> TextTable:
 
 def summary_table(found: Benchmark) -> TextTable:
     """Medians of each entry over the problems of a law that it solved."""
-    rows = []
-    for place, entry in enumerate(found.entries, start=1):
-        for linear, law in LAWS.items():
-            names = [each.name for each in found.problems.problems if each.linear == linear]
-            solved = [row for name, row in entry.solved.items() if name in names]
-            own = [_middle(solved, figure, shown) for figure, shown in COLUMNS.values()]
-            broken = sum(len(row.broken) for row in solved)
-            if solved:
-                rows.append((str(place), entry.label, law, f"{len(solved)}/{len(names)}", *own, str(broken)))
+    rows, numbers = [], [each.label for each in found.entries]
+    for (entry, linear), each in found.medians().iterrows():
+        count = sum(problem.linear == linear for problem in found.problems.problems)
+        figures = [shown(each[figure]) for figure, shown in COLUMNS.values()]
+        said = (str(numbers.index(entry) + 1), entry, LAWS[linear], f"{each['solved']:.0f}/{count}")
+        rows.append((*said, *figures, f"{each['broken']:.0f}"))
     headings = ("no.", "entry", "law", "solved", *COLUMNS, "broken\nclaims")
     title = "Medians over the problems of each law that an entry solved"
     return TextTable(title, headings, rows, f"{MEANINGS} {_notes(found.entries)}", left=("entry", "law"))
@@ -107,7 +102,7 @@ def _problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextT
     for entry in entries:
         row = next(each for each in entry.rows if each.problem == problem.name)
         if row.solved:
-            rows.append((entry.label, *(_middle([row], *each) for each in known), row.state))
+            rows.append((entry.label, *(_shown(row, *each) for each in known), row.state))
         elif row.state != "refused":
             rows.append((entry.label, *[NONE] * len(known), row.state))
             reasons.append(f"{entry.label}: {row.message}")
@@ -117,10 +112,10 @@ def _problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextT
     )
 
 
-def _middle(rows: Sequence[EntryRow], figure: str, shown: Callable[[float], str]) -> str:
-    """The median of a figure over rows; a dash where none has it."""
-    values = [value for row in rows if (value := getattr(row, figure)) is not None]
-    return shown(median(values)) if values else NONE
+def _shown(row: EntryRow, figure: str, shown: Callable[[float], str]) -> str:
+    """A figure of a row; a dash where there is none."""
+    value = getattr(row, figure)
+    return NONE if value is None else shown(value)
 
 
 def _notes(entries: Sequence[Entry]) -> str:

@@ -81,16 +81,11 @@ class ProblemSet:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of version, problems and references."""
-        return content_hash(
-            [
-                self.version,
-                SIZES.model_dump(),
-                [
-                    [each.name, each.definition, each.physics, file_digest(each.reference_file)]
-                    for each in self.problems
-                ],
-            ]
-        )
+        every = [
+            [each.name, each.definition, each.physics, file_digest(each.reference_file)]
+            for each in self.problems
+        ]
+        return content_hash([self.version, SIZES.model_dump(), every])
 
     @property
     def described(self) -> dict[str, Any]:

@@ -4,14 +4,12 @@
 """
 
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.runtime.atomic import atomic_path
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.solution import Solution
 from pinnray.studies.benchmark.problems import BenchmarkProblem
@@ -63,22 +61,6 @@ class Reference:
         error, size = (float(weights @ (each**2).sum(axis=1)) for each in rows)
         return float(np.sqrt(error / size))
 
-    def save(self, file: Path) -> None:
-        """Write it compressed; fields and points in 65,535 steps of their range."""
-        fields = {"points": self.points, "u": self.exact.displacement, "von_mises": self.exact.von_mises}
-        arrays: dict[str, NDArray[Any]] = {}
-        for name, values in fields.items():
-            arrays[name], arrays[f"{name}_range"] = packed(values)
-        numbers = [self.exact.force, self.exact.energy, *(self.bounds[name] for name in MEASURES)]
-        with atomic_path(file) as partial, partial.open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                weights=self.weights.astype(np.float32),
-                away=np.packbits(self.away),
-                numbers=numbers,
-                **arrays,
-            )
-
     @classmethod
     def load(cls, problem: BenchmarkProblem) -> Self:
         """The one of a problem.
@@ -102,13 +84,7 @@ class Reference:
         return cls(points, weights, away, exact, dict(zip(MEASURES, bounds, strict=True)))
 
 
-def packed(values: FloatArray) -> tuple[NDArray[np.uint16], FloatArray]:
-    """Values as whole steps of their range, and the range."""
-    low, high = float(values.min()), float(values.max())
-    return np.round((values - low) / (high - low) * STEPS).astype(np.uint16), np.array([low, high])
-
-
 def unpacked(steps: NDArray[np.uint16], ends: FloatArray) -> FloatArray:
-    """The values of `packed`."""
+    """Values from whole steps of the range between two ends."""
     low, high = ends
     return np.asarray(low + steps * ((high - low) / STEPS))

@@ -132,7 +132,7 @@ def command(
             pool.start()  # which takes as long as to make the solvers here
         made, set_up = options.read(names), {text.partition(".")[0] for text in options.solver_set}
         finger.check_cost(design, mesh, made, simulated=measurements is None)
-        spare = [] if solvers else spare_solvers(made, reference, options.preset, set_up)
+        spare = spare_solvers(made, reference, options.preset, set_up)
         job = replace(job, solvers=made, spare=spare)
         try:
             with Stages(Console(stderr=True), quiet=json_) as stages:

@@ -7,6 +7,9 @@ from rich.console import Console
 from pinnray.options.shared import OptionalOutputPath, SolverOptions, going_on_from
 from pinnray.runtime.exits import say
 
+WIDE = ("no.", "v. Mises,\n%", "energy,\n%", "memory,\nGB")
+"""Headings of columns for which a terminal is too narrow."""
+
 
 def command(
     solvers: str = "fem,fem-nonlinear,pinn-std",
@@ -46,10 +49,10 @@ def command(
         found = run_benchmark(job, stages)
         written = write_benchmark(found, job.out, stages.record())
     for table in (broken_table(found), summary_table(found)):
-        if table.rows:
-            Console().print(
-                terminal_table(table.title, table.headings, table.rows, left=table.left, narrow=True)
-            )
+        kept = [place for place, heading in enumerate(table.headings) if heading not in WIDE]
+        headings, *rows = [[row[place] for place in kept] for row in (table.headings, *table.rows)]
+        if rows:
+            Console().print(terminal_table(table.title, headings, rows, left=table.left, narrow=True))
     for path in written:
         print(path)
     for remark in found.remarks:

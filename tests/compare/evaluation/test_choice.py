@@ -1,8 +1,10 @@
+import json
 from dataclasses import dataclass
 from typing import ClassVar
 
 import pytest
 
+from pinnray.cli import main
 from pinnray.comparison.evaluation.comparison import supported_solvers, unsupported_remarks
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.solution import Solution
@@ -53,3 +55,11 @@ def test_solvers_with_the_same_reason_share_a_line():
         "left out: a, c (no load)",
         "left out: b (too few markers)",
     ]
+
+
+@pytest.mark.slow
+def test_a_named_solver_that_cannot_is_left_out_and_the_first_that_can_is_the_reference(tmp_path, capsys):
+    line = "compare --load cylinder --solvers fem,fem-nonlinear --mesh-size 2 --stroke 1 --quiet --out"
+    assert main([*line.split(), str(tmp_path / "run")]) == 0
+    assert "left out: fem (no load 'cylinder')" in capsys.readouterr().err
+    assert json.loads((tmp_path / "run" / "metrics.json").read_text())["reference"] == "fem-nonlinear"
