@@ -12,11 +12,11 @@ LONGEST_STEP = 0.05
 """Longest load step of a filmed simulation: a spline through its equilibria is then exact to micrometres."""
 
 
-def filmed_course(solution: Solution) -> Course:
-    """The nodal displacements of a solution on the way to its load, which a linear one reaches straight."""
-    nodes = solution.problem.mesh.at_nodes()
+def filmed_course(solution: Solution) -> Course | None:
+    """The nodal displacements of a solution on the way to its load; None for a linear one."""
     if not solution.states:
-        return Course.proportional(solution.displacement(nodes))
+        return None
+    nodes = solution.problem.mesh.at_nodes()
     states = np.array([state.displacement(nodes) for state in solution.states])
     return Course(solution.history["load_fraction"], states)
 

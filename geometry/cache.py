@@ -11,7 +11,7 @@ from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.atomic import write_bytes
-from pinnray.runtime.cache import Result, cache_folder, cached
+from pinnray.runtime.cache import cache_folder, cached
 from pinnray.runtime.content_hash import content_hash, file_digest, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_version
@@ -27,12 +27,7 @@ MAKERS = ("cadquery", "cadquery-ocp", "ezdxf", "gmsh", "numpy", "svgelements")
 
 
 def finger_mesh(
-    finger: Finger,
-    *,
-    settings: MeshSettings | None = None,
-    across: int | None = None,
-    cache_dir: Path | None = None,
-    keep: bool = True,
+    finger: Finger, *, settings: MeshSettings | None = None, across: int | None = None, keep: bool = True
 ) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before.
 
@@ -41,7 +36,6 @@ def finger_mesh(
         settings: Element sizes; None means the mesh of the finger's file if it has one, else the default
             sizes.
         across: Least number of elements through a wall; None means that of the mesher, 3.
-        cache_dir: Folder of the cache; by default `cache_folder()`.
         keep: Whether the cache keeps the mesh.
 
     Raises:
@@ -54,8 +48,10 @@ def finger_mesh(
     settings = settings or MeshSettings()
     sizes = settings.model_dump()
     task = ChildCall(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))
-    entry = (cache_dir or cache_folder()) / f"mesh-{cache_key(finger.digest, (sizes, across))}.npz"
-    return _cached(entry, task, TriangleMesh.load, TriangleMesh.save if keep else None)
+    entry = cache_folder() / f"mesh-{cache_key(finger.digest, (sizes, across))}.npz"
+    save = TriangleMesh.save if keep else None
+    mesh: TriangleMesh = cached(entry, task.what, lambda: run_task(task, TIMEOUT_S), TriangleMesh.load, save)
+    return mesh
 
 
 def mesh_sizes(
@@ -75,18 +71,12 @@ def expected_triangles(finger: Finger, settings: MeshSettings | None) -> int:
     return estimated_triangles(finger, settings or MeshSettings())
 
 
-def drawn_finger(
-    file: Path,
-    description: Description,
-    *,
-    cache_dir: Path | None = None,
-) -> DrawnFinger:
+def drawn_finger(file: Path, description: Description) -> DrawnFinger:
     """The finger of a drawing, from the cache if the same file was read before.
 
     Args:
         file: STEP, DXF, SVG or MSH.
         description: Clamp, contact and markers; what it leaves out is the drawing's own or proposed.
-        cache_dir: Folder of the cache; by default `cache_folder()`.
 
     Raises:
         UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
@@ -94,19 +84,14 @@ def drawn_finger(
     if not file.is_file():
         raise UserError(f"there is no drawing {file}")
     lines = description.model_dump(mode="json")
-    task = ChildCall(
-        f"reading {file.name}", _reader, (file.absolute(), lines)
-    )  # the child has its own folder
-    entry = (cache_dir or cache_folder()) / f"drawing-{cache_key(file_digest(file), (file.name, lines))}.json"
-    return _cached(entry, task, DrawnFinger.load, DrawnFinger.save)
+    # The child has its own folder.
+    task = ChildCall(f"reading {file.name}", _reader, (file.absolute(), lines))
+    entry = cache_folder() / f"drawing-{cache_key(file_digest(file), (file.name, lines))}.pickle"
+    found: DrawnFinger = cached(entry, task.what, lambda: run_task(task, TIMEOUT_S))
+    return found
 
 
-def cad_files(
-    finger: Finger,
-    folder: Path,
-    *,
-    formats: Sequence[str] = CAD_FORMATS,
-) -> list[Path]:
+def cad_files(finger: Finger, folder: Path, *, formats: Sequence[str] = CAD_FORMATS) -> list[Path]:
     """Write a finger's CAD files: solid as STEP and STL (body and markers), section as DXF.
 
     Args:
@@ -136,19 +121,6 @@ def cache_key(digest: str, asked: object) -> str:
     versions = {package: package_version(package) for package in MAKERS}
     parts = {"content": digest, "asked": asked, "versions": versions, "sources": sources_digest(__name__)}
     return content_hash(parts)
-
-
-def _cached(
-    entry: Path,
-    task: ChildCall,
-    load: Callable[[Path], Result],
-    save: Callable[[Result, Path], None] | None,
-) -> Result:
-    def make() -> Result:
-        made: Result = run_task(task, TIMEOUT_S)
-        return made
-
-    return cached(entry, task.what, make, load, save)
 
 
 def _mesher() -> Callable[..., TriangleMesh]:

@@ -66,13 +66,7 @@ class PressedFinger:
         return float(self.problem.load.radius or 0)
 
 
-def press(
-    problem: Problem,
-    progress: Progress = silent,
-    *,
-    scored: bool,
-    places: int,
-) -> PressedFinger:
+def press(problem: Problem, progress: Progress = silent, *, scored: bool, places: int) -> PressedFinger:
     """Press a finger at the places to fit and at those to score.
 
     The travel is the load's stroke from the finger's own contact on; nearer to the base it is less, in

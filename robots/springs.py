@@ -31,11 +31,6 @@ class Springs:
     stiffnesses: FloatArray  #: k, shape (n + 1,), N m or N/m by the coordinates that a has most of
     frequencies: FloatArray  #: Angular frequencies, rising, shape (n + 1,), rad/s
 
-    @property
-    def matrix(self) -> FloatArray:
-        """K, shape (n + 1, n + 1)."""
-        return np.asarray(self.rows.T @ (self.stiffnesses[:, None] * self.rows))
-
 
 def fitted_springs(chain: Chain, finger: PressedFinger, *, fastest: float) -> Springs:
     """Springs by which the chain takes the finger's shapes under the finger's forces.

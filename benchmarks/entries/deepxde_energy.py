@@ -95,8 +95,8 @@ class DeepXdeEntry:
         field = Field(net)
         energy, reaction = energy_and_force(problem, field)
         stats = {"seconds": time.perf_counter() - started, "parameters": net.num_trainable_parameters()}
-        message = f"{self.adam} steps of Adam, {self.lbfgs} of L-BFGS; loss {sum(history.loss_train[-1]):.3g}"
-        return Solution(self.name, problem, field, energy, reaction, Status(True, message), stats)
+        message = f"DeepXDE has no criterion; the loss ended at {sum(history.loss_train[-1]):.3g}"
+        return Solution(self.name, problem, field, energy, reaction, Status(False, message), stats)
 
 
 class Field:

@@ -4,7 +4,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,7 +17,6 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray, frozen_array
-from pinnray.runtime.atomic import write_text
 from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import brief, fact_table, png_image
@@ -160,23 +158,10 @@ class DrawnFinger:
             ),
         }
 
-    def save(self, path: Path) -> None:
-        """Write the definition and the file's own mesh as JSON."""
-        write_text(path, json.dumps(self._whole()))
-
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the definition and the file's own mesh, for other processes."""
-        return type(self).from_definition, (self._whole(),)
-
-    def _whole(self) -> dict[str, Any]:
-        """The definition with the arrays of the file's own mesh."""
-        arrays = self.mesh and {name: array.tolist() for name, array in self.mesh.arrays().items()}
-        return {**self.definition(), "mesh": arrays}
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Read a finger that `save` wrote."""
-        return cls.from_definition(json.loads(path.read_text(encoding="utf-8")))
+        """Pickle the definition and the arrays of the file's own mesh, for the cache and other processes."""
+        arrays = self.mesh and self.mesh.arrays()
+        return type(self).from_definition, ({**self.definition(), "mesh": arrays},)
 
     @classmethod
     def from_definition(cls, definition: Mapping[str, Any]) -> Self:

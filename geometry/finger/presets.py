@@ -26,9 +26,7 @@ def preset_names() -> list[str]:
 
 
 def load_design(
-    name_or_path: str | Path = "default",
-    overrides: Mapping[str, Any] | None = None,
-    **parameters: Any,
+    name_or_path: str | Path = "default", overrides: Mapping[str, Any] | None = None, **parameters: Any
 ) -> Design:
     """A preset, or the design in a TOML file, with some parameters changed: `load_design(rib_count=6)`.
 

@@ -69,17 +69,20 @@ def base_corners(p: Parameters) -> FloatArray:
     return np.array([[0.0, 0.0], p.base_width * along])
 
 
+@lru_cache(maxsize=64)
 def cells(p: Parameters) -> tuple[FloatArray, ...]:
     """Cavities from base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise.
 
     Corners: front and back one near the base, then back and front one near the tip.
     """
-    return _quadrilaterals(p)[::2]
-
-
-def ribs(p: Parameters) -> tuple[FloatArray, ...]:
-    """Ribs between the walls' inner faces, corners in the order of `cells`, each of shape (4, 2), mm."""
-    return _quadrilaterals(p)[1::2]
+    half = p.rib_thickness / (2 * np.cos(np.radians(rib_slope(p))))
+    sides_of_ribs = _rib_lines(p, (rib_feet(p)[:, None] + (-half, half)).ravel())
+    lines = (base_line(p, p.base_thickness), sides_of_ribs, tip_line(p))
+    walls = (front_line(p.front_thickness), back_line(p, p.back_thickness))
+    sides = np.concatenate(
+        [np.stack([line.meets(wall) for wall in walls], axis=-2).reshape(-1, 2, 2) for line in lines]
+    )
+    return tuple(np.concatenate([sides[::2], sides[1::2, ::-1]], axis=1))
 
 
 def rib_feet(p: Parameters) -> FloatArray:
@@ -153,19 +156,6 @@ def _base_frame(p: Parameters) -> tuple[FloatArray, FloatArray]:
     """Unit vectors from the base into the body and along it from front to back, each of shape (2,)."""
     tilt = np.radians(p.base_tilt)
     return np.array([np.cos(tilt), np.sin(tilt)]), np.array([np.sin(tilt), -np.cos(tilt)])
-
-
-@lru_cache(maxsize=64)
-def _quadrilaterals(p: Parameters) -> tuple[FloatArray, ...]:
-    """Cavities and ribs in turn, from base to tip, each of shape (4, 2), mm."""
-    half = p.rib_thickness / (2 * np.cos(np.radians(rib_slope(p))))
-    sides_of_ribs = _rib_lines(p, (rib_feet(p)[:, None] + (-half, half)).ravel())
-    lines = (base_line(p, p.base_thickness), sides_of_ribs, tip_line(p))
-    walls = (front_line(p.front_thickness), back_line(p, p.back_thickness))
-    sides = np.concatenate(
-        [np.stack([line.meets(wall) for wall in walls], axis=-2).reshape(-1, 2, 2) for line in lines]
-    )
-    return tuple(np.concatenate([sides[:-1], sides[1:, ::-1]], axis=1))
 
 
 def _rib_lines(p: Parameters, feet: FloatArray) -> Line:

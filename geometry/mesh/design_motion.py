@@ -18,9 +18,12 @@ from pinnray.runtime.errors import UserError
 ON_CURVE = 1e-6
 """Largest distance of a boundary's node from the section, mm."""
 
+STEPS = 4
+"""In which the boundary moves; in one step, triangles at joints turn over."""
+
 
 class MovingMesh:
-    """A mesh that follows its finger.
+    """A mesh that follows its finger; its boundary `contact` stays.
 
     Args:
         mesh: Of the finger's section.
@@ -31,7 +34,7 @@ class MovingMesh:
     """
 
     def __init__(self, mesh: TriangleMesh, finger: Finger) -> None:
-        self._mesh, self._loops = mesh, _loops(finger)
+        self.mesh, self._finger, self._loops = mesh, finger, _loops(finger)
         self._motion = elastic(mesh)
         self._nodes = np.unique(mesh.boundary_edges)
         points = mesh.points[self._nodes]
@@ -46,27 +49,23 @@ class MovingMesh:
         if nearest.max() > ON_CURVE:
             raise UserError(f"the mesh is not of the finger {finger.name!r}: its boundary is elsewhere")
 
-    def of(self, finger: Finger, steps: int = 1) -> TriangleMesh | None:
-        """The mesh of a finger with other parameters; None if its section has other pieces.
-
-        Args:
-            finger: The finger.
-            steps: In which the boundary moves; a large motion in few steps would turn triangles over.
+    def of(self, finger: Finger) -> TriangleMesh:
+        """The mesh of a finger with other parameters.
 
         Raises:
-            UserError: If a triangle turns over.
+            UserError: If the section has other pieces, or a triangle turns over.
         """
-        loops = _loops(finger)
+        loops = _loops(finger.at_contact(self._finger.contact_abscissa))
         if [loop.names for loop in loops] != [loop.names for loop in self._loops]:
-            return None
-        moved = np.zeros((len(self._mesh.points), 2))
+            raise UserError("its section has other pieces than that in the middle of the ranges; narrow them")
+        moved = np.zeros((len(self.mesh.points), 2))
         for number, loop in enumerate(loops):
             own = self._loop == number
             places = _at(loop, self._piece[own], self._share[own])
-            moved[self._nodes[own]] = places - self._mesh.points[self._nodes[own]]
-        mesh = replace(self._mesh, points=self._mesh.points + self._motion.of(moved / steps))
-        for _ in range(steps - 1):
-            mesh = replace(mesh, points=mesh.points + elastic(mesh).of(moved / steps))
+            moved[self._nodes[own]] = places - self.mesh.points[self._nodes[own]]
+        mesh = replace(self.mesh, points=self.mesh.points + self._motion.of(moved / STEPS))
+        for _ in range(STEPS - 1):
+            mesh = replace(mesh, points=mesh.points + elastic(mesh).of(moved / STEPS))
         return replace(mesh, depth=finger.depth)
 
 

@@ -10,11 +10,7 @@ import gmsh
 import numpy as np
 
 from pinnray.geometry.finger.finger import Finger, outline_with_contact
-from pinnray.geometry.mesh.boundary import (
-    are_among,
-    counter_clockwise,
-    elements_through_thickness,
-)
+from pinnray.geometry.mesh.boundary import are_among, counter_clockwise, elements_through_thickness
 from pinnray.geometry.mesh.element_size import TRIES, contact_points, size_field
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges

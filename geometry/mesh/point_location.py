@@ -61,9 +61,7 @@ class Locator:
             distance, candidates = self._centroids.query(where[todo], k=count)
             distance, candidates = distance.reshape(-1, count), candidates.reshape(-1, count)
             local = np.einsum(
-                "nkij,nkj->nki",
-                self._inverse[candidates],
-                where[todo][:, None] - self._origin[candidates],
+                "nkij,nkj->nki", self._inverse[candidates], where[todo][:, None] - self._origin[candidates]
             )
             all_three = np.concatenate([1 - local.sum(axis=2, keepdims=True), local], axis=2)
             rows, best = np.arange(len(todo)), all_three.min(axis=2).argmax(axis=1)

@@ -13,12 +13,7 @@ import numpy as np
 import shapely
 from scipy.sparse import coo_matrix, diags
 
-from pinnray.geometry.mesh.boundary import (
-    CORNER_ANGLE,
-    boundary_loops,
-    mean_thickness,
-    walls_and_ribs,
-)
+from pinnray.geometry.mesh.boundary import CORNER_ANGLE, boundary_loops, mean_thickness, walls_and_ribs
 from pinnray.geometry.mesh.extension import Extension, barycentric_gradients
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
@@ -66,12 +61,9 @@ class WallMotion:
         moved = np.einsum("k,knx->nx", changes, self.nodal)[self.mesh.triangles[location.cells]]
         return np.asarray(np.einsum("nc,ncx->nx", location.barycentric, moved))
 
+    @cached_property
     def gradients(self) -> FloatArray:
         """Gradients dV_i/dX_j of the motions per mm of change in every triangle, shape (k, t, 2, 2), 1/mm."""
-        return self._gradients
-
-    @cached_property
-    def _gradients(self) -> FloatArray:
         corners = self.nodal[:, self.mesh.triangles]
         return np.asarray(np.einsum("ktci,tcj->ktij", corners, barycentric_gradients(self.mesh)))
 

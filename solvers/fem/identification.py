@@ -57,7 +57,7 @@ class FemBody:
         self._clamped, _ = dirichlet_conditions(Problem(problem.mesh, problem.material, Load()), space)
         rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = space.shape_gradients(rule.location)
-        self._wall_gradients = motion.gradients()[:, rule.location.cells]
+        self._wall_gradients = motion.gradients[:, rule.location.cells]
         moduli = self._elements.moduli(problem.material.lame)
         self._moduli: tuple[Any, Any] = moduli[:2]
         self._moved, self._direction = (self._elements.node_function() for _ in range(2))

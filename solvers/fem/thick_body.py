@@ -107,7 +107,7 @@ class ThickBody:
         self._shapes = *self.space.shape_gradients(rule.location), self.space.shape_functions(rule.location)
         self._local = np.stack([each.data.reshape(len(rule.weights), -1) for each in self._shapes], axis=1)
         self._walls = np.zeros((len(unknowns.motion.names), len(rule.weights), 1, 3, 3))
-        self._walls[..., 0, :2, :2] = unknowns.motion.gradients()[:, rule.location.cells]
+        self._walls[..., 0, :2, :2] = unknowns.motion.gradients[:, rule.location.cells]
         base = self.space.boundary_nodes("base")
         self._free = ~np.isin(np.arange(len(self.space.nodes)), base)
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))

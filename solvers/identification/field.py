@@ -59,7 +59,7 @@ class Snapshot:
 
     def _gradient(self, drawn: FloatArray, location: LocatedPoints) -> FloatArray:
         """`gradient` from that by the drawn position without the clamp, both of shape (n, d, d)."""
-        walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())
+        walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients)
         cofactors = (1 + np.trace(walls, axis1=1, axis2=2))[:, None, None] * np.eye(2) - walls
         inverse, turned = (np.eye(drawn.shape[-1]) * np.ones((count, 1, 1)) for count in (len(walls), 1))
         inverse[:, :2, :2] = cofactors / deformation_jacobian(walls)[:, None, None]

@@ -81,7 +81,7 @@ def summary_table(found: Benchmark) -> TextTable:
     rows, numbers = [], [each.label for each in found.entries]
     for (entry, linear), each in found.medians().iterrows():
         count = sum(problem.linear == linear for problem in found.problems.problems)
-        figures = [shown(each[figure]) for figure, shown in COLUMNS.values()]
+        figures = [shown(float(each[figure])) for figure, shown in COLUMNS.values()]
         said = (str(numbers.index(entry) + 1), entry, LAWS[linear], f"{each['solved']:.0f}/{count}")
         rows.append((*said, *figures, f"{each['broken']:.0f}"))
     headings = ("no.", "entry", "law", "solved", *COLUMNS, "broken\nclaims")

@@ -127,8 +127,7 @@ class BeamFrame:
             contact=state[:, contact : contact + 2],
             tip=state[:, apex : apex + 2],
             stress=np.stack(
-                [stress[:, first:last].max(axis=1, initial=0.0) for first, last in pairwise(parts)],
-                axis=1,
+                [stress[:, first:last].max(axis=1, initial=0.0) for first, last in pairwise(parts)], axis=1
             ),
         )
 

@@ -64,12 +64,7 @@ class Block:
             if len(factors) < WATCHED:
                 factors.append(np.linalg.inv(factor[:count, :count]))
         return cls(
-            modes,
-            inputs,
-            np.array(rates),
-            np.array(weights).T,
-            np.array(numbers).T,
-            np.array(factors),
+            modes, inputs, np.array(rates), np.array(weights).T, np.array(numbers).T, np.array(factors)
         )
 
     def vector(self, inputs: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """The fields that a sweep has kept, and the finger whose mesh they are on."""
 
+import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,13 +9,14 @@ from typing import Any, Self
 import numpy as np
 
 from pinnray.geometry.finger.design import Design
+from pinnray.geometry.mesh.design_motion import MovingMesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_json
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.studies.emulator.inputs import Inputs
-from pinnray.studies.sweep.field_path import FieldPath, MovedMesh
+from pinnray.studies.sweep.field_path import FieldPath, moving_mesh
 from pinnray.studies.sweep.job import field_base, field_file
 from pinnray.studies.sweep.study import Study, Value
 from pinnray.studies.sweep.sweep import STUDY_FILE, load_sweep
@@ -82,10 +84,10 @@ class KnownSamples:
         return self.inputs.study
 
     @cached_property
-    def meshes(self) -> MovedMesh:
+    def meshes(self) -> MovingMesh:
         """Makes the mesh of a sample."""
-        base = Design(**field_base(self.study, self.inputs.base))
-        return MovedMesh(base, MeshSettings(size=self.study.mesh_size))
+        base = json.dumps(field_base(self.study, self.inputs.base))
+        return moving_mesh(base, MeshSettings(size=self.study.mesh_size))
 
 
 @dataclass(frozen=True, eq=False)

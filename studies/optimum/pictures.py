@@ -91,11 +91,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution], page: f
     label = 0.27 + 0.15 * (1 + max(text.count("\n") for text in titles.values()))
     height = width * extent.height / extent.width
     with figure(0.55 + -(-len(meshes) // columns) * (height + label), page) as drawn:
-        write_heading(
-            drawn,
-            optimum.study.heading,
-            "grey: at rest; black: under the load; all to one scale",
-        )
+        write_heading(drawn, optimum.study.heading, "grey: at rest; black: under the load; all to one scale")
         for place, (run, mesh) in enumerate(meshes.items()):
             row, column = divmod(place, columns)
             box = (0.1 + column * (width + 0.2), 0.5 + row * (height + label) + label, width, height)

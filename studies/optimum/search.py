@@ -7,7 +7,6 @@ from threadpoolctl import threadpool_limits
 
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.geometry.finger.rules import broken_rule
-from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import brief
@@ -134,12 +133,12 @@ def _proposed(
     with threadpool_limits(1):  # the same sums, whatever the number of cores
         known = Sweep(question, fingers, measured)
         emulator = fitted_emulator(known, inputs, names=question.names, fewest=ENOUGH, quick=True)
-        costs = _allowed_costs(question, measured)
+        allowed = [question.costs(each.values) for each in measured if is_allowed(question, each)]
         every = np.array([question.costs(each.values) for each in measured if each.state == "done"])
         found = proposals(
             question,
             emulator,
-            costs,
+            np.array(allowed).reshape(-1, len(question.objectives)),
             fingers,
             reference_point(every),
             count=count,
@@ -151,12 +150,6 @@ def _proposed(
 def is_allowed(question: Question, run: Measurement) -> bool:
     """Whether a run has converged, obeys the constraints and is of a finger that can be so deformed."""
     return run.state == "done" and not run.through_itself and question.allows(run.values)
-
-
-def _allowed_costs(question: Question, measured: list[Measurement]) -> FloatArray:
-    """Costs of the runs that are allowed, shape (n, m)."""
-    rows = [question.costs(each.values) for each in measured if is_allowed(question, each)]
-    return np.array(rows).reshape(-1, len(question.objectives))
 
 
 def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journal) -> Optimum:

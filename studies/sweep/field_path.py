@@ -13,7 +13,6 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.design_motion import MovingMesh
 from pinnray.geometry.mesh.settings import MeshSettings
-from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_arrays
 from pinnray.runtime.errors import UserError
@@ -24,10 +23,6 @@ from pinnray.solvers.solver import Solver
 
 NUMBERS = ("force_u", "force_v", "energy", "force_abscissa", "contact_width")
 """Of a body along its load path: force on it, N/mm, energy, N mm/mm, and where it is pressed, mm."""
-
-
-STEPS = 4
-"""In which a mesh moves to the finger of a sample; in one step, triangles at joints turn over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,25 +79,6 @@ class FieldPath:
             raise UserError(f"{file} is damaged ({error}); remove it and run the sweep again") from None
 
 
-class MovedMesh:
-    """The mesh of a base finger, moved to the sections of other fingers; its boundary `contact` stays."""
-
-    def __init__(self, base: Design, settings: MeshSettings) -> None:
-        self.base, self.mesh = base, finger_mesh(base, settings=settings)
-        self._moving = MovingMesh(self.mesh, base)
-
-    def of(self, finger: Design) -> TriangleMesh:
-        """The mesh of a finger.
-
-        Raises:
-            UserError: If the sections have other pieces, or a triangle would turn over.
-        """
-        moved = self._moving.of(finger.replaced(contact_position=self.base.contact_abscissa), STEPS)
-        if moved is None:
-            raise UserError("its section has other pieces than that in the middle of the ranges; narrow them")
-        return moved
-
-
 def stepping(solver: Solver, strokes: int) -> Solver:
     """The solver of finite strain with its load steps at equal strokes, where it needs no shorter ones."""
     assert isinstance(solver, FemNonlinearSolver)
@@ -112,6 +88,7 @@ def stepping(solver: Solver, strokes: int) -> Solver:
 
 
 @lru_cache(maxsize=1)
-def moved_mesh(base: str, settings: MeshSettings) -> MovedMesh:
-    """The moved meshes of a base finger, whose definition is given as JSON; the last one is kept."""
-    return MovedMesh(Design(**json.loads(base)), settings)
+def moving_mesh(base: str, settings: MeshSettings) -> MovingMesh:
+    """The mesh of a base finger, whose definition is given as JSON, to be moved; the last one is kept."""
+    finger = Design(**json.loads(base))
+    return MovingMesh(finger_mesh(finger, settings=settings), finger)

@@ -22,7 +22,7 @@ from pinnray.runtime.machine import package_versions
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Solver, check_load
-from pinnray.studies.sweep.field_path import moved_mesh, stepping
+from pinnray.studies.sweep.field_path import moving_mesh, stepping
 from pinnray.studies.sweep.study import PHYSICS, Study, Value, physics_of
 
 LEAST_MARKERS = {name: float(parameter_info(name, "low")) for name in ("marker_diameter", "marker_height")}
@@ -74,7 +74,7 @@ class Task:
         material, load = physics_of(self.physics)
         solver: Solver = make_solver(self.solver, **self.settings)
         if self.fields and isinstance(finger, Design):
-            mesh = moved_mesh(self.fields.base, self.mesh).of(finger)
+            mesh = moving_mesh(self.fields.base, self.mesh).of(finger)
             load = load.model_copy(update={"position": finger.contact_abscissa})
             solver = stepping(solver, self.fields.strokes)
         else:

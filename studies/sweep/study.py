@@ -142,9 +142,11 @@ class Study(CheckedModel):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         settings = self.settings_of(self.varied)
+        known = {*PHYSICS, *Parameters.model_fields} - {"name"}
         for name in (*self.fixed, *self.varied):
-            if name.removeprefix(f"{self.solver}.") not in settings:
-                _check_name(name)
+            if name not in known and name.removeprefix(f"{self.solver}.") not in settings:
+                hint = unknown_parameter(name, Parameters)
+                raise ValueError(f"{hint}; of material and load there are {', '.join(PHYSICS)}")
         if both := sorted(self.fixed.keys() & self.varied.keys()):
             raise ValueError(f"{both[0]} is both fixed and varied; give it once")
         for name, values in self.varied.items():
@@ -237,13 +239,6 @@ def _range(name: str, entry: Any) -> Range:
         return Range(**entry)
     except UserError as error:
         raise ValueError(f"varied.{name}: {error}") from None
-
-
-def _check_name(name: str) -> None:
-    """Refuse a parameter that the study cannot change."""
-    if name not in (*PHYSICS, *Parameters.model_fields) or name == "name":
-        hint = unknown_parameter(name, Parameters)
-        raise ValueError(f"{hint}; of material and load there are {', '.join(PHYSICS)}")
 
 
 def _check_range(name: str, values: Range, sampling: str) -> None:

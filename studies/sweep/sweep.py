@@ -176,16 +176,11 @@ def load_sweep(folder: Path) -> Sweep:
     """
     if not (folder / JOURNAL).is_file():
         raise UserError(f"{folder} holds no sweep; make one by `pinnray sweep STUDY.toml`")
-    study = _study_in(folder)
+    try:
+        study = Study(**read_json(folder / STUDY_FILE, "sweep")["study"])
+    except (KeyError, TypeError):
+        raise UserError(f"{folder / STUDY_FILE} is no description of a sweep") from None
     every = samples(study)
     with opened(folder / JOURNAL) as journal:
         found = [each for each in journal.measurements() if each.number < len(every)]
     return Sweep(study, every, found)
-
-
-def _study_in(folder: Path) -> Study:
-    """The study of a sweep's folder."""
-    try:
-        return Study(**read_json(folder / STUDY_FILE, "sweep")["study"])
-    except (KeyError, TypeError):
-        raise UserError(f"{folder / STUDY_FILE} is no description of a sweep") from None

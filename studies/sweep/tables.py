@@ -82,14 +82,11 @@ def failure_grid(sweep: Sweep) -> TextTable:
     reasons: dict[tuple[str, str], list[int]] = {}
     for each in sweep.measurements:
         if each.state != "done":
-            reasons.setdefault((each.state, _kind_of(each.message)), []).append(each.number)
+            # up to the first number or colon, so that like reasons are counted together
+            kind = re.split(r":| -?\d", each.message, maxsplit=1)[0]
+            reasons.setdefault((each.state, kind), []).append(each.number)
     rows: list[tuple[str, ...]] = []
     for (state, reason), numbers in sorted(reasons.items(), key=lambda entry: -len(entry[1])):
         rows.append((state, str(len(numbers)), reason, first_of(numbers)))
     headings = ("state", "samples", "reason", "numbers")
     return TextTable("Samples without a result", headings, rows, left=("state", "reason", "numbers"))
-
-
-def _kind_of(message: str) -> str:
-    """A message up to its first number or colon, so that like reasons are counted together."""
-    return re.split(r":| -?\d", message, maxsplit=1)[0]

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,18 +20,20 @@ COARSE = MeshSettings(size=1.5, coarsening=2)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("cache")
     abandoned = folder / ".mesh-0.0123abcd.partial.npz"
     abandoned.write_bytes(b"half of a mesh")
     os.utime(abandoned, (0, 0))
-    finger_mesh(Design(), settings=COARSE, cache_dir=folder)
-    return folder
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setenv("PINNRAY_CACHE", str(folder))
+        finger_mesh(Design(), settings=COARSE)
+        yield folder
 
 
 def test_second_call_is_read_from_the_cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pinnray.geometry.cache.run_task", None)  # a second run would fail
-    mesh = finger_mesh(Design(name="another-name"), settings=COARSE, cache_dir=folder)
+    mesh = finger_mesh(Design(name="another-name"), settings=COARSE)
     assert len(mesh.markers) == 9
 
 
@@ -41,9 +44,7 @@ def test_nothing_but_the_result_is_left_in_the_cache(folder: Path) -> None:
 def test_worker_gives_the_same_mesh_as_meshing_here(folder: Path) -> None:
     from pinnray.geometry.mesh.mesher import build_mesh
 
-    assert (
-        finger_mesh(Design(), settings=COARSE, cache_dir=folder).digest == build_mesh(Design(), COARSE).digest
-    )
+    assert finger_mesh(Design(), settings=COARSE).digest == build_mesh(Design(), COARSE).digest
 
 
 @pytest.mark.parametrize(
@@ -67,7 +68,7 @@ def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypat
     monkeypatch.setattr("pinnray.geometry.cache.run_task", run)
     entry.write_bytes(damage(good))
     with pytest.warns(RuntimeWarning, match="rebuilding mesh-.* is damaged"):
-        finger_mesh(Design(), settings=COARSE, cache_dir=folder)
+        finger_mesh(Design(), settings=COARSE)
     assert rebuilt == ["meshing design 'default'"]
     assert entry.read_bytes() == good
 
@@ -86,21 +87,24 @@ def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPa
 @pytest.mark.slow
 def test_time_limit_ends_the_worker_with_advice(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr("pinnray.geometry.cache.TIMEOUT_S", 0.5)
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path))
     with pytest.raises(UserError, match=r"meshing design 'default' was ended after 0\.5 s; use larger"):
-        finger_mesh(Design(), settings=MeshSettings(size=0.02), cache_dir=tmp_path)
+        finger_mesh(Design(), settings=MeshSettings(size=0.02))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_worker_stays_and_follows_a_change_of_folder(tmp_path, monkeypatch):
-    finger_mesh(Design(), settings=COARSE, cache_dir=tmp_path / "first")
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "first"))
+    finger_mesh(Design(), settings=COARSE)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PINNRAY_CACHE", "second")
     (tmp_path / "beam.svg").write_text(
         '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="10mm" viewBox="0 0 60 10">'
         '<path d="M 0 0 H 60 V 10 H 0 Z"/></svg>'
     )
-    drawn = drawn_finger(Path("beam.svg"), Description(), cache_dir=Path("cache"))
+    drawn = drawn_finger(Path("beam.svg"), Description())
     assert drawn.section.area == pytest.approx(600)
-    assert finger_mesh(drawn, settings=COARSE, cache_dir=Path("cache")).areas.sum() == pytest.approx(600)
+    assert finger_mesh(drawn, settings=COARSE).areas.sum() == pytest.approx(600)
 
 
 @pytest.mark.parametrize("place", ["/proc/cache", "/dev/null/cache"])
@@ -125,8 +129,9 @@ def test_a_full_cache_is_a_warning_and_the_mesh_is_there(tmp_path: Path, monkeyp
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(TriangleMesh, "save", full)
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path))
     with pytest.warns(RuntimeWarning, match=r"cache folder .* \(No space left on device\), .* is repeated"):
-        mesh = finger_mesh(Design(), settings=COARSE, cache_dir=tmp_path)
+        mesh = finger_mesh(Design(), settings=COARSE)
     assert len(mesh.markers) == 9
 
 

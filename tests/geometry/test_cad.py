@@ -8,16 +8,15 @@ import pytest
 
 from pinnray.geometry import Design, MeshSettings, cad, cad_files, load_design, marker_positions
 from pinnray.geometry.mesh.mesher import build_mesh
-from tests.meshes import body_area, body_perimeter
 
 
 def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> None:
     face = cq.Face.makeFromWires(*cad._wires(design))
     assert face.isValid()
-    assert face.Area() == pytest.approx(body_area(design), rel=1e-9)
+    assert face.Area() == pytest.approx(design.section.area, rel=1e-9)
     assert len(face.innerWires()) == design.rib_count + 1
     perimeter = sum(wire.Length() for wire in [face.outerWire(), *face.innerWires()])
-    assert perimeter == pytest.approx(body_perimeter(design), rel=1e-9)
+    assert perimeter == pytest.approx(sum(loop.lengths.sum() for loop in design.section.loops), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -33,7 +32,7 @@ def test_body_and_markers_together_are_the_extruded_section(design: Design) -> N
     volumes = np.array([part.Volume() for part in parts])
     heights = np.array([part.Center().z for part in parts])
     assert all(part.isValid() for part in parts)
-    assert volumes.sum() == pytest.approx(body_area(design) * design.depth, rel=1e-9)
+    assert volumes.sum() == pytest.approx(design.section.area * design.depth, rel=1e-9)
     assert (volumes * heights).sum() / volumes.sum() == pytest.approx(design.depth / 2, rel=1e-9)
     disc = np.pi / 4 * design.marker_diameter**2 * design.marker_height
     np.testing.assert_allclose(volumes[1:], disc, rtol=1e-9)
@@ -70,9 +69,9 @@ def stl_volume(path: Path) -> float:
 
 
 def test_stl_files_enclose_the_volumes(written: dict[str, Path]) -> None:
-    discs = 9 * np.pi / 4 * 1.6**2 * 0.6
+    discs, body = 9 * np.pi / 4 * 1.6**2 * 0.6, 20 * Design().section.area
     assert stl_volume(written["finger-markers.stl"]) == pytest.approx(discs, rel=0.01)  # facets of circles
-    assert stl_volume(written["finger-body.stl"]) == pytest.approx(body_area(Design()) * 20 - discs, rel=1e-4)
+    assert stl_volume(written["finger-body.stl"]) == pytest.approx(body - discs, rel=1e-4)
 
 
 @pytest.mark.parametrize(

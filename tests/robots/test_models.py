@@ -71,7 +71,9 @@ def test_mujoco_has_the_masses_springs_and_places_of_the_chain(front, chain, spr
     data.qvel[:] = speed = 2 * q
     mujoco.mj_forward(model, data)
     assert chain_front(chain, MM * front)(model, data) == pytest.approx(chain.placed(q, MM * front)[0])
-    assert data.qfrc_spring == pytest.approx(-springs.matrix @ q, rel=1e-6)
+    assert data.qfrc_spring == pytest.approx(
+        -springs.rows.T @ (springs.stiffnesses * (springs.rows @ q)), rel=1e-6
+    )
     # A vibration's damping is its stiffness times the loss factor over its frequency.
     resistance = springs.rows.T @ (0.3 * springs.stiffnesses / springs.frequencies * (springs.rows @ speed))
     assert data.qfrc_damper == pytest.approx(-resistance, rel=1e-6)

@@ -149,7 +149,8 @@ class Camera:
             UserError: If a point lies where the distortion cannot be undone: the polynomial folds there.
         """
         seen = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-        plane, tolerance = self._on_plane(seen), 1e-10
+        plane = (seen - (self.cx, self.cy)) / (self.fx, self.fy)
+        tolerance = 1e-10
         for _ in range(60):
             bent = self.project_with_jacobians(np.column_stack([plane, np.ones(len(plane))]))
             missed, jacobian = bent.pixels - seen, bent.by_point[:, :, :2]
@@ -165,10 +166,6 @@ class Camera:
                 "with boards that reach the corners of the image"
             )
         return np.asarray(plane * (self.fx, self.fy) + (self.cx, self.cy))
-
-    def _on_plane(self, pixels: FloatArray) -> FloatArray:
-        """Points of the plane at depth 1 that a pinhole shows at `pixels`; shapes (n, 2)."""
-        return np.asarray((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
 
 
 def _check_covariance(covariance: FloatArray) -> None:

@@ -1,7 +1,6 @@
 """Camera files: JSON with the keys of OpenCV's calibration sample, readable by `cv2.FileStorage`."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +71,12 @@ def load_camera(path: Path) -> Camera:
     distortion = _matrix(content, "distortion_coefficients", path, sizes=(4, 5))
     coefficients = tuple(np.resize([*distortion, 0.0], 5).tolist())
     fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    size, covariance = len(INTRINSICS), None
     try:
-        camera = Camera(width, height, fx, fy, cx, cy, coefficients)
-        return replace(camera, covariance=_covariance(content, len(INTRINSICS), path))
+        if "intrinsics_covariance" in content:
+            rows = _matrix(content, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
+            covariance = tuple(map(tuple, rows.tolist()))
+        return Camera(width, height, fx, fy, cx, cy, coefficients, covariance)
     except UserError as error:
         raise UserError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
 
@@ -104,14 +106,6 @@ def _entry(rows: Sequence[Sequence[float]]) -> dict[str, object]:
     """A matrix as `cv2.FileStorage` has it."""
     data = [float(value) for row in rows for value in row]
     return {"type_id": "opencv-matrix", "rows": len(rows), "cols": len(rows[0]), "dt": "d", "data": data}
-
-
-def _covariance(content: Mapping[str, Any], size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:
-    """The covariance in the file, or None."""
-    if "intrinsics_covariance" in content:
-        covariance = _matrix(content, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
-        return tuple(map(tuple, covariance.tolist()))
-    return None
 
 
 def _number(content: Mapping[str, Any], name: str, path: Path) -> int:

@@ -7,7 +7,6 @@ to 8 bits: steps of 0.4 in L*, of 1 in a* and b*. A grey image has L* alone.
 import re
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -24,13 +23,6 @@ HALF = 0.45
 """Threshold over the greatest darkness nearby: about at a blurred edge, and darker than a grey wall."""
 CONTRAST = 15.0
 """Least difference in L* of a dark disc from its surroundings."""
-
-
-class Colour(Protocol):
-    """Classifier of the pixels that may belong to a marker."""
-
-    def mask(self, image: Image, radius: float = ...) -> Image:
-        """255 where a pixel may belong to a disc of at most `radius`, pixels; 0 elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +77,8 @@ class Darker:
 
 
 DARK = Darker()
+Colour = ColourRange | Darker
+"""Classifier of the pixels that may belong to a marker."""
 
 
 def read_colour(text: str) -> Colour:

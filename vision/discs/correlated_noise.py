@@ -14,12 +14,7 @@ import numpy as np
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.vision.discs.disc_image_model import EDGE, EDGES, Array, X, Y, disc_image, irregular_columns
 from pinnray.vision.discs.fit_priors import Known, prior_and_limits
-from pinnray.vision.discs.least_squares import (
-    DiscFit,
-    beyond_limits,
-    normal_matrices,
-    robust_weights,
-)
+from pinnray.vision.discs.least_squares import DiscFit, beyond_limits, normal_matrices, robust_weights
 from pinnray.vision.discs.pixel_windows import PixelWindows
 
 NEIGHBOURS = 3

@@ -8,13 +8,7 @@ from pinnray.vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, 
 from pinnray.vision.discs.fit_priors import Known, prior_and_limits
 from pinnray.vision.discs.hough import HoughVotes, sector, vote_for_centres
 from pinnray.vision.discs.irregular_outlines import better_outlines
-from pinnray.vision.discs.least_squares import (
-    NEAR,
-    DiscFit,
-    coherent_pixels,
-    fit_disc_model,
-    refined_fit,
-)
+from pinnray.vision.discs.least_squares import NEAR, DiscFit, coherent_pixels, fit_disc_model, refined_fit
 from pinnray.vision.discs.pixel_windows import QUANTISATION, PixelWindows, median_where
 from pinnray.vision.discs.straight_edges import with_edges
 from pinnray.vision.frames.frame import GreyImage

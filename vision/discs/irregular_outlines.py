@@ -11,31 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.vision.discs import disc_image_model as model
 from pinnray.vision.discs.correlated_noise import correlated_noise
-from pinnray.vision.discs.disc_image_model import (
-    BLUR,
-    CONTRAST,
-    COUNT,
-    HALO,
-    LOBES,
-    OUTLINE,
-    RADIUS,
-    SLANT,
-    STRETCH,
-    Array,
-    X,
-    Y,
-    disc_image,
-    outline,
-    outline_centroid,
-)
+from pinnray.vision.discs.disc_image_model import Array
 from pinnray.vision.discs.fit_priors import MISSING, Known, prior_and_limits
-from pinnray.vision.discs.least_squares import (
-    DiscFit,
-    fit_disc_model,
-    misfit,
-    refined_fit,
-)
+from pinnray.vision.discs.least_squares import DiscFit, fit_disc_model, misfit, refined_fit
 from pinnray.vision.discs.pixel_windows import PixelWindows
 from pinnray.vision.discs.straight_edges import with_edges
 
@@ -91,17 +71,17 @@ def better_outlines(
     if np.isfinite(noise).any():
         noise = np.fmax(noise, np.nanmedian(noise, axis=0))
     parameters = outlines.parameters.copy()
-    parameters[:, [X, Y]] += outline_centroid(parameters)
-    columns = [*range(COUNT), *range(COUNT + OUTLINE, parameters.shape[1])]
+    parameters[:, [model.X, model.Y]] += model.outline_centroid(parameters)
+    columns = [*range(model.COUNT), *range(model.COUNT + model.OUTLINE, parameters.shape[1])]
     return better, replace(outlines, parameters=parameters[:, columns]), noise
 
 
 def _whole(window: PixelWindows, outlines: DiscFit, radii: FloatArray, tolerance: float) -> BoolArray:
     """Whether outlines may be those of printed dots that nothing hides, shape (n,)."""
-    excursion = np.abs(outline(outlines.parameters) - 1).max(axis=1)
+    excursion = np.abs(model.outline(outlines.parameters) - 1).max(axis=1)
     rough = np.sqrt(np.maximum(outlines.variance - window.noise**2, 0))
-    likely = (excursion < EXCURSION) & (rough < ROUGH * np.abs(outlines.parameters[:, CONTRAST]))
-    likely &= np.abs(outlines.parameters[:, RADIUS] / radii - 1) < OTHER_SIZE * tolerance
+    likely = (excursion < EXCURSION) & (rough < ROUGH * np.abs(outlines.parameters[:, model.CONTRAST]))
+    likely &= np.abs(outlines.parameters[:, model.RADIUS] / radii - 1) < OTHER_SIZE * tolerance
     return np.asarray(outlines.settled & (outlines.seen > LEAST_SEEN) & likely)
 
 
@@ -112,16 +92,16 @@ def _outlined(
 
     A lenient fit takes the residuals for noise, however large they are, so that it leaves out few pixels.
     """
-    start = start[:, :COUNT].copy()
-    start[:, [STRETCH, SLANT]] = 0
-    start[:, RADIUS] = radii
-    start = np.concatenate([start, np.zeros((len(start), OUTLINE))], axis=1)
+    start = start[:, : model.COUNT].copy()
+    start[:, [model.STRETCH, model.SLANT]] = 0
+    start[:, model.RADIUS] = radii
+    start = np.concatenate([start, np.zeros((len(start), model.OUTLINE))], axis=1)
     for _ in range(2):
         start = _by_moments(window, start)
     start, present = with_edges(window, start, window.within)
     prior, limits = prior_and_limits(start, present, radii, known)
     plain = prior._replace(precision=prior.precision.copy())
-    plain.precision[:, HALO] = MISSING**-2.0  # a halo is sought after the outline
+    plain.precision[:, model.HALO] = MISSING**-2.0  # a halo is sought after the outline
     if lenient:
         return fit_disc_model(window, start, plain, limits, window.within, lenient=True)
     priors = [plain, *[prior] * (REFINEMENTS - 1)]
@@ -130,23 +110,23 @@ def _outlined(
 
 def _by_moments(window: PixelWindows, start: FloatArray) -> FloatArray:
     """Improve discs by the moments of the residuals near their edges, which are shares of darkness astray."""
-    levels, _ = disc_image(start.astype(np.float32), window.x, window.y)
-    x, y, radius = start[:, [X, Y, RADIUS]].T
-    near = np.abs(window.outside(start)) < EXCURSION * radius[:, None] + 2 * start[:, [BLUR]]
-    contrast = np.copysign(np.maximum(np.abs(start[:, CONTRAST]), 1.0), start[:, CONTRAST])
+    levels, _ = model.disc_image(start.astype(np.float32), window.x, window.y)
+    x, y, radius = start[:, [model.X, model.Y, model.RADIUS]].T
+    near = np.abs(window.outside(start)) < EXCURSION * radius[:, None] + 2 * start[:, [model.BLUR]]
+    contrast = np.copysign(np.maximum(np.abs(start[:, model.CONTRAST]), 1.0), start[:, model.CONTRAST])
     astray = np.clip((levels - window.values) / contrast[:, None], -1, 1) * (near & window.within)
     arms = (window.x - x[:, None] + 1j * (window.y - y[:, None])).astype(np.complex64)
     arms /= np.maximum(np.abs(arms), 1e-6)
     turned, sums = astray.astype(np.complex64), []
-    for _ in range(LOBES.stop):
+    for _ in range(model.LOBES.stop):
         sums.append(turned.sum(axis=1))
         turned *= arms
     waves = np.stack(sums, axis=1)
     even, odd = waves.real, waves.imag
     moved = start.copy()
-    moved[:, X] += even[:, 1] / (np.pi * radius)
-    moved[:, Y] += odd[:, 1] / (np.pi * radius)
-    moved[:, RADIUS] += even[:, 0] / (2 * np.pi * radius)
-    moved[:, COUNT:HALO:2] += even[:, LOBES] / (np.pi * radius[:, None] ** 2)
-    moved[:, COUNT + 1 : HALO : 2] += odd[:, LOBES] / (np.pi * radius[:, None] ** 2)
+    moved[:, model.X] += even[:, 1] / (np.pi * radius)
+    moved[:, model.Y] += odd[:, 1] / (np.pi * radius)
+    moved[:, model.RADIUS] += even[:, 0] / (2 * np.pi * radius)
+    moved[:, model.COUNT : model.HALO : 2] += even[:, model.LOBES] / (np.pi * radius[:, None] ** 2)
+    moved[:, model.COUNT + 1 : model.HALO : 2] += odd[:, model.LOBES] / (np.pi * radius[:, None] ** 2)
     return moved

@@ -15,19 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
-from pinnray.vision.discs.disc_image_model import (
-    BLUR,
-    CONTRAST,
-    EDGE,
-    RADIUS,
-    SHADE_X,
-    SHADE_Y,
-    Array,
-    X,
-    Y,
-    disc_image,
-    irregular_columns,
-)
+from pinnray.vision.discs import disc_image_model as model
+from pinnray.vision.discs.disc_image_model import Array
 from pinnray.vision.discs.pixel_windows import (
     DARKEST,
     LIGHTEST,
@@ -142,13 +131,13 @@ def fit_disc_model(
     information = np.tile(np.eye(width), (count, 1, 1))
     all_residuals = np.empty_like(window.values)
     active = np.arange(count)
-    bends = list(range(irregular_columns(width)[1] + EDGE - 1, width, EDGE))
+    bends = list(range(model.irregular_columns(width)[1] + model.EDGE - 1, width, model.EDGE))
     for number in range(STEPS):
         now, allowed, values = result.parameters[active], chosen[active], window.values[active]
-        levels, derivatives = disc_image(now.astype(np.float32), window.x, window.y)
+        levels, derivatives = model.disc_image(now.astype(np.float32), window.x, window.y)
         beyond = beyond_limits(values, levels)
         counted, residuals = allowed & ~beyond, np.where(beyond, 0, values - levels)
-        most = np.maximum(2 * window.noise[active], MODEL_ERROR * np.abs(now[:, CONTRAST]))
+        most = np.maximum(2 * window.noise[active], MODEL_ERROR * np.abs(now[:, model.CONTRAST]))
         if lenient or number < LENIENT:
             most = most + 1e3
         noise = np.minimum(SCALE * median_where(np.abs(residuals), counted), most)
@@ -164,20 +153,21 @@ def fit_disc_model(
         step = np.linalg.solve(normal, gradient[:, :, None])[:, :, 0]
         shortened = np.minimum(1, (limits[active] / np.maximum(np.abs(step), 1e-12)).min(axis=1))
         now = now + shortened[:, None] * step
-        now[:, RADIUS] = np.maximum(now[:, RADIUS], 1.0)
-        now[:, BLUR] = np.clip(now[:, BLUR], SHARPEST, now[:, RADIUS])
-        most_bent = MOST_BENT / now[:, [RADIUS]]
+        now[:, model.RADIUS] = np.maximum(now[:, model.RADIUS], 1.0)
+        now[:, model.BLUR] = np.clip(now[:, model.BLUR], SHARPEST, now[:, model.RADIUS])
+        most_bent = MOST_BENT / now[:, [model.RADIUS]]
         now[:, bends] = np.clip(now[:, bends], -most_bent, most_bent)
         steady = variance > STEADY * result.variance[active]
         result.parameters[active], information[active], result.variance[active] = now, normal, variance
         all_residuals[active] = residuals
-        by_radius = derivatives[:, RADIUS] ** 2
+        by_radius = derivatives[:, model.RADIUS] ** 2
         result.seen[active] = (by_radius * agreement).sum(axis=1) / np.maximum(by_radius.sum(axis=1), 1e-6)
-        result.settled[active] = (np.hypot(step[:, X], step[:, Y]) < TOLERANCE) & (number >= LENIENT) & steady
+        still = np.hypot(step[:, model.X], step[:, model.Y]) < TOLERANCE
+        result.settled[active] = still & (number >= LENIENT) & steady
         active = active[~result.settled[active]]
         if not len(active):
             break
-    covariances, shades = np.linalg.inv(information), [SHADE_X, SHADE_Y]
+    covariances, shades = np.linalg.inv(information), [model.SHADE_X, model.SHADE_Y]
     result.covariances[:] = covariances[:, :2, :2]
     variances = np.maximum(covariances[:, shades, shades], 1e-12)
     result.shade_precision[:] = np.maximum(1 / variances - prior.precision[:, shades], 0)
@@ -234,11 +224,7 @@ def refined_fit(
             break
         used, before = chosen, prior
         part, left = fit_disc_model(
-            window.at(moving),
-            result.parameters[moving],
-            prior.at(moving),
-            limits[moving],
-            chosen[moving],
+            window.at(moving), result.parameters[moving], prior.at(moving), limits[moving], chosen[moving]
         )
         result.put(moving, part)
         residuals[moving] = left
@@ -250,7 +236,7 @@ def coherent_pixels(window: PixelWindows, fitted: DiscFit, residuals: Array) -> 
 
     Means of nine residuals show occlusions and neighbours that are hidden by the noise of single pixels.
     """
-    tolerated = MODEL_ERROR / 2 * fitted.parameters[:, CONTRAST]
+    tolerated = MODEL_ERROR / 2 * fitted.parameters[:, model.CONTRAST]
     most = COHERENT * np.maximum(fitted.variance, tolerated**2) ** 0.5
     wrong = np.abs(window.smoothed(residuals * window.within, 3)) > most[:, None]
     near = window.smoothed(wrong.astype(np.float32), 3) > 0
@@ -262,6 +248,6 @@ def misfit(window: PixelWindows, parameters: FloatArray, variance: FloatArray) -
 
     Source: P. H. S. Torr, A. Zisserman, "MLESAC", Computer Vision and Image Understanding 78, 2000.
     """
-    levels, _ = disc_image(parameters.astype(np.float32), window.x, window.y)
+    levels, _ = model.disc_image(parameters.astype(np.float32), window.x, window.y)
     squares = (window.values - np.clip(levels, 0, 255)) ** 2 / np.maximum(variance, QUANTISATION)[:, None]
     return np.asarray((np.minimum(squares, NONE**2) * window.within).sum(axis=1) / 2, dtype=np.float64)

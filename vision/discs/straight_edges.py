@@ -11,15 +11,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.vision.discs.disc_image_model import (
-    BLUR,
-    EDGE,
-    EDGES,
-    LIGHT,
-    RADIUS,
-    Array,
-    disc_image,
-)
+from pinnray.vision.discs.disc_image_model import BLUR, EDGE, EDGES, LIGHT, RADIUS, Array, disc_image
 from pinnray.vision.discs.pixel_windows import LIGHTEST, QUANTISATION, PixelWindows
 
 ANGLES, OFFSETS = 24, np.arange(0.75, 4.0, 0.5)

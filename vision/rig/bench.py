@@ -9,8 +9,7 @@ import numpy as np
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.arrays import FloatArray, IntArray
-from pinnray.runtime.errors import ShapeError
+from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.rig.shapes import Paint, Scene, Shape, blot, circle, closed, rectangle
 from pinnray.vision.tracking.workspace import Workspace
 
@@ -55,7 +54,7 @@ class Bench:
 
     def markers(self, displacement: FloatArray) -> FloatArray:
         """Centres of the markers, shape (m, 3), mm, for nodal displacements, shape (n, 2), mm."""
-        points = self.mesh.markers + _checked(displacement, self.mesh)[self.mesh.marker_nodes]
+        points = self.mesh.markers + displacement[self.mesh.marker_nodes]
         return np.column_stack([points, np.full(len(points), self.workspace.marker_plane)])
 
     def discs(self, displacement: FloatArray) -> list[Shape]:
@@ -65,7 +64,7 @@ class Bench:
 
     def scene(self, displacement: FloatArray, occluders: Sequence[Shape] = ()) -> Scene:
         """The scene for nodal displacements, shape (n, 2), mm, with occluders in front."""
-        moved = self.mesh.points + _checked(displacement, self.mesh)
+        moved = self.mesh.points + displacement
         plane = self.workspace.marker_plane
         fiducials = [circle(point, self.workspace.fiducial_diameter / 2) for point in self.workspace.points]
         return Scene(
@@ -74,7 +73,7 @@ class Bench:
                 *(Shape(closed(border), PAINTS["dark"]) for border in fiducials),
                 *(Shape(block, CLAMP, plane) for block in self._clamps),
                 Shape(self._indenter(moved), INDENTER, plane),
-                Shape(moved[self._border], FINGER, plane),
+                Shape(moved[self.mesh.boundary_edges], FINGER, plane),
                 *self.discs(displacement),
                 *occluders,
             ],
@@ -106,10 +105,6 @@ class Bench:
         return blocks
 
     @cached_property
-    def _border(self) -> IntArray:
-        return self.mesh.boundary_edges
-
-    @cached_property
     def _marker_borders(self) -> LocatedPoints:
         radius = self.finger.marker_radius
         borders = [
@@ -120,7 +115,7 @@ class Bench:
 
     def _moved(self, where: LocatedPoints, displacement: FloatArray) -> FloatArray:
         """Points of the body after nodal displacements, shape (n, 2), mm."""
-        corners = _checked(displacement, self.mesh)[self.mesh.triangles[where.cells]]
+        corners = displacement[self.mesh.triangles[where.cells]]
         return np.asarray(where.points + np.einsum("nc,ncx->nx", where.barycentric, corners))
 
 
@@ -129,9 +124,3 @@ def _frame(edges: FloatArray) -> FloatArray:
     along = (edges[:, 0] - edges[:, 1]).sum(axis=0)
     along = along / np.linalg.norm(along)
     return np.stack([along, along[::-1] * (-1, 1)])
-
-
-def _checked(displacement: FloatArray, mesh: TriangleMesh) -> FloatArray:
-    if displacement.shape != mesh.points.shape:
-        raise ShapeError(f"displacement must have shape {mesh.points.shape}, got {displacement.shape}")
-    return displacement

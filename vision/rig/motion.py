@@ -33,17 +33,6 @@ class Motion(CheckedModel):
         """Number of frames."""
         return self.rest + self.moving + self.held
 
-    @property
-    def parts(self) -> dict[str, range]:
-        """The frames of every part of the recording."""
-        pressed, end = self.rest + self.moving, len(self)
-        return {
-            "all": range(end),
-            "rest": range(self.rest),
-            "moving": range(self.rest, pressed),
-            "held": range(pressed, end),
-        }
-
     def load(self, time: ArrayLike) -> FloatArray:
         """Share of the load that acts at times, both of shape (n,); the frames start at 0, 1, 2, ..."""
         start = self.rest - 1 + self.shutter
@@ -69,11 +58,6 @@ class Course:
 
     shares: FloatArray
     displacements: FloatArray
-
-    @classmethod
-    def proportional(cls, displacement: FloatArray) -> "Course":
-        """Displacements that grow in proportion to the load to those of shape (n, 2), mm."""
-        return cls(np.array([0.0, 1.0]), np.stack([np.zeros_like(displacement), displacement]))
 
     def at(self, share: float) -> FloatArray:
         """Displacements at a share of the load, shape (n, 2), mm."""

@@ -92,13 +92,10 @@ def _placed(label: TDF_Label, around: gp_Trsf, within: tuple[str, ...]) -> Itera
     own = [(XCAFDoc_ShapeTool.GetShape_s(each), _name(each)) for each in inner]
     for solid in cq.Shape.cast(shape).Solids():
         called = tuple(name for each, name in own if each.IsSame(solid.wrapped))
-        for moved in _moved(solid, place).Solids():
+        # a copy, which may be mirrored or scaled
+        copy = BRepBuilderAPI_Transform(solid.wrapped, place, True).Shape()
+        for moved in cq.Shape.cast(copy).Solids():
             yield Part(moved, (*called, *names, *within))
-
-
-def _moved(solid: cq.Solid, place: gp_Trsf) -> cq.Shape:
-    """A solid moved; the copy may be mirrored or scaled."""
-    return cq.Shape.cast(BRepBuilderAPI_Transform(solid.wrapped, place, True).Shape())
 
 
 def _name(label: TDF_Label) -> str:

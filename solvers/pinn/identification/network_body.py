@@ -81,7 +81,7 @@ class NetworkBody:
             scale: Of the spacings.
         """
         energy = solver.level(problem, scale).energy
-        return cls(energy, motion.gradients()[:, problem.mesh.locate(energy.places).cells])
+        return cls(energy, motion.gradients[:, problem.mesh.locate(energy.places).cells])
 
     @property
     def shape(self) -> tuple[int, ...]:

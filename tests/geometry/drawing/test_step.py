@@ -10,7 +10,6 @@ from pinnray.geometry import UserError
 from pinnray.geometry.cache import drawn_finger
 from pinnray.geometry.drawing.checks import body
 from pinnray.geometry.drawing.description import Description
-from pinnray.geometry.drawing.formats import step_parts
 from pinnray.geometry.drawing.formats.planes import plane_of, plane_text
 from pinnray.geometry.drawing.load import finger_from_file, read_drawing
 from tests.geometry.drawing.files import FINRAY
@@ -84,17 +83,6 @@ def test_a_whole_that_is_turned_and_mirrored(tmp_path):
     corners = drawing.loops[0].points.round(9).tolist()
     assert [56, -1] in corners
     assert [-4, -17] in corners
-
-
-def test_a_placement_that_mirrors_or_scales_moves_the_solid():
-    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf
-
-    mirror, scale = gp_Trsf(), gp_Trsf()
-    mirror.SetMirror(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(1, 0, 0)))
-    scale.SetScale(gp_Pnt(0, 0, 0), 2)
-    moved = [step_parts._moved(BODY, place) for place in (mirror, scale)]
-    assert [shape.BoundingBox().xmin for shape in moved] == pytest.approx([-60, 0], abs=1e-6)
-    assert [shape.Volume() for shape in moved] == pytest.approx([14400, 8 * 14400])
 
 
 def test_the_clamp_is_in_the_coordinates_of_the_assembly(tmp_path):
@@ -293,7 +281,7 @@ def test_a_damaged_file_is_refused_by_the_worker(tmp_path):
     path = tmp_path / "cut.stp"
     path.write_bytes((FINRAY / "Finray_8.stp").read_bytes()[:3000])
     with pytest.raises(UserError, match="it is damaged or cut off"):
-        drawn_finger(path, Description(), cache_dir=tmp_path / "cache")
+        drawn_finger(path, Description())
 
 
 def test_no_other_file_is_read(tmp_path, monkeypatch):

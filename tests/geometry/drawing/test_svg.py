@@ -41,19 +41,6 @@ def test_what_svg_does_not_draw_is_left_out(tmp_path, undrawn):
     assert area(write_svg(tmp_path / "a.svg", BODY + undrawn)) == pytest.approx(600)
 
 
-@pytest.mark.parametrize(
-    ("drawn", "bounds"),
-    [
-        (f'<mask>{HOLE}</mask><use href="#hole" x="5" y="1"/>', (25, 4, 35, 8)),
-    ],
-)
-def test_copies_are_where_they_are_used(tmp_path, drawn, bounds):
-    path = write_svg(tmp_path / "a.svg", f'<rect width="100" height="60"/>{drawn}')
-    _, hole = sorted(read_drawing(path).loops, key=lambda loop: -abs(loop.area))
-    left, top, right, bottom = bounds
-    assert hole.bounds == pytest.approx(np.array([[left, -bottom], [right, -top]]))
-
-
 def test_a_copy_is_copied_again(tmp_path):
     copies = '<g id="s"><rect x="2" y="2" width="3" height="3"/></g>'
     copies += '<g id="t"><use href="#s" x="10"/></g><use href="#t" y="1"/>'

@@ -7,8 +7,7 @@ import pytest
 from shapely.geometry import LineString, Point, Polygon
 
 from pinnray.geometry import Design, finger_section, marker_positions
-from pinnray.geometry.finger.section import cells, rib_axes, ribs
-from tests.meshes import body_area, body_perimeter, polygon_area
+from pinnray.geometry.finger.section import cells, rib_axes, rib_feet
 
 THICKNESS = {"front": "front_thickness", "back": "back_thickness", "base": "base_thickness"}
 
@@ -28,17 +27,15 @@ def as_shapely(design: Design) -> Polygon:
 def test_area_and_perimeter_agree_with_shapely(design: Design) -> None:
     section, body = finger_section(design), as_shapely(design)
     assert section.area == pytest.approx(body.area, rel=1e-7)
-    assert section.area == pytest.approx(body_area(design), rel=1e-12)
     perimeter = sum(loop.lengths.sum() for loop in section.loops)
     assert perimeter == pytest.approx(body.length, rel=1e-7)
-    assert perimeter == pytest.approx(body_perimeter(design), rel=1e-12)
 
 
 def test_section_has_one_cell_more_than_ribs_and_none_touches_another(design: Design) -> None:
     found = [Polygon(corners) for corners in cells(design)]
-    assert len(found) == len(ribs(design)) + 1 == design.rib_count + 1
+    assert len(found) == design.rib_count + 1
     outer = Polygon(design.section.outline.points)
-    assert all(cell.is_valid and polygon_area(np.array(cell.exterior.coords[:-1])) > 0 for cell in found)
+    assert all(cell.is_valid and cell.exterior.is_ccw for cell in found)
     assert all(outer.contains(cell) for cell in found)
     assert all(first.distance(second) > 0 for first, second in pairwise(found))
 
@@ -77,8 +74,7 @@ def test_ribs_slope_by_their_angle(angle: float, leans: int) -> None:
 
 
 def test_ribs_are_evenly_spaced_along_the_front_wall() -> None:
-    feet = [corners[[0, 3], 0].mean() for corners in ribs(Design())]
-    np.testing.assert_allclose(feet, 2 + 68 / 5 * np.arange(1, 5), rtol=1e-14)
+    np.testing.assert_allclose(rib_feet(Design()), 2 + 68 / 5 * np.arange(1, 5), rtol=1e-14)
 
 
 def test_front_markers_are_evenly_spaced_on_the_centre_line() -> None:

@@ -9,27 +9,12 @@ from pinnray.geometry import Design, MeshSettings, TriangleMesh, UserError, elem
 from pinnray.geometry import marker_positions as positions_of
 from pinnray.geometry.mesh.boundary import boundary_loops
 from pinnray.geometry.mesh.mesher import build_mesh
-from tests.meshes import body_area, boundary_lengths
 
 
 def test_area_is_that_of_the_section(design: Design, mesh: TriangleMesh) -> None:
     # Chords cut a little off the rounded corners of the cavities; straight edges leave nothing out.
     tolerance = 2e-3 if design.fillet_radius else 1e-12
-    assert mesh.areas.sum() == pytest.approx(body_area(design), rel=tolerance)
-
-
-def test_named_boundaries_have_their_lengths(design: Design, mesh: TriangleMesh) -> None:
-    assert {name: mesh.boundary_length(name) for name in mesh.boundaries} == pytest.approx(
-        boundary_lengths(design), rel=1e-12
-    )
-
-
-def test_named_boundaries_lie_on_their_lines(design: Design, mesh: TriangleMesh) -> None:
-    x, y = mesh.points.T
-    assert (x[mesh.boundary("base")] == 0).all()
-    assert (y[mesh.boundary("front")] == 0).all()
-    back = mesh.boundary("back")
-    np.testing.assert_allclose(y[back], design.base_width * (x[back] / design.height - 1), atol=1e-9)
+    assert mesh.areas.sum() == pytest.approx(design.section.area, rel=tolerance)
 
 
 def test_outline_is_base_front_and_back(mesh: TriangleMesh) -> None:
@@ -155,7 +140,7 @@ def random_design(seed: int) -> Design:
 def test_random_admissible_design_meshes(seed: int) -> None:
     design = random_design(seed)
     mesh = build_mesh(design, MeshSettings(size=2, coarsening=2))
-    assert mesh.areas.sum() == pytest.approx(body_area(design), rel=5e-3 if design.fillet_radius else 1e-11)
+    assert mesh.areas.sum() == pytest.approx(design.section.area, rel=5e-3 if design.fillet_radius else 1e-11)
     assert len(boundary_loops(mesh)) == design.rib_count + 2
     assert elements_through_thickness(mesh) >= 3
     assert mesh.boundary_length("contact") == pytest.approx(design.contact_width)

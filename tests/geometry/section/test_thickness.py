@@ -5,7 +5,7 @@ import pytest
 
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
-from pinnray.geometry.section.thickness import _samples, cavity_widths, through, wall_thickness
+from pinnray.geometry.section.thickness import cavity_widths, through, wall_thickness
 
 
 def disc(radius: float, pieces: int = 2) -> Loop:
@@ -62,12 +62,6 @@ def test_slot_in_the_outline_leaves_a_thin_wall_to_the_same_curve():
 def test_ray_from_inside_ends_on_the_arc():
     crossing = through(Section(disc(2)), [[0.5, 0.0]], [[0.6, 0.8]])
     assert crossing.lengths == pytest.approx(-0.3 + np.sqrt(0.09 + 3.75))
-
-
-def test_samples_lie_on_their_piece_and_look_into_the_body():
-    ring = Section(disc(10, 3), (rectangle(-2, -2, 3, 3).reversed(),))
-    points, normals, _ = _samples(ring.loops, 0.7)
-    assert ring.clearance(points + 0.01 * normals) == pytest.approx(0.01, rel=2e-3)
 
 
 def test_the_width_of_a_cavity_is_that_of_its_own_walls():

@@ -30,12 +30,11 @@ sys.exit(main(["--version"]))
 
 WHILE_MESHING = """
 import sys
-from pathlib import Path
 from pinnray.cli import main
 from pinnray.geometry import Design, MeshSettings, finger_mesh
 
 def command():
-    finger_mesh(Design(), settings=MeshSettings(size=0.02), cache_dir=Path(sys.argv[1]))  # minutes
+    finger_mesh(Design(), settings=MeshSettings(size=0.02))  # minutes
 
 import pinnray.commands.launch as launch
 launch.guarded, guarded = lambda _: guarded(command), launch.guarded
@@ -88,9 +87,13 @@ def until(condition: Callable[[], object]) -> None:
 
 
 @pytest.fixture
-def meshing(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], int, Path]]:
+def meshing(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[subprocess.Popen[str], int, Path]]:
     """A command whose worker is meshing, its worker's number, and the folder for temporary files."""
-    command = started(WHILE_MESHING, str(tmp_path / "cache"), TMPDIR=str(tmp_path))
+    command = started(
+        WHILE_MESHING, PINNRAY_CACHE=str(tmp_path_factory.mktemp("cache")), TMPDIR=str(tmp_path)
+    )
     until(lambda: workers(command.pid))
     (worker,) = workers(command.pid)
     until(lambda: "libgmsh" in Path(f"/proc/{worker}/maps").read_text())

@@ -268,8 +268,7 @@ def test_errors_are_those_in_the_picture_whose_frame_was_found(task, truth, obse
 def test_the_stress_is_that_of_the_material_that_a_solver_has_found(task, truth, monkeypatch):
     softer = replace(truth.problem, material=Material(young=5.7))
     monkeypatch.setattr(
-        "pinnray.studies.crossval.fold_runner.refitter",
-        lambda *_: lambda _: replace(truth, problem=softer),
+        "pinnray.studies.crossval.fold_runner.refitter", lambda *_: lambda _: replace(truth, problem=softer)
     )
     halved = judged(task)[0]
     monkeypatch.setattr("pinnray.studies.crossval.fold_runner.refitter", lambda *_: lambda _: truth)

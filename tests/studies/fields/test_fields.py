@@ -1,5 +1,6 @@
 """Emulated fields against fields in closed form, and kept fields against a solution on its own mesh."""
 
+import json
 import pickle
 from dataclasses import replace
 
@@ -17,7 +18,7 @@ from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.studies.fields.emulator import FieldEmulator, fitted_fields, places
 from pinnray.studies.fields.reader import FieldReader
 from pinnray.studies.fields.store import fields_of
-from pinnray.studies.sweep.field_path import FieldPath, MovedMesh
+from pinnray.studies.sweep.field_path import FieldPath, moving_mesh
 from pinnray.studies.sweep.job import StudyJob
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.study import Study
@@ -112,7 +113,7 @@ def test_an_emulator_is_kept_for_what_it_was_fitted_to(what, emulator, tmp_path,
 @pytest.mark.slow
 def test_the_reader_reads_what_the_figures_of_a_solution_say():
     finger = load_design("default")
-    meshes = MovedMesh(finger, MeshSettings(size=5.0))
+    meshes = moving_mesh(json.dumps(finger.definition()), MeshSettings(size=5.0))
     load = Load("cylinder", stroke=4.0, radius=8.0, position=40.0)
     problem = Problem(meshes.mesh, Material(law="neo-hookean"), load, finger=finger)
     solution = FemNonlinearSolver().solve(problem)
@@ -145,7 +146,7 @@ def test_a_sweep_keeps_the_path_of_each_sample_on_the_moved_mesh(tmp_path, in_li
     path = FieldPath.load(task.fields.file)
     finger = Design(**task.definition)
     middle = load_design("default").replaced(front_thickness=2.0, contact_position=45.0)
-    mesh = MovedMesh(middle, MeshSettings(size=5.0)).of(finger)
+    mesh = moving_mesh(json.dumps(middle.definition()), MeshSettings(size=5.0)).of(finger)
     for number, stroke in enumerate((1.5, 3.0)):
         load = Load("cylinder", stroke=stroke, radius=5.0, position=finger.contact_abscissa)
         solution = FemNonlinearSolver().solve(Problem(mesh, Material(law="neo-hookean"), load, finger=finger))

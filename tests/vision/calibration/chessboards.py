@@ -55,13 +55,7 @@ def views(count: int, *, noise: float, seed: int = 0) -> dict[str, FloatArray]:
     }
 
 
-def drawn(
-    board: Board,
-    homography: FloatArray,
-    size: tuple[int, int],
-    *,
-    samples: int = 5,
-) -> GreyImage:
+def drawn(board: Board, homography: FloatArray, size: tuple[int, int], *, samples: int = 5) -> GreyImage:
     """A photograph without a lens: every pixel is the mean of `samples`² points of the exact scene.
 
     `homography` takes pixels to the board's plane, mm; outside the board all is white.

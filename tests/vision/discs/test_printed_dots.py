@@ -7,18 +7,8 @@ import pytest
 
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
+from pinnray.vision.discs import disc_image_model as model
 from pinnray.vision.discs.disc_fit import FittedDiscs, fit_discs
-from pinnray.vision.discs.disc_image_model import (
-    BLUR,
-    CONTRAST,
-    COUNT,
-    EDGE,
-    HALO,
-    LIGHT,
-    OUTLINE,
-    RADIUS,
-    disc_image,
-)
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.shapes import area, blot, centroid, closed
@@ -105,22 +95,23 @@ def test_the_intervals_of_dots_hold(radius, changes):
 
 def test_derivatives_of_an_irregular_disc_are_differences():
     rng = np.random.default_rng(0)
-    start = np.zeros((1, COUNT + OUTLINE + EDGE))
-    start[:, [RADIUS, BLUR, LIGHT, CONTRAST, HALO]] = 8.0, 1.0, 180.0, 120.0, 0.4
-    start[:, COUNT:HALO] = 0.002 * rng.standard_normal(HALO - COUNT)
-    start[:, COUNT + OUTLINE :] = 0.4, 9.0, 60.0, 0.005
+    start = np.zeros((1, model.COUNT + model.OUTLINE + model.EDGE))
+    own = [model.RADIUS, model.BLUR, model.LIGHT, model.CONTRAST, model.HALO]
+    start[:, own] = 8.0, 1.0, 180.0, 120.0, 0.4
+    start[:, model.COUNT : model.HALO] = 0.002 * rng.standard_normal(model.HALO - model.COUNT)
+    start[:, model.COUNT + model.OUTLINE :] = 0.4, 9.0, 60.0, 0.005
     line = np.arange(-12, 13, dtype=np.float32)
     x, y = (part.ravel() for part in np.meshgrid(line, line))
     away = np.hypot(x, y) > 3  # the waves have no direction in the middle
-    _, derivatives = disc_image(start.astype(np.float32), x, y)
-    columns = [0, 1, RADIUS, COUNT, COUNT + 5, HALO - 1, HALO]
-    for column in (*columns, *range(COUNT + OUTLINE, start.shape[1])):
-        step = 1e-2 if column in (0, 1, RADIUS) else 1e-3
+    _, derivatives = model.disc_image(start.astype(np.float32), x, y)
+    columns = [0, 1, model.RADIUS, model.COUNT, model.COUNT + 5, model.HALO - 1, model.HALO]
+    for column in (*columns, *range(model.COUNT + model.OUTLINE, start.shape[1])):
+        step = 1e-2 if column in (0, 1, model.RADIUS) else 1e-3
         ends = []
         for sign in (1, -1):
             moved = start.copy()
             moved[0, column] += sign * step
-            ends.append(disc_image(moved.astype(np.float32), x, y)[0][0])
+            ends.append(model.disc_image(moved.astype(np.float32), x, y)[0][0])
         slope = (ends[0] - ends[1]) / (2 * step)
         scale = np.abs(slope[away]).max()
         # Without the change of the edge's slope, of second order in the heights of the waves.

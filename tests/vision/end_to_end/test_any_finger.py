@@ -104,17 +104,6 @@ def test_nothing_lies_on_a_fiducial_and_all_are_in_the_picture(name: str) -> Non
     assert all(abs(area(shape.edges)) > 0 for shape in shapes)
 
 
-def test_the_blade_stands_on_a_curved_front_along_its_normal() -> None:
-    finger = ring().at_contact(32.0)  # where the ring slopes
-    mesh = build_mesh(finger, MeshSettings(size=2.0))
-    bench = Bench(mesh, finger, default_workspace(finger))
-    blade = bench._indenter(mesh.points)[:, 0]
-    centre, foot = np.array([15.0, -30.0]), finger.section.front_point(32.0)
-    normal = (foot - centre) / 30.0
-    farthest = blade[((blade - foot) @ normal).argsort()[-2:]].mean(axis=0) - foot
-    np.testing.assert_allclose(farthest / np.linalg.norm(farthest), normal, atol=0.01)
-
-
 def test_markers_on_both_sides_of_a_ring_keep_their_names_though_they_are_equally_far_from_the_base() -> None:
     finger = ring()
     points = finger.markers

@@ -6,16 +6,7 @@ import pytest
 
 from pinnray.vision.tracking.scene import FilmedScene
 from pinnray.vision.tracking.tracker import track
-from tests.vision.films import (
-    CAMERA,
-    DESIGN,
-    WORKSPACE,
-    bent,
-    error_of,
-    frames_of,
-    images,
-    tracked,
-)
+from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, error_of, frames_of, images, tracked
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("discs_fitted_once")]
 

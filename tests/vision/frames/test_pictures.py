@@ -56,10 +56,7 @@ def test_pictures_in_grey_and_in_colour(suffix, tmp_path):
     assert levels(tmp_path) == pytest.approx([70, 90], abs=1)
 
 
-@pytest.mark.parametrize(
-    ("white", "bits"),
-    [(300, 10), (3000, 12), (16383, 14), (65535, 16)],
-)
+@pytest.mark.parametrize(("white", "bits"), [(300, 10), (3000, 12), (16383, 14), (65535, 16)])
 def test_16_bits_become_8_by_one_scale(white, bits, tmp_path):
     (tmp_path / "1.png").write_bytes(encoded(white, dtype=np.uint16))
     (tmp_path / "2.tif").write_bytes(encoded(white // 3, ".tif", dtype=np.uint16))

@@ -48,12 +48,6 @@ def test_edges_may_come_in_any_order_and_the_body_on_either_side():
     np.testing.assert_allclose(on_grid(edges[:, ::-1]), on_grid(edges), atol=1e-12)
 
 
-def test_a_rectangle_covers_its_area_in_closed_form():
-    x = np.clip(9.75 - np.arange(14), 0, 1) - np.clip(2.25 - np.arange(14), 0, 1)
-    y = np.clip(20 - np.arange(11), 0, 1) - np.clip(1.5 - np.arange(11), 0, 1)
-    np.testing.assert_allclose(on_grid(rectangle((2.25, 1.5), (9.75, 20))), np.outer(y, x), atol=1e-14)
-
-
 @pytest.mark.parametrize("radius", [0.4, 7.6, 19])
 def test_a_circle_keeps_its_area(radius):
     centre = np.array([25.31, 24.68])

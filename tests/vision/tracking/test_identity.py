@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from pinnray.vision.tracking.data_association import (
-    associate_markers,
-    rest_covariances,
-    step_covariances,
-)
+from pinnray.vision.tracking.data_association import associate_markers, rest_covariances, step_covariances
 from tests.vision.fingers import MARKERS, pressed
 
 FRONT = MARKERS["front"]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pinnray.vision.tracking.rest_detection import STILL, RestIntervals, _noise, _resting, find_rest_intervals
+from pinnray.vision.tracking.rest_detection import RestIntervals, find_rest_intervals
 from tests.vision.fingers import MARKERS, PRESSED
 
 WHOLE = np.array(PRESSED["front"])[0]
@@ -44,29 +44,6 @@ def test_one_stray_frame_is_no_motion():
     positions = film(RAMP, noise=0.002)
     positions[5] += 1
     assert find_rest_intervals(positions).initial == range(12)
-
-
-@pytest.mark.parametrize(
-    ("away", "resting"),
-    [([], 6), ([5], 5), ([1], 6), ([1, 5], 5), ([2, 3], 2), ([3, 4, 5], 3), ([1, 4, 5], 4)],
-)
-def test_the_rest_ends_with_two_frames_away_or_at_the_last_one(away, resting):
-    shares = np.zeros(6)
-    shares[away] = 1
-    assert _resting(film(shares), 3, 0.02) == resting
-
-
-@pytest.mark.parametrize(("size", "resting"), [(0.018, 12), (0.022, 6)])
-def test_a_fiftieth_of_a_millimetre_counts_as_rest(size, resting):
-    step = np.repeat([0.0, size], 6) / np.sqrt((WHOLE**2).mean())
-    assert _resting(film(step), 3, STILL) == resting
-
-
-def test_noise_is_found_beside_a_steady_motion():
-    """36,000 second differences: their median is known to 1 %."""
-    positions = film(np.linspace(0, 1, 2000), noise=0.01)
-    assert _noise(positions) == pytest.approx(0.01, rel=0.03)
-    assert _noise(positions[:2]) == 0
 
 
 def test_two_pictures_are_before_and_after():

@@ -1,6 +1,5 @@
 """Films without fiducials, on lists of discs: the markers give the plane; and which fiducials are at rest."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.discs.disc_detector import DiscDetections
 from pinnray.vision.tracking.marker_plane import SIMILARITY
 from pinnray.vision.tracking.rest_detection import RestIntervals
 from pinnray.vision.tracking.scene import FilmedScene
@@ -55,15 +53,6 @@ def test_markers_that_move_out_of_the_front_are_of_a_mirrored_image(listed: List
         markers_only(listed, MARKERS, -PRESSED, 0.0)
 
 
-def of(count: int, hidden: Sequence[int]) -> list[DiscDetections | None]:
-    """Fiducials of frames, told apart by their radius; None in those in which they were not searched for."""
-    empty = np.zeros((1, 2)), np.zeros((1, 2, 2))
-    return [
-        None if n in hidden else DiscDetections(*empty, np.full(1, float(n)), np.zeros(1))
-        for n in range(count)
-    ]
-
-
 @pytest.mark.parametrize(
     ("searched", "before", "after"),
     [
@@ -75,7 +64,6 @@ def of(count: int, hidden: Sequence[int]) -> list[DiscDetections | None]:
     ],
 )
 def test_fiducials_at_rest_are_those_searched_for_or_the_nearest(searched, before, after):
-    hidden = [number for number in range(10) if number not in searched]
-    found = _fiducials_at_rest(of(10, hidden), RestIntervals(range(3), range(8, 10)))
-    numbers = [[int(discs.radii[0]) for discs in end] for end in found]
-    assert numbers == [list(before), list(after), [*before, *after]]
+    numbers = [number if number in searched else None for number in range(10)]
+    found = _fiducials_at_rest(numbers, RestIntervals(range(3), range(8, 10)))
+    assert found == ([*before], [*after], [*before, *after])
