@@ -40,10 +40,7 @@ ALL: dict[str, tuple[Callable[[], Any], str]] = {
     "fem": (_own("fem"), ""),
     "fem-nonlinear": (_own("fem-nonlinear"), ""),
     "skfem-p1": (_outside("scikit_fem:SkfemEntry", degree=1), ""),
-    "skfem-p2": (
-        _outside("scikit_fem:SkfemEntry"),
-        "SuperLU is in its symmetric mode.",
-    ),
+    "skfem-p2": (_outside("scikit_fem:SkfemEntry"), "SuperLU is in its symmetric mode."),
     "felupe": (
         _outside("felupe_entry:FelupeEntry"),
         "A derivative of its quadratic triangle is put right; linear problems are solved by SuperLU.",

@@ -95,10 +95,7 @@ def _path(ring: shapely.LinearRing) -> str:
     return f"M {' L '.join(places)} Z"
 
 
-FINGERS = (
-    PrintedFinger("A", (15.0, 0.0, -15.0), 26.0, 16.0, 4.44),
-    PrintedFinger("B", (), 30.0, 18.0, 1.42),
-)
+FINGERS = (PrintedFinger("A", (15.0, 0.0, -15.0), 26.0, 16.0, 4.44), PrintedFinger("B", (), 30.0, 18.0, 1.42))
 
 if __name__ == "__main__":
     for finger in FINGERS:

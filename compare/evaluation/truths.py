@@ -185,11 +185,7 @@ _TRUTHS = (
     SLIDING,
     Truth("stvk", f"St Venant-Kirchhoff, {_SLIDES}", law="st-venant-kirchhoff"),
     Truth("gent", f"Gent, which stiffens, {_SLIDES}", law="gent"),
-    Truth(
-        "print",
-        f"neo-Hookean, {_WALLS} and back wall 5 % thinner than drawn, {_SLIDES}",
-        scaled=_PRINTED,
-    ),
+    Truth("print", f"neo-Hookean, {_WALLS} and back wall 5 % thinner than drawn, {_SLIDES}", scaled=_PRINTED),
     Truth("base", f"neo-Hookean, {_BASE}, {_SLIDES}", scaled=_PRINTED, thicker=_THICK_BASE),
     Truth("cylinder", f"neo-Hookean, {_CYLINDER.format(10)}", radius=10.0, slope=0.0),
     Truth(
@@ -213,25 +209,11 @@ _TRUTHS = (
         f"neo-Hookean, {_PATCH} and that friction holds half way between sliding and sticking",
         slope=-0.07,
     ),
+    Truth("rubbing", f"neo-Hookean, {_ROUGH.format(10, 0.5)}", radius=10.0, friction=0.5, slope=0.0),
     Truth(
-        "rubbing",
-        f"neo-Hookean, {_ROUGH.format(10, 0.5)}",
-        radius=10.0,
-        friction=0.5,
-        slope=0.0,
+        "3d", f"neo-Hookean finger in three dimensions, of which the side face is seen, {_SLIDES}", solid=True
     ),
-    Truth(
-        "3d",
-        f"neo-Hookean finger in three dimensions, of which the side face is seen, {_SLIDES}",
-        solid=True,
-    ),
-    Truth(
-        "wide",
-        f"neo-Hookean, {_ROUGH.format(25, 0.9)}",
-        radius=25.0,
-        friction=0.9,
-        slope=0.0,
-    ),
+    Truth("wide", f"neo-Hookean, {_ROUGH.format(25, 0.9)}", radius=25.0, friction=0.9, slope=0.0),
     Truth(
         "limit",
         f"neo-Hookean, {_CYLINDER.format(10)}, beyond its largest force",

@@ -9,12 +9,7 @@ from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import IN_SAMPLE, Evaluation
 from pinnray.comparison.evaluation.force_curves import ForceCurve, force_curves
 from pinnray.comparison.figures.body import PERCENT
-from pinnray.comparison.figures.fields import (
-    QUANTITIES,
-    FieldQuantity,
-    draw_field,
-    drawn_solvers,
-)
+from pinnray.comparison.figures.fields import QUANTITIES, FieldQuantity, draw_field, drawn_solvers
 from pinnray.comparison.figures.force_charts import draw_force_displacement
 from pinnray.comparison.figures.overlay import Panels, draw_overlay
 from pinnray.comparison.figures.solver_charts import draw_losses, draw_marker_errors

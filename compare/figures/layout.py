@@ -46,8 +46,7 @@ def fitting(
     """
     found = [each for each in evaluations if not chosen or each.solver in chosen]
     first = sorted(
-        found,
-        key=lambda each: (each.solver != reference.solver, not each.converged, each.identified is None),
+        found, key=lambda each: (each.solver != reference.solver, not each.converged, each.identified is None)
     )
     return [each for each in found if each in first[: max(room, 1)]]
 

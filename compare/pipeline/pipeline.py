@@ -160,11 +160,7 @@ def _without_markers(
 
 
 def _write(
-    folder: Path,
-    job: Job,
-    comparison: Results,
-    stages: Stages,
-    photographs: Sequence[Picture] = (),
+    folder: Path, job: Job, comparison: Results, stages: Stages, photographs: Sequence[Picture] = ()
 ) -> None:
     """Write every file of a comparison but its solutions; photographs are for the report."""
     # They need the libraries of pictures.

@@ -123,20 +123,13 @@ def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
 
 
 def write_report(
-    path: Path,
-    comparison: Results,
-    pictures: Sequence[Picture],
-    provenance: Mapping[str, object],
+    path: Path, comparison: Results, pictures: Sequence[Picture], provenance: Mapping[str, object]
 ) -> None:
     """Write the report as one HTML file, atomically; arguments as for `report_html`."""
     write_text(path, report_html(comparison, pictures, provenance))
 
 
-def report_html(
-    comparison: Results,
-    pictures: Sequence[Picture],
-    provenance: Mapping[str, object],
-) -> str:
+def report_html(comparison: Results, pictures: Sequence[Picture], provenance: Mapping[str, object]) -> str:
     """The report as HTML text.
 
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.

@@ -36,11 +36,7 @@ def mesh_price(
 
 
 def check_mesh_cost(
-    finger: Finger,
-    settings: MeshSettings | None,
-    solvers: Sequence[Solver] = (),
-    *,
-    simulated: bool = False,
+    finger: Finger, settings: MeshSettings | None, solvers: Sequence[Solver] = (), *, simulated: bool = False
 ) -> None:
     """Refuse a mesh that takes long or much memory, unless it is the one of the finger's file.
 

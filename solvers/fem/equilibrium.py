@@ -52,10 +52,7 @@ class DiscreteEquilibrium:
     shared = False  # Whether other solvers use it too
 
     def __init__(
-        self,
-        problem: Problem,
-        space: NodalSpace,
-        constraints: DisplacementConstraints | None = None,
+        self, problem: Problem, space: NodalSpace, constraints: DisplacementConstraints | None = None
     ) -> None:
         """Compile the forms; what needs factors first makes them. Constraints are the load's by default."""
         self.problem, self.linear = problem, problem.material.law == "linear"

@@ -284,11 +284,6 @@ def _gradient(shapes: Sequence[csr_matrix], state: FloatArray, across: Functions
     """∂u_i/∂X_j (n, z, 3, 3) from matrices (n, N) of derivatives along x and y and of values."""
     dx, dy, own = (shape @ state for shape in shapes)
     parts = np.stack(
-        [
-            dx[:, None] * across.values,
-            dy[:, None] * across.values,
-            own[:, None] * across.slopes,
-        ],
-        axis=-1,
+        [dx[:, None] * across.values, dy[:, None] * across.values, own[:, None] * across.slopes], axis=-1
     )
     return np.stack([parts[:, :, i == COMPONENT].sum(axis=2) for i in range(3)], axis=2)

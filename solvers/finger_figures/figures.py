@@ -71,8 +71,7 @@ class FingerFigures:
     force_50: float = _figure("N", "force at 50 % of the stroke", always=False)
     force_75: float = _figure("N", "force at 75 % of the stroke", always=False)
     lift: float = _figure(
-        "kg",
-        "mass that two such fingers hold by friction, 2 µ force / g; µ is the load's, else 0.5",
+        "kg", "mass that two such fingers hold by friction, 2 µ force / g; µ is the load's, else 0.5"
     )
     tip_u: float = _figure("mm", "displacement of the front's tip along the finger")
     tip_v: float = _figure("mm", "displacement of the front's tip across it, positive toward the indenter")

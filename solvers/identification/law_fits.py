@@ -30,10 +30,7 @@ class LawFits:
     """
 
     def __init__(
-        self,
-        model: Callable[[LawName], ResponseModel],
-        parameters: Sequence[Parameter],
-        cost_change: float,
+        self, model: Callable[[LawName], ResponseModel], parameters: Sequence[Parameter], cost_change: float
     ) -> None:
         self._model, self.parameters, self._cost_change = model, parameters, cost_change
         self._names = [parameter.name for parameter in parameters]
@@ -52,9 +49,7 @@ class LawFits:
             measurement.errors,
         )
         return fit._replace(
-            estimate=found,
-            response=fit.model.extrapolated(about, found.values),
-            measurement=measurement,
+            estimate=found, response=fit.model.extrapolated(about, found.values), measurement=measurement
         )
 
     def fit(

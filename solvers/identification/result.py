@@ -9,13 +9,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, MIN_RESOLUTION
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
-from pinnray.solvers.identification.field import (
-    STEP,
-    IdentifiedField,
-    IdentifiedSideFace,
-    Member,
-    Snapshot,
-)
+from pinnray.solvers.identification.field import STEP, IdentifiedField, IdentifiedSideFace, Member, Snapshot
 from pinnray.solvers.identification.fit import NORMAL, SOURCES, Fit
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import (
@@ -96,12 +90,7 @@ class Identified:
         half = NORMAL * float(np.sqrt(self.probabilities @ (deviations**2 + (values - mean) ** 2)))
         return Estimated(mean, mean - half, mean + half)
 
-    def solution(
-        self,
-        name: str,
-        problem: Problem,
-        stats: Mapping[str, float | int | str],
-    ) -> Solution:
+    def solution(self, name: str, problem: Problem, stats: Mapping[str, float | int | str]) -> Solution:
         """The solution by the most probable law, with deviations that the others widen.
 
         Args:
@@ -217,12 +206,7 @@ class Identified:
                 f"{name}_{column}": each for column, each in zip(columns, rest, strict=True)
             }
         force, low, high = self.force().force
-        numbers |= {
-            "law": self.best.law,
-            "force": force,
-            "force_low": low,
-            "force_high": high,
-        }
+        numbers |= {"law": self.best.law, "force": force, "force_low": low, "force_high": high}
         for name, probability in self._laws().items():
             numbers[f"probability {name}"] = probability
         for fit in reversed(self.fits):  # that of the best one stays

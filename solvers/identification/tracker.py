@@ -21,12 +21,7 @@ from scipy.optimize import lsq_linear
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.estimation import (
-    degrees_of_freedom,
-    inflation_of,
-    quantile_of,
-    values_of,
-)
+from pinnray.solvers.assimilation.estimation import degrees_of_freedom, inflation_of, quantile_of, values_of
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
 from pinnray.solvers.identification.fit import NORMAL, component_of, place_of
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel

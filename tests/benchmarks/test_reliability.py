@@ -88,11 +88,7 @@ def test_a_process_that_stays_behind_is_an_orphan(tmp_path: Path, monkeypatch) -
 def test_of_equal_calls_on_a_file_the_first_the_middle_and_the_last_are_chosen() -> None:
     points = [Point("open", "a"), *[Point("write", "a")] * 7, Point("fsync", "b"), Point("rename", "b")]
     struck = {kind: [fault.at for fault in faults(points) if fault.kind == kind] for kind in KINDS}
-    assert struck == {
-        "kill": [0, 1, 4, 7, 8, 9],
-        "ENOSPC": [0, 1, 4, 7],
-        "EIO": struck["kill"],
-    }
+    assert struck == {"kill": [0, 1, 4, 7, 8, 9], "ENOSPC": [0, 1, 4, 7], "EIO": struck["kill"]}
 
 
 def test_half_a_file_is_seen_and_times_are_not_compared(tmp_path: Path) -> None:

@@ -23,11 +23,7 @@ from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem
 from tests.fingers import beam
 
-FILES = {
-    "empty/notes.txt": "mine",
-    "damaged/metrics.json": "{",
-    "foreign/metrics.json": '{"schema": 99}',
-}
+FILES = {"empty/notes.txt": "mine", "damaged/metrics.json": "{", "foreign/metrics.json": '{"schema": 99}'}
 truth = partial(Truth, name="mine", description="pressed in by {:.4g} mm")
 MESH = build_mesh(Design(), MeshSettings(size=2.0), across=1)
 PROBLEM = Problem(MESH)

@@ -6,11 +6,7 @@ from pinnray.options.shared import FingerOptions, OutputPath
 from pinnray.runtime.errors import UserError
 
 
-def command(
-    *,
-    finger: FingerOptions = FingerOptions(),
-    out: OutputPath = Path("out/mesh"),
-) -> int:
+def command(*, finger: FingerOptions = FingerOptions(), out: OutputPath = Path("out/mesh")) -> int:
     """Mesh the finger: write the mesh as a VTU and a NumPy file, and a picture.
 
     Args:

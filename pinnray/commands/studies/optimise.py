@@ -7,11 +7,7 @@ from rich.console import Console
 from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 
 
-def command(
-    question: Path,
-    *,
-    options: StudyOptions = StudyOptions(),
-) -> int:
+def command(question: Path, *, options: StudyOptions = StudyOptions()) -> int:
     """Find the fingers that no other finger beats: the best ones by a quantity, or the front of two or three.
 
     An emulator proposes fingers and the solver judges each of them. Writes the fingers as a table, a design

@@ -8,11 +8,7 @@ from pinnray.options.shared import StudyOptions, going_on_from, read_formats
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
 
-def command(
-    study: Path,
-    *,
-    options: StudyOptions = StudyOptions(),
-) -> int:
+def command(study: Path, *, options: StudyOptions = StudyOptions()) -> int:
     """Solve many fingers: the samples of a study over parameters of design, material and load.
 
     Writes a table of force, wrap angle, compliance, stress and more, and a page with pictures. Each result is

@@ -75,10 +75,7 @@ class ConstrainedNetwork:
 
     @classmethod
     def of(
-        cls,
-        energy: NetworkEnergy,
-        problem: Problem,
-        weighting: MarkerWeighting | None = None,
+        cls, energy: NetworkEnergy, problem: Problem, weighting: MarkerWeighting | None = None
     ) -> "ConstrainedNetwork":
         """The network of an energy under the load and, with a weighting, the markers of a problem."""
         conditions = load_conditions(problem)

@@ -21,11 +21,7 @@ from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import Lame, deformation_jacobian, piola_stress_and_tangent
 from pinnray.solvers.identification.body import Linearised
-from pinnray.solvers.pinn.finite_basis.energy import (
-    REGULARISATION,
-    NetworkEnergy,
-    energy_density,
-)
+from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION, NetworkEnergy, energy_density
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField
 from pinnray.solvers.pinn.finite_basis.solver import FiniteBasisSolver
 from pinnray.solvers.pinn.threading import pool
@@ -66,11 +62,7 @@ class NetworkBody:
 
     @classmethod
     def of(
-        cls,
-        solver: FiniteBasisSolver,
-        problem: Problem,
-        motion: WallMotion,
-        scale: float = 1.0,
+        cls, solver: FiniteBasisSolver, problem: Problem, motion: WallMotion, scale: float = 1.0
     ) -> "NetworkBody":
         """The body by a solver's windows, their spacings times a scale.
 

@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pinnray.comparison.evaluation.truths import (
-    LAWS,
-    SLIDING,
-    TRUTHS,
-    WALLS,
-    Truth,
-)
+from pinnray.comparison.evaluation.truths import LAWS, SLIDING, TRUTHS, WALLS, Truth
 from pinnray.comparison.evaluation.virtual_experiment import experiment_source, simulate
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design

@@ -78,12 +78,4 @@ def main() -> None:
     solving.LARGE = 0
     solvers = Ending("reporting", laws=("linear",)), Ending(sys.argv[2])
     with interruptible(), solving.second_process() as pool:
-        solving.solve_all(
-            Job(DESIGN, solvers),
-            solvers,
-            PROBLEM,
-            MARKERS,
-            Path(sys.argv[1]),
-            Said(),
-            pool,
-        )
+        solving.solve_all(Job(DESIGN, solvers), solvers, PROBLEM, MARKERS, Path(sys.argv[1]), Said(), pool)

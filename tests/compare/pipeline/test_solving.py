@@ -132,10 +132,7 @@ def test_the_end_of_a_second_process_is_one_line_of_the_first(solve):
 
 @pytest.mark.parametrize(
     ("name", "ending"),
-    [
-        ("silent", signal.SIGKILL),
-        pytest.param("reporting", signal.SIGTERM, marks=pytest.mark.slow),
-    ],
+    [("silent", signal.SIGKILL), pytest.param("reporting", signal.SIGTERM, marks=pytest.mark.slow)],
 )
 def test_no_process_outlives_the_run(tmp_path, name, ending):
     program = subprocess.Popen(

@@ -52,10 +52,7 @@ CASES = [
 ]
 """On a curved base and on a divided one; networks are compared on four more on the finer mesh."""
 
-NETWORKS = {
-    **dict.fromkeys(("tilted wedge", "arch"), "fast"),
-    **dict.fromkeys(("beam", "notched"), "local"),
-}
+NETWORKS = {**dict.fromkeys(("tilted wedge", "arch"), "fast"), **dict.fromkeys(("beam", "notched"), "local")}
 """Preset by body."""
 
 

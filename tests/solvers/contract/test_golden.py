@@ -20,8 +20,7 @@ SLOW = ("pinn", "fem-id", "fem-nonlinear", "statfem")
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[pytest.mark.release] * name.startswith(SLOW)) for name in JOBS],
+    "name", [pytest.param(name, marks=[pytest.mark.release] * name.startswith(SLOW)) for name in JOBS]
 )
 def test_the_numbers_are_those_that_are_stored(name):
     stored = json.loads(NUMBERS.read_text(encoding="utf-8"))["jobs"][name]

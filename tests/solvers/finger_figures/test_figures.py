@@ -166,11 +166,7 @@ def test_mass_and_break_are_of_the_substance() -> None:
         (0.4, 0.5, "is 40% of the material's strain at break."),
         (0.6, np.nan, "60% of the material's strain at break: a printed part breaks earlier"),
         (1.2, 0.5, "120% of the material's strain at break: it breaks."),
-        (
-            1.2,
-            0.0,
-            "it breaks; it is at a sharp corner or edge, where it grows with finer elements",
-        ),
+        (1.2, 0.0, "it breaks; it is at a sharp corner or edge, where it grows with finer elements"),
     ],
 )
 def test_whether_it_breaks_is_said(share, radius, said) -> None:
