@@ -10,6 +10,7 @@ from pinnray.runtime.errors import UserError
 
 BENCHMARKS = {
     "results": "results.default_run:main",
+    "default": "results.default_time:main",
     "entries": "entries.run:small",
     "full-entries": "entries.run:full",
     "page": "entries.run:page",
