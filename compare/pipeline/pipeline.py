@@ -100,6 +100,8 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
                 unsupported |= without
                 observations, remarks = no_displacements(problem, radius, str(error)), [f"no truth: {error}"]
     outcome = solve_all(job, solvers, problem, observations, folder, stages, pool)
+    if outcome.unsupported and not (outcome.evaluations or outcome.failed):
+        raise UserError("; ".join(outcome.unsupported.values()))
     with stages.stage("checks"):
         evaluations, impossible = with_body_checks(list(outcome.evaluations.values()), mesh, truth)
     return Comparison(
