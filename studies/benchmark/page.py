@@ -132,6 +132,7 @@ def figure_texts(rows: Sequence[Mapping[str, Any]], bounds: Mapping[str, float])
         values = [row[figure] for row in rows]
         sizes = [np.inf if value is None else abs(value) for value in values]
         near = np.array(sizes) <= min(sizes, default=0.0) + bounds.get(figure, -1.0)
+        near &= np.isfinite(sizes)
         texts = [NONE if value is None else shown(value) for value in values]
         marked = [f"{text} {ALIKE}" if alike else text for text, alike in zip(texts, near, strict=True)]
         bound = shown(bounds[figure]).replace("+", "") if figure in bounds else NONE

@@ -132,7 +132,7 @@ def test_what_the_reference_does_not_tell_apart_is_marked():
     ]
     force = list(COLUMNS).index("force,\n%")
     for bound, said in {0.006: ["0.60", "+2.0 ≈", "−2.5 ≈"], 0.004: ["0.40", "+2.0", "−2.5"]}.items():
-        assert [row[force] for row in figure_texts(rows, {"force": bound})] == said
+        assert [row[force] for row in figure_texts([*rows, blank], {"force": bound})] == [*said, "–"]
 
 
 @pytest.mark.parametrize(
