@@ -127,12 +127,11 @@ def test_an_entry_is_a_file_and_those_of_other_sets_are_left_out(tmp_path, two):
 
 
 def test_what_the_reference_does_not_tell_apart_is_marked():
-    rows = [
-        dict.fromkeys((name for name, _ in COLUMNS.values())) | {"force": each} for each in (0.02, -0.025)
-    ]
+    blank = dict.fromkeys(name for name, _ in COLUMNS.values())
+    rows = [blank | {"force": 0.02}, blank | {"force": -0.025}, blank]
     force = list(COLUMNS).index("force,\n%")
     for bound, said in {0.006: ["0.60", "+2.0 ≈", "−2.5 ≈"], 0.004: ["0.40", "+2.0", "−2.5"]}.items():
-        assert [row[force] for row in figure_texts([*rows, blank], {"force": bound})] == [*said, "–"]
+        assert [row[force] for row in figure_texts(rows, {"force": bound})] == [*said, "–"]
 
 
 @pytest.mark.parametrize(
