@@ -110,9 +110,6 @@ class Network(torch.nn.Module):
     def __init__(self, solver: DeepEnergySolver, given: NetworkProblem) -> None:
         super().__init__()
         self._given = given
-        self._first, last = given.base[given.base[:, 1].argmin()], given.base[given.base[:, 1].argmax()]
-        along = (last - self._first) / (last - self._first).norm()
-        self._normal = torch.stack([along[1], -along[0]])
         alike = torch.full((len(given.contact), 1), 1 / len(given.contact), dtype=torch.float64)
         self._weights = alike if given.shares is None else given.shares
         self._frequencies = torch.pi * solver.scale * torch.randn(2, solver.features, dtype=torch.float64)
@@ -130,8 +127,7 @@ class Network(torch.nn.Module):
         if self._frequencies.shape[1]:
             phases = places @ self._frequencies
             places = torch.cat([phases.sin(), phases.cos()], dim=1)
-        away = self._given.scaled(both) @ self._normal - self._given.scaled(self._first) @ self._normal
-        away = away.abs()[:, None]
+        away = self._given.away(both)
         own = stroke.abs().max() * away * self._layers(places)
         count = len(points)
         means = [(self._weights * each[count:]).sum(dim=0) for each in (own, away)]

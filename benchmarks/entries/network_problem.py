@@ -17,7 +17,6 @@ class NetworkProblem:
     Attributes:
         points: Where the energy is evaluated, shape (n, 2), mm.
         areas: Their weights, shape (n,), mm².
-        base: Nodes of the base, shape (b, 2), mm.
         contact: Points at which the contact is prescribed, shape (c, 2), mm.
         shares: Weights of their mean displacement, shape (c, 1); None where every point is prescribed.
         stroke: Prescribed displacement, shape (2,), mm.
@@ -28,7 +27,6 @@ class NetworkProblem:
         mesh, rule = problem.mesh, body_quadrature(problem.mesh, degree)
         self._law, self._lame = problem.material.law, problem.material.lame
         self.points, self.areas = torch.tensor(rule.location.points), torch.tensor(rule.weights)
-        self.base = torch.tensor(mesh.points[np.unique(mesh.boundary("base"))])
         contact, shares = contact_functional(problem)
         self.shares = torch.tensor(shares)[:, None] if problem.load.kind == "mean" else None
         if self.shares is None:
@@ -36,6 +34,10 @@ class NetworkProblem:
         self.contact, self.stroke = torch.tensor(contact), torch.tensor(problem.load.values)
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
         self._middle, self._half = torch.tensor((low + high) / 2), float((high - low).max() / 2)
+        base = torch.tensor(mesh.points[mesh.boundary("base").ravel()])
+        self._first, last = base[base[:, 1].argmin()], base[base[:, 1].argmax()]
+        along = (last - self._first) / (last - self._first).norm()
+        self._normal = torch.stack([along[1], -along[0]]) / self._half
 
     def density(self, gradient: torch.Tensor) -> torch.Tensor:
         """Energy density at displacement gradients (n, 2, 2), shape (n,), MPa."""
@@ -44,6 +46,10 @@ class NetworkProblem:
     def scaled(self, points: torch.Tensor) -> torch.Tensor:
         """Points as coordinates from -1 to 1 along the longer side."""
         return (points - self._middle) / self._half
+
+    def away(self, points: torch.Tensor) -> torch.Tensor:
+        """Distance of points from the line of the base in the same unit, shape (n, 1)."""
+        return ((points - self._first) @ self._normal).abs()[:, None]
 
     def missed(self, moved: torch.Tensor) -> torch.Tensor:
         """By how much displacements of `contact` miss the stroke, point by point or in their mean, mm."""
