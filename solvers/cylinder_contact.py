@@ -89,7 +89,7 @@ class CylinderContact:
             travel=load.values,
             radius=float(load.radius or 0),
             # More would need fewer updates of the multipliers but more Newton iterations.
-            stiffness=10.0 * problem.stiffest,
+            stiffness=10.0 * problem.material.young,
             coefficient=load.friction,
             edges=order[np.searchsorted(nodes[order], np.concatenate(columns, axis=1))],
             shares=space.shares,

@@ -147,7 +147,6 @@ class Traits:
     family: Family | None = None  #: Kind of method; None if unknown
     twin: str | None = None  #: Solver by finite elements that fits the markers in the same way, if any
     friction: bool = False  #: Whether its load `cylinder` may have friction
-    parts: bool = False  #: Whether parts of the body may have materials of their own
     cost: Cost = Cost()  #: Time that it takes
 
     @classmethod
@@ -175,11 +174,6 @@ def check_problem(solver: Solver, problem: Problem) -> None:
     if problem.material.law not in solver.laws:
         raise UnsupportedProblemError(
             f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}"
-        )
-    if problem.mesh.moduli is not None and not Traits.of(solver).parts:
-        raise UnsupportedProblemError(
-            f"{solver.name} takes a body of one material, and parts of this one have their own; take fem or "
-            "fem-nonlinear"
         )
     check_load(solver, problem.load)
 

@@ -61,8 +61,7 @@ class DiscreteEquilibrium:
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         material, gradient = problem.material, ufl.grad(self.elements.function)
-        cells = None if problem.mesh.moduli is None else np.arange(len(problem.mesh.triangles))
-        lame = problem.lame(cells, solid=self.elements.dimension == 3)
+        lame = material.solid_lame if self.elements.dimension == 3 else material.lame
         moduli = self.elements.moduli(lame)
         density = energy_density_of(material.law, gradient, moduli, ufl.ln)
         measure = ufl.dx if self.linear else ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
