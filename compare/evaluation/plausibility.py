@@ -16,8 +16,6 @@ from pinnray.solvers.solver import NONE_SEEN
 from pinnray.vision.measurements import SMALLEST_DISTANCE
 from pinnray.vision.point_order import SURE, likeliest_order, likelihoods, order_text
 
-UNITS = (1000.0, 25.4, 10.0)
-"""Millimetres in a metre, an inch and a centimetre."""
 LOOKS_LIKE = "this looks like"
 """Words before the unit that a number is taken to have."""
 CONVENTION = "u and v are final minus initial position, in mm, u towards the tip and v out of the front"
@@ -35,7 +33,7 @@ SMALL = 0.1
 def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
     """Raise a `UserError` if no marker was seen, or they cannot be markers of the body.
 
-    They cannot if one is not on the body, two are at one place, or all lie where their discs have no room.
+    They cannot if one is not on the body, or two are at one place.
     """
     points = observations.points
     if not observations.known:
@@ -51,15 +49,6 @@ def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
     if len(apart) and float(apart.min()) < SMALLEST_DISTANCE:
         first, second = (int(ends[apart.argmin()]) + 1 for ends in np.triu_indices(len(points), 1))
         raise UserError(f"the markers {first} and {second} are at one place; keep one")
-    crowded = bool(len(apart)) and float(apart.min()) < 2 * observations.marker_radius
-    for factor in UNITS:  # so near the origin they may lie on the body by chance
-        if (crowded or factor == UNITS[0]) and _inside(mesh, points * factor):
-            extent = float(np.abs(points).max())
-            raise UserError(
-                f"the measurements are not of this finger: all markers lie within {extent:.3g} mm of its "
-                f"frame's origin, and would be on it {factor:g} times as far; give positions and "
-                "displacements in mm"
-            )
 
 
 def problem_remarks(problem: Problem) -> list[str]:
@@ -200,14 +189,6 @@ def _cosine(one: FloatArray, other: FloatArray) -> float:
     """Cosine of the angle between two arrays as vectors; 0 if one vanishes."""
     sizes = float(np.linalg.norm(one) * np.linalg.norm(other))
     return float((one * other).sum()) / sizes if sizes else 0.0
-
-
-def _inside(mesh: TriangleMesh, points: FloatArray) -> bool:
-    try:
-        mesh.locate(points)
-    except OutsideBodyError:
-        return False
-    return True
 
 
 LEAST_ACROSS = 1.5
