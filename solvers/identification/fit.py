@@ -1,9 +1,10 @@
 """A fit of the unknowns under one law, with its evidence, force and place.
 
 The evidence of a law is Laplace's approximation of the integral of likelihood times prior: with the
-residuals r over φ σ, the sensitivities A and the standardised values z of `Estimate`, for n observations
+residuals r over φ σ, the sensitivities A and the standardised values z of `Estimate`, whose prior has the
+mean m and the precision P, for n observations
 
-    log Z = -n log φ - (r . r + z . z) / 2 - log det(A^T A + 1) / 2
+    log Z = -n log φ - (r . r + (z - m) . P (z - m)) / 2 - log det(A^T A + P) / 2 + log det P / 2
 
 Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
 """
@@ -13,6 +14,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
+from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.boundary import mean_thickness
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
@@ -31,17 +33,17 @@ from pinnray.solvers.identification.unknowns import (
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
 SOURCES = {
-    "third dimension": "the third dimension, which plane strain leaves out: take fem-id with a finger that "
-    "has a depth, or weigh one press, and multiply the forces of others by the ratio of weighed to found",
-    "markers": "the errors of the markers: film nearer or sharper, or use more markers",
+    "third dimension": "the third dimension",
+    "markers": "the errors of the markers",
     "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
-    "contact": "place, width and pressure of the contact: put markers nearer to it",
-    "finger": "walls, clamp and Poisson's ratio: measure the walls, and leave those that are as drawn out of "
-    "the parameters",
-    "frames": "the frames of the pictures: show fiducials, and fix the camera",
-    "law": "the choice between the laws: give the law, or press farther",
+    "contact": "place, width and pressure of the contact",
+    "corners": "the roundings of the cavities' corners, which the drawing leaves out",
+    "modulus": "Young's modulus",
+    "finger": "walls, clamp and Poisson's ratio",
+    "frames": "the frames of the pictures",
+    "law": "the choice between the laws",
 }
-"""What the variance of a force comes from, and what would narrow its interval."""
+"""What the variance of a force comes from, in words."""
 
 
 SIDE_ODDS = 150.0
@@ -85,10 +87,9 @@ class Fit(NamedTuple):
         """Logarithm of the evidence, up to a constant that all laws share."""
         found = self.estimate
         a, r = found.sensitivities[found.kept], found.residuals[found.kept]
-        _, volume = np.linalg.slogdet(a.T @ a + np.eye(a.shape[1]))
-        misfit = float(r @ r + found.z @ found.z)
+        misfit = float(r @ r) + found.prior.misfit(found.z)
         wrong = float(self.measurement.errors.log_odds[self.doubted].sum())
-        return wrong - len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
+        return wrong - len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + found.prior.log_volume(a))
 
     @property
     def doubted(self) -> IntArray:
@@ -145,8 +146,9 @@ class Fit(NamedTuple):
     def variances(self, direction: FloatArray) -> dict[str, float]:
         """Variance of that component, (N/mm)^2, by what it comes from: names of `SOURCES`.
 
-        With the estimate's error C A^T e - C p, for unit errors e of the observations and p of the priors, it
-        is the sum of independent parts. Where φ is above one, all but 1 / φ^2 of the observations' is misfit.
+        With the estimate's error C A^T e - C R^T p, for unit errors e of the observations and p of the prior,
+        it is the sum of independent parts; of unknowns that are known together each has its share. Where φ is
+        above one, all but 1 / φ^2 of the observations' is misfit.
         """
         found, unknowns = self.estimate, self.model.unknowns
         slopes = self.response.force_slopes @ direction * found.slopes
@@ -156,12 +158,22 @@ class Fit(NamedTuple):
         value = float(self.response.force @ direction)
         parts = dict.fromkeys(SOURCES, 0.0)
         parts["third dimension"] = (self.model.doubt.force * value) ** 2
+        parts["corners"] = (self.model.doubt.corners * value) ** 2
         parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
-        for name, part in zip(unknowns.names, spread.tolist(), strict=True):
+        shares = spread * (found.prior.precision @ spread)
+        for name, part in zip(unknowns.names, shares.tolist(), strict=True):
             contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
             frame = name.startswith(("pressed", "drawn"))
-            parts["contact" if contact else "frames" if frame else "finger"] += part**2
+            finger = "modulus" if name == "young" else "finger"
+            parts["contact" if contact else "frames" if frame else finger] += part
         return parts
+
+    @property
+    def learned(self) -> Learned | None:
+        """What the markers, and those of earlier pictures, say of the finger; None if it has no unknowns."""
+        found = self.estimate
+        wider = (found.quantile / NORMAL) ** 2
+        return self.model.unknowns.learned(found.parameters, found.z, wider * found.covariance)
 
 
 def component_of(
@@ -173,7 +185,8 @@ def component_of(
     """
     component = float(response.force @ direction)
     spread = response.force_slopes @ direction @ errors
-    return component, float(np.hypot(np.linalg.norm(spread), model.doubt.force * component))
+    doubt = np.hypot(model.doubt.force, model.doubt.corners) * component
+    return component, float(np.hypot(np.linalg.norm(spread), doubt))
 
 
 def place_of(unknowns: Unknowns, response: Response, errors: FloatArray) -> tuple[float, float]:
