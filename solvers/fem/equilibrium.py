@@ -233,17 +233,6 @@ class DiscreteEquilibrium:
         nodal, forces = self.minimiser(self.prescribed, self.constraints.targets)
         return LoadState(fraction, fraction * nodal, np.zeros(0), fraction * forces)
 
-    @property
-    def stiffness_to_cylinder(self) -> float:
-        """Force of a cylinder over its way into the finger as it begins to press, N/mm per mm.
-
-        The tangent at rest must be factorised. Infinite for a cylinder that moves away.
-        """
-        assert self.contact is not None
-        pressed = self.linear_guess(1e-3)
-        way = -float(self.contact.gaps(replace(self.rest, fraction=1e-3))[0].min())
-        return float(pressed.contact.sum()) / way if way > 0 else np.inf
-
     def _pressed_at_one_node(self, contact: CylinderContact, fraction: float) -> LoadState:
         rest = replace(self.rest, fraction=fraction)
         gap, normal = contact.gaps(rest)
