@@ -10,14 +10,16 @@ from rich.table import Table
 from pinnray.comparison.figures.force_charts import draw_force_track
 from pinnray.film.loading_path import FIRST, Loading, LoadingPath
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import Cell, terminal_table, write_csv
 from pinnray.solvers.identification.model import ResponseModel
 from pinnray.solvers.identification.tracker import ForceReading, ForceTracker
 from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
-from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import Estimated
 from pinnray.solvers.solver import Progress, check_law
@@ -46,7 +48,13 @@ class FrameForce(NamedTuple):
 
 
 def force_tracker(
-    mesh: TriangleMesh, finger: Finger, material: Material, points: FloatArray, *, plane: bool
+    mesh: TriangleMesh,
+    finger: Finger,
+    material: Material,
+    points: FloatArray,
+    *,
+    plane: bool,
+    learned: Learned | None = None,
 ) -> ForceTracker:
     """The force tracker of a finger, by quadratic elements.
 
@@ -60,6 +68,7 @@ def force_tracker(
         material: Of a law of finite strain; of the neo-Hookean one if none was given.
         points: Markers at rest, shape (m, 2), mm.
         plane: Whether the finger was simulated in plane strain.
+        learned: What pictures have taught of the finger.
 
     Raises:
         UserError: If DOLFINx is missing.
@@ -69,9 +78,10 @@ def force_tracker(
     from pinnray.solvers.fem.thick_body import ThickBody
 
     law = "neo-hookean" if material.law == "linear" else material.law
-    problem = Problem(mesh, material.model_copy(update={"law": law}), finger=finger)
+    still = Observations(points, np.zeros_like(points), visible=np.zeros(len(points)), simulated=plane)
+    problem = Problem(mesh, material.model_copy(update={"law": law}), Load(), still, finger, learned)
     unknowns, thick = Unknowns(problem, DEFAULT), not plane and has_depth(finger)
-    model, stiffness = ResponseModel(FemBody(unknowns, 2), unknowns, weighed=plane or thick), 1.0
+    model, stiffness = ResponseModel(FemBody(unknowns, 2), unknowns, weighed=thick), 1.0
     if thick:
         stiffness = model.flexibility() / ResponseModel(ThickBody(unknowns, 2), unknowns).flexibility()
     return ForceTracker(model, points, finger.marker_radius, stiffness)

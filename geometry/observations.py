@@ -1,7 +1,7 @@
 """Measured or simulated displacements of the markers."""
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 from textwrap import shorten
 
 import numpy as np
@@ -24,6 +24,8 @@ class Observations:
         source: One sentence on the origin of the numbers, or on why there are none, shown with them.
         simulated: True if no camera was involved; in plane strain, unless it is `solid`.
         solid: True if simulated in three dimensions, with the side faces that a camera sees.
+        weighed: Force along the stroke that a scale showed when the finger was pressed so, and its standard
+            deviation, N.
         marker_radius: Radius of the markers' discs, over which their displacements are means, mm; the default
             design's, `design.marker_radius` is that of another one.
         pressed: Registration of the pressed picture with that at rest.
@@ -41,6 +43,7 @@ class Observations:
     source: str
     simulated: bool
     solid: bool
+    weighed: tuple[float, float] | None
     marker_radius: float
     pressed: Registration
     drawn: Registration
@@ -54,6 +57,7 @@ class Observations:
         source: str = "measurements given as arrays",
         simulated: bool = False,
         solid: bool = False,
+        weighed: tuple[float, float] | None = None,
         marker_radius: float = 0.8,
         pressed: Registration = FIXED,
         drawn: Registration = FIXED,
@@ -72,6 +76,7 @@ class Observations:
             source=source,
             simulated=simulated,
             solid=solid,
+            weighed=weighed,
             marker_radius=marker_radius,
             pressed=pressed,
             drawn=drawn,
@@ -94,6 +99,9 @@ class Observations:
             )
         if not 0 <= self.marker_radius < inf:
             raise UserError(f"the marker radius must be zero or more, got {self.marker_radius} (mm)")
+        if self.weighed is not None and not (isfinite(self.weighed[0]) and 0 < self.weighed[1] < inf):
+            force, deviation = self.weighed
+            raise UserError(f"weighed: {force} ± {deviation} N; the deviation must be above zero")
         if not len(self.visible):
             raise ShapeError("observations need at least one marker")
 

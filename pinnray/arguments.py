@@ -11,6 +11,7 @@ from pinnray.geometry.drawing.description import Description, description_beside
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.learned import Learned, read_learned
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
 from pinnray.geometry.finger.presets import load_design
 from pinnray.geometry.mesh.settings import MeshSettings
@@ -96,6 +97,14 @@ def read_finger(design: object, shape: Mapping[str, Any] | None = None) -> Finge
     if shape:
         raise UserError(f"{next(iter(shape))} is a parameter of a design, and {design.name} is a drawing")
     return design
+
+
+def learned_of(design: object) -> Learned | None:
+    """What a design's file, or the description beside a drawing, says that pictures have taught of it."""
+    if not isinstance(design, str | Path):
+        return None
+    path = Path(design)
+    return read_learned(description_beside(path) if path.suffix.lower() in DRAWINGS else path)
 
 
 def given_drawing(file: str | Path, description: Mapping[str, Any] | None = None) -> DrawnFinger:

@@ -11,18 +11,28 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from pinnray.arguments import given_drawing, mesh_settings, read_job, read_solver, read_solvers, taken
+from pinnray.arguments import (
+    given_drawing,
+    learned_of,
+    mesh_settings,
+    read_job,
+    read_solver,
+    read_solvers,
+    taken,
+)
 from pinnray.camera import read_observations
 from pinnray.comparison.report.comparison import Comparison
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import as_path
 from pinnray.solution import Solution
+from pinnray.solvers.identification.settings import taught
 from pinnray.solvers.load import Load, LoadKind
 from pinnray.solvers.material import Material
 from pinnray.solvers.problem import Problem
@@ -87,6 +97,8 @@ def solve(
     material: Material | str | None = None,
     load: Load | LoadKind | None = None,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
+    presses: "Sequence[str | Path | Observations | pd.DataFrame]" = (),
+    learned: Learned | None = None,
     progress: bool | None = None,
     **given: Any,
 ) -> Solution:
@@ -107,6 +119,9 @@ def solve(
             `pr.MATERIALS`.
         load: Motion of the indenter, or its kind alone.
         measurements: Marker displacements, for a solver that assimilates them.
+        presses: Other pictures of the same finger under the same contact, from which a solver that
+            identifies the finger learns before; `solution.identified.learned` has what all have taught.
+        learned: What earlier pictures have taught of the finger; that of the design's file if None.
         progress: Whether to show the stages; if None in a notebook only.
         given: Parameters of the finger (`rib_count`), the material (`young` or E, `poisson` or nu, `plane`,
             `law`) and the load (`stroke`, mm, `direction`, degrees, `slide`, `radius`, mm, `friction`).
@@ -126,10 +141,10 @@ def solve(
     from pinnray.runtime.stages import shown_stages
 
     chosen = read_solver(solver, preset)
-    others = (size, material, load, measurements)
+    others = (size, material, load, measurements, presses or None, learned)
     with shown_stages(progress) as stages:
         if not isinstance(problem, Problem):
-            words = ("size", "material", "load", "measurements", "preset", "solver")
+            words = ("size", "material", "load", "measurements", "presses", "learned", "preset", "solver")
             finger, elastic, moved = read_job(problem, material, load, given, besides=words)
             seen = read_observations(measurements, finger)
             check_asked(chosen, elastic, seen)
@@ -137,7 +152,12 @@ def solve(
                 triangles = finger_mesh(finger, settings=mesh_settings(size))
                 if seen is not None:
                     check_positions(seen, triangles)
-            problem = Problem(triangles, elastic, moved, seen, finger)
+            known = learned_of(problem) if learned is None else learned
+            problem = Problem(triangles, with_law(elastic, chosen), moved, seen, finger, known)
+            if presses:
+                with stages.stage("presses") as report:
+                    pictures = [found for each in presses if (found := read_observations(each, finger))]
+                    problem = replace(problem, learned=taught(chosen, problem, pictures, report))
         elif given or any(each is not None for each in others):
             raise UserError(
                 "a Problem has its own mesh, material, load and observations; give a design to choose them"
@@ -172,6 +192,9 @@ def compare(
     *,
     preset: str | None = None,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
+    presses: "Sequence[str | Path | Observations | pd.DataFrame]" = (),
+    learned: Learned | None = None,
+    learn: str | Path | None = None,
     truth: str | None = None,
     size: float | MeshSettings | None = None,
     adapt: float | None = None,
@@ -194,6 +217,9 @@ def compare(
         preset: Of the networks among them: `fast`, `local`, `paper` or `trained`.
         measurements: Marker displacements: a data frame or CSV file (x_mm, y_mm, u_mm, v_mm), or a video to
             track without a camera file; simulated by a finite-strain run if None.
+        presses: Other pictures of the same finger under the same contact, from which `fem-id` learns before.
+        learned: What earlier pictures have taught of the finger; that of the design's file if None.
+        learn: Design file to write, .toml, with what all pictures have taught.
         truth: What is simulated then, such as "sliding" (if None), "cylinder" or "3d".
         size: Largest element in walls and ribs, mm.
         adapt: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
@@ -218,8 +244,8 @@ def compare(
         raise UserError("resume goes on with the output folder of an earlier run; name it as out")
     if adapt is not None and (isinstance(adapt, bool) or not isinstance(adapt, int | float)):
         raise UserError(f"adapt = {adapt!r} is no number; give a tolerance in mm")
-    words = ("solvers", "size", "adapt", "material", "load", "measurements", "truth", "preset", "reference")
-    finger, elastic, moved = read_job(design, material, load, given, besides=words)
+    words = "solvers size adapt material load measurements presses learned learn truth preset reference"
+    finger, elastic, moved = read_job(design, material, load, given, besides=words.split())
     chosen = read_solvers(job_defaults(preset).solvers.split(",") if solvers is None else solvers, preset)
     job = Job(
         design=finger,
@@ -230,6 +256,9 @@ def compare(
         material=elastic,
         load=moved,
         measurements=read_observations(measurements, finger),
+        presses=[found for each in presses if (found := read_observations(each, finger))],
+        learned=learned_of(design) if learned is None else learned,
+        learn=None if learn is None else as_path(learn, "learn"),
         truth=truth,
         reference=reference,
         resume=resume,

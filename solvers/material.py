@@ -1,11 +1,11 @@
 """Material: elastic constants, the name of their law (see `elasticity`), and what the finger is made of."""
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from pinnray.geometry.finger.parameters import CheckedModel, bounded
+from pinnray.geometry.finger.parameters import CheckedModel, bounded, value_and_deviation
 from pinnray.runtime.errors import UserError
 
 LawName = Literal["linear", "neo-hookean", "st-venant-kirchhoff", "gent"]
@@ -66,6 +66,15 @@ class Material(CheckedModel):
 
     #: From a thousandth of the softest gels' to eight times diamond's
     young: float = bounded(11.4, 1e-6, 1e7, "MPa", "E", "Young's modulus")
+    #: Zero: known exactly. `Material(young="11.4±1.2")` has 1.2 MPa
+    young_deviation: float = bounded(
+        0.0,
+        0,
+        1e7,
+        "MPa",
+        "",
+        "Standard deviation of Young's modulus, which widens a force found from markers",
+    )
     poisson: float = bounded(0.45, -0.99, 0.4999, "", "nu", "Poisson's ratio", gt=-1, lt=0.5)
     plane: Literal["strain", "stress"] = Field(
         default="strain",
@@ -84,6 +93,16 @@ class Material(CheckedModel):
         "forces in films and in films of the rig, and in no equilibrium",
     )
     _substance: Substance | None = PrivateAttr(None)  # beside the constants, which alone decide a solution
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_deviation(cls, values: Any) -> Any:
+        """Young's modulus and its deviation out of a text such as `11.4±1.2` or `11.4+-1.2`."""
+        if isinstance(values, dict) and isinstance(young := values.get("young"), str):
+            value, deviation = value_and_deviation(young)
+            if deviation:
+                return values | {"young": value, "young_deviation": deviation}
+        return values
 
     @model_validator(mode="after")
     def _supported(self) -> Self:

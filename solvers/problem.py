@@ -9,6 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.quadrature import segment_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
@@ -43,6 +44,7 @@ class Problem:
     observations: Observations | None = None  #: Marker displacements, for the solvers that assimilate them
     #: The meshed finger, for solvers that need more than the mesh, such as the thickness of a wall
     finger: Finger | None = None
+    learned: Learned | None = None  #: Of the finger, for solvers that identify it
 
     __repr__ = brief
 
@@ -115,9 +117,16 @@ class Problem:
         content: list[object] = [self.mesh.digest, self.material.model_dump(), self.load.model_dump()]
         if (seen := self.observations) is not None:
             content += [seen.points, seen.displacements, seen.standard_deviations, seen.visible]
-            content += [seen.marker_radius, *vars(seen.pressed).values(), *vars(seen.drawn).values()]
+            content += [
+                seen.weighed,
+                seen.marker_radius,
+                *vars(seen.pressed).values(),
+                *vars(seen.drawn).values(),
+            ]
         if self.finger is not None:
             content.append(self.finger.digest)
+        if self.learned is not None:
+            content.append(self.learned.model_dump())
         if self.material.substance is not None:  # of which the figures are
             content += self.material.substance
         return content_hash(content)

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, NamedTuple, Protocol, cast, runtime_checka
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.picture_frame import Pictures
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
@@ -103,6 +104,7 @@ class IdentifiedForce(NamedTuple):
     shares: Mapping[str, float] = {}
     advice: str = ""  #: A sentence on the largest share, and on what would narrow the interval
     contact: Literal["cylinder", "patch"] = "patch"  #: What presses in the model of the finger
+    learned: Learned | None = None  #: What the markers, and those of earlier pictures, say of the finger
 
     def phrase(self, depth: float | None = None) -> str:
         """Forces and place with their intervals in words: in N for a finger of a depth, mm, else in N/mm."""

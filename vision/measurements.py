@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from pinnray.geometry.finger.parameters import value_and_deviation
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import FIXED, HAND_HELD, Registration
 from pinnray.runtime.arrays import FloatArray
@@ -31,7 +32,7 @@ SMALLEST_DISTANCE = 1e-3
 LARGEST = 1e6
 """Size of a coordinate or displacement that cannot be of a finger, mm."""
 SIMULATED_MARK, SOLID = "# simulated", " in three dimensions"
-SOURCE_MARK = "# source: "
+SOURCE_MARK, WEIGHED_MARK = "# source: ", "# weighed: "
 PICTURES = {"pressed": "# pressed picture: ", "drawn": "# picture at rest: "}
 """Marks of the comments that say how well the pictures' frames are known."""
 
@@ -45,6 +46,9 @@ def write_measurements(path: Path, observations: Observations) -> None:
         if observations.simulated:
             file.write(f"{SIMULATED_MARK}{SOLID if observations.solid else ''}\n")
         file.write(f"{SOURCE_MARK}{' '.join(observations.source.split())}\n")
+        if observations.weighed is not None:
+            force, deviation = observations.weighed
+            file.write(f"{WEIGHED_MARK}{force!r} ± {deviation!r} N\n")
         for picture, mark in PICTURES.items():
             known = getattr(observations, picture)
             if known != _unsaid(observations.simulated, observations.standard_deviations)[picture]:
@@ -73,6 +77,7 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
 
     Comment lines start with `#`. `# source: TEXT` names the origin of the numbers. `# simulated` means that
     no camera was involved and the finger is in plane strain, unless `in three dimensions` follows.
+    `# weighed: 2.62 ± 0.05 N` is the force along the stroke that a scale showed in the pressed picture.
     `# pressed picture: TEXT` says how well the pressed picture's frame is known in that at rest, and `#
     picture at rest: TEXT` how well that one's is in the drawing, in words of `Registration.parse`. Where
     nothing is said they are fixed, but a pressed picture is `HAND_HELD` whose points were `CLICKED`.
@@ -86,6 +91,7 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
     marks = [re.fullmatch(rf"#\s*simulated({SOLID})?", comment, re.I) for comment in table.comments]
     simulated, solid = any(marks), any(mark and mark[1] for mark in marks)
     known = {picture: said[0] for picture, mark in PICTURES.items() if (said := _said(table.comments, mark))}
+    weighed = _said(table.comments, WEIGHED_MARK)
     return measurements_of(
         [(f"line {line}", cells) for line, cells in table.rows],
         marker_radius=marker_radius,
@@ -93,6 +99,7 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
         source=sources[0] if sources else f"measurements from {path.name}",
         simulated=simulated,
         solid=solid,
+        weighed=weighed[0] if weighed else None,
         pictures=known,
     )
 
@@ -105,6 +112,7 @@ def measurements_of(
     source: str,
     simulated: bool = False,
     solid: bool = False,
+    weighed: str | None = None,
     pictures: Mapping[str, str] = MappingProxyType({}),
 ) -> Observations:
     """Observations from a table; columns and defaults as in `read_measurements`.
@@ -116,6 +124,7 @@ def measurements_of(
         source: One sentence on the origin of the numbers.
         simulated: True if no camera was involved.
         solid: See `Observations`.
+        weighed: Force that a scale showed, in words of `parse_weighed`.
         pictures: How well the frames of the pictures of `PICTURES` are known, in words.
 
     Raises:
@@ -141,6 +150,7 @@ def measurements_of(
     try:
         known = _unsaid(simulated, deviations)
         known |= {picture: Registration.parse(said) for picture, said in pictures.items()}
+        force = None if weighed is None else parse_weighed(weighed)
         return Observations(
             points=np.column_stack([columns["x_mm"], columns["y_mm"]]),
             displacements=np.column_stack([columns["u_mm"], columns["v_mm"]]),
@@ -149,11 +159,26 @@ def measurements_of(
             source=source,
             simulated=simulated,
             solid=solid,
+            weighed=force,
             marker_radius=marker_radius,
-            **known,
+            pressed=known["pressed"],
+            drawn=known["drawn"],
         )
     except UserError as error:
         raise UserError(f"{table}: {error}") from None
+
+
+def parse_weighed(text: str) -> tuple[float, float]:
+    """A force and its standard deviation, N, out of a text such as `2.62±0.05` or `2.62 ± 0.05 N`.
+
+    Raises:
+        UserError: If it is none.
+    """
+    value, deviation = value_and_deviation(text.strip().removesuffix("N"))
+    force = read_number(value), read_number(deviation)
+    if not (np.isfinite(force).all() and force[1] > 0):
+        raise UserError(f"weighed {text!r}: give a force and its standard deviation, N, such as 2.62±0.05")
+    return force
 
 
 def _unsaid(simulated: bool, deviations: FloatArray) -> dict[str, Registration]:

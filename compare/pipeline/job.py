@@ -10,12 +10,14 @@ from pinnray.comparison.evaluation.truths import SLIDING, TRUTHS, Truth, check_t
 from pinnray.comparison.figures import Picture, check_formats, page_width
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.content_hash import has_source
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.fem.adaptive_refinement import check_adaptable
+from pinnray.solvers.identification.settings import IdentifyingSolver
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, check_law, check_name
 from pinnray.vision.measurements import read_measurements
@@ -56,6 +58,10 @@ class Job:
     load: Load = field(default_factory=Load)  #: Motion of the indenter.
     #: Marker displacements, their CSV file, or a source such as a film; simulated if None.
     measurements: Observations | Path | MarkerSource | None = None
+    weighed: tuple[float, float] | None = None  #: Force of the measurements by a scale, its deviation, N.
+    presses: Sequence[Observations | Path] = ()  #: Other pictures of the finger, which `fem-id` learns from.
+    learned: Learned | None = None  #: What earlier pictures have taught of the finger.
+    learn: Path | None = None  #: Design file to write with what the pictures have taught.
     truth: str | None = None  #: Key of `TRUTHS` to simulate where nothing is measured; None: `sliding`.
     reference: str | None = None  #: Solver to compare the others with; `fem`, else the first, if None.
     out: Path = Path("out/default")  #: Output folder.
@@ -97,10 +103,24 @@ def prepared(job: Job) -> Job:
             raise UserError("a truth is for a simulated experiment; with measurements leave it out")
         check_truths([job.truth], job.design)
     check_walls(job.simulated)
-    if isinstance(job.measurements, Path):
-        radius = job.design.marker_radius
-        return replace(job, measurements=read_measurements(job.measurements, marker_radius=radius))
-    return job
+    if job.presses and job.measurements is None:
+        raise UserError("presses are other pictures of a measured finger; give measurements, too")
+    if job.learn is not None and job.learn.suffix != ".toml":
+        raise UserError(f"learn {job.learn}: give the name of a design file, such as my-finger.toml")
+    radius, measured = job.design.marker_radius, job.measurements
+    if isinstance(measured, Path):
+        measured = read_measurements(measured, marker_radius=radius)
+    if job.weighed is not None:
+        if not isinstance(measured, Observations):
+            raise UserError(
+                "a force was weighed with a picture whose markers are known: give their table, too"
+            )
+        measured = replace(measured, weighed=job.weighed)
+    presses = [
+        read_measurements(each, marker_radius=radius) if isinstance(each, Path) else each
+        for each in job.presses
+    ]
+    return replace(job, measurements=measured, presses=presses)
 
 
 def checked(job: Job) -> Job:
@@ -124,6 +144,8 @@ def checked(job: Job) -> Job:
                 f"solver {solver.name} has no source file, so that an edit of its class cannot be told; do "
                 "not resume, or move the class from the notebook or shell into a module"
             )
+    if job.learn is not None and not any(isinstance(each, IdentifyingSolver) for each in job.solvers):
+        raise UserError("learn takes what fem-id or pinn-id finds of the finger; name one of them")
     check_law(job.solvers, job.material)
     supported_solvers(job.solvers, job.spare, job.material, job.load)
     return job if job.measurements else replace(job, load=job.simulated.reached(job.load))

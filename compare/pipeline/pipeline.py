@@ -22,6 +22,9 @@ from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
 from pinnray.comparison.pipeline.solving import ERRORS, solve_all
 from pinnray.comparison.report.comparison import Comparison
 from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
+from pinnray.geometry.drawing.drawn_finger import finger_lines
+from pinnray.geometry.finger.finger import Finger
+from pinnray.geometry.finger.learned import write_learned
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.content_hash import file_digest
 from pinnray.runtime.errors import UserError
@@ -29,7 +32,9 @@ from pinnray.runtime.machine import package_versions
 from pinnray.runtime.output_folder import check_output, replaced_folder, write_run
 from pinnray.runtime.processes.pool import Pool
 from pinnray.runtime.stages import Stages
+from pinnray.solvers.identification.settings import taught
 from pinnray.solvers.problem import Problem
+from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solver import Solver, Traits
 from pinnray.vision.measurements import write_measurements
 
@@ -87,7 +92,12 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
         solvers=solvers,
         check=partial(check_positions, given) if given else None,
     )
-    problem = Problem(mesh, job.material, job.load, finger=job.design)
+    problem = Problem(mesh, job.material, job.load, finger=job.design, learned=job.learned)
+    if presses := [each for each in job.presses if isinstance(each, Observations)]:
+        with stages.stage("presses") as progress:
+            for each in presses:
+                check_positions(each, mesh)
+            problem = replace(problem, learned=taught(make_solver("fem-id"), problem, presses, progress))
     with stages.stage("measurements") as progress:
         observations, truth, remarks = given, None, displacement_remarks(given, problem) if given else []
         if observations is None:
@@ -173,6 +183,8 @@ def _write(
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
     comparison.scores.write(folder)
+    if job.learn is not None:
+        _write_learned(job.learn, job.design, comparison)
     with stages.stage("fields"):
         for evaluation in comparison.shown_fields:
             write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
@@ -191,6 +203,14 @@ def _write(
         write_run(folder, record)
 
 
+def _write_learned(path: Path, finger: Finger, comparison: Results) -> None:
+    """Write the design file of a finger with what the first solver that identified it has learned."""
+    found = [own.learned for each in comparison.evaluations if (own := each.identified) and own.learned]
+    if not found:
+        raise UserError(f"learn {path}: no solver has identified the finger; nothing was learned")
+    write_learned(path, found[0], finger_lines(finger))
+
+
 def _provenance(folder: Path, job: Job, comparison: Results, stages: Stages) -> dict[str, Any]:
     """Times, and the causes of the numbers: hashes, settings, seeds, devices, versions, machine."""
     adaptation, settings = comparison.adaptation, comparison.settings
@@ -204,6 +224,7 @@ def _provenance(folder: Path, job: Job, comparison: Results, stages: Stages) -> 
         "adapt": adaptation and {"tolerance_mm": adaptation.tolerance, "end": adaptation.message},
         "material": job.material.model_dump(),
         "load": job.load.model_dump(),
+        "learned": job.learned and job.learned.model_dump(),
         "measurements_sha256": file_digest(folder / "observations.csv"),
         "film": job.measurements.provenance() if isinstance(job.measurements, MarkerSource) else None,
         "solvers": settings,

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
+from pinnray.geometry.finger.learned import TABLE
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_toml
@@ -109,6 +110,7 @@ def load_description(path: Path | None, lines: Sequence[str] = ()) -> Descriptio
     values: dict[str, Any] = {}
     if path is not None:
         values = read_toml(path, "description")
+        values.pop(TABLE, None)  # for `read_learned`
     for text in lines:
         try:
             values |= tomllib.loads(text)

@@ -254,6 +254,11 @@ def description_lines(finger: Finger) -> str:
     return "\n".join([*lines, ""])
 
 
+def finger_lines(finger: Finger) -> str:
+    """The lines of the file that a finger is read from: a design's parameters, or a drawing's description."""
+    return finger.lines() if isinstance(finger, Design) else description_lines(finger)
+
+
 def finger_from(definition: Mapping[str, Any]) -> Finger:
     """The finger that `Finger.definition` describes.
 

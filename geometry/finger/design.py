@@ -1,5 +1,6 @@
 """A finger from parameters that obey every rule."""
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,6 +61,11 @@ class Design(Parameters):
     def definition(self) -> dict[str, Any]:
         """Every parameter by name."""
         return self.model_dump()
+
+    def lines(self) -> str:
+        """Every parameter that differs from its default, as the lines of a design file."""
+        own = self.model_dump(exclude_defaults=True, exclude_none=True) | {"name": self.name}
+        return "".join(f"{name} = {json.dumps(value)}\n" for name, value in own.items())
 
     def facts(self) -> list[tuple[str, str, str]]:
         """Meaning, symbol of the paper and value with unit; without zeros that the paper does not have."""

@@ -179,6 +179,12 @@ class Parameters(CheckedModel):
         return content_hash(values)
 
 
+def value_and_deviation(text: str) -> tuple[str, str]:
+    """A measured value and its standard deviation out of `11.4±1.2` or `11.4+-1.2`; empty without one."""
+    value, _, deviation = text.replace("+/-", "±").replace("+-", "±").partition("±")
+    return value.strip(), deviation.strip()
+
+
 def parameter_info(
     name: str, key: Literal["unit", "symbol", "low", "high"], model: type[BaseModel] = Parameters
 ) -> Any:

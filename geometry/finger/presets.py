@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pinnray.geometry.finger.design import Design
+from pinnray.geometry.finger.learned import TABLE
 from pinnray.geometry.finger.parameters import (
     SYMBOLS,
     Parameters,
@@ -47,6 +48,7 @@ def load_design(
         raise UserError(f"{with_symbol(twice[0])} is given twice; give it once")
     path = _path_of(name_or_path)
     values = by_parameter_name(read_toml(path, "design file"))
+    values.pop(TABLE, None)  # for `read_learned`
     changes = by_parameter_name({**(overrides or {}), **parameters})
     try:
         return Design(**{"name": path.stem, **values, **changes})

@@ -22,6 +22,7 @@ from pinnray.solvers.material import Material
 if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported when they are read
     from pinnray.geometry.finger.design import Design
     from pinnray.geometry.finger.finger import Finger
+    from pinnray.geometry.finger.learned import Learned
     from pinnray.geometry.mesh.settings import MeshSettings
     from pinnray.solvers.load import Load
     from pinnray.solvers.solver import Solver
@@ -29,6 +30,7 @@ if TYPE_CHECKING:  # `--help` has to be quick: what options describe is imported
 
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
+MEASURED = Group("Measured finger", sort_key=2, default_parameter=Parameter(show_default=False))
 TRAINING = Group("Solvers' settings", sort_key=3)
 OUTPUT = Group("Output", sort_key=4, default_parameter=Parameter(negative="", show_default=False))
 
@@ -87,6 +89,15 @@ class FingerOptions(CheckedModel):
                 raise UserError(f"--mesh-{error}") from None
         finger = self._designed() if self.section is None else self._drawn(self.section)
         return finger, mesh_sizes(finger, asked, usual)
+
+    def learned(self) -> "Learned | None":
+        """What the files that describe the finger say that pictures have taught of it."""
+        from pinnray.geometry.finger.learned import read_learned
+
+        found = [
+            learned for file in self.files() if file.suffix == ".toml" and (learned := read_learned(file))
+        ]
+        return found[0] if found else None
 
     def files(self) -> list[Path]:
         """The files that describe the finger."""
@@ -162,6 +173,10 @@ def _changed_name(design: "Design", changes: Mapping[str, object]) -> str:
 class MaterialOptions(Material):
     """Elastic constants, or the name of a material that has them."""
 
+    young: float | str = Field(  # type: ignore[assignment]
+        default=11.4, description="Young's modulus [MPa]; 11.4±1.2 is known to a standard deviation of 1.2"
+    )
+
     material: str | None = Field(
         default=None,
         description="Name of a filament or silicone, whose modulus and Poisson's ratio are taken unless they "
@@ -184,7 +199,7 @@ class MaterialOptions(Material):
 
 
 @Parameter(name="*", group=PHYSICS, negative="")
-class PhysicsOptions(Physics, MaterialOptions):
+class PhysicsOptions(MaterialOptions, Physics):
     """Material and load."""
 
     def read(self, preset: str | None = None, usual_load: LoadKind | None = None) -> "tuple[Material, Load]":
@@ -197,6 +212,31 @@ class PhysicsOptions(Physics, MaterialOptions):
 
         usual = {"load": usual_load or job_defaults(preset).load} | self._usual
         return usual | self.model_dump(exclude_unset=True, exclude={"material"})
+
+
+@Parameter(
+    name="*", group=Group("Measured finger", sort_key=2, default_parameter=Parameter(show_default=False))
+)
+class PressOptions(CheckedModel):
+    """Other pictures of the finger, and what they teach of it.
+
+    Attributes:
+        presses: Other pictures of the same finger under the same contact, CSV files with commas between them;
+            what they say of walls, clamp and modulus, fem-id takes into its fit. One that was weighed has a
+            line `# weighed: 2.62 ± 0.05 N`.
+        weighed: Force along the stroke that a scale showed in the picture that is measured, such as
+            2.62±0.05, N.
+        learn: Design file to write, .toml, with what all pictures say of the finger; --design takes it.
+    """
+
+    presses: str = ""
+    weighed: str | None = None
+    learn: Path | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """The files of the other pictures."""
+        return [Path(name) for name in comma_list(self.presses)]
 
 
 @Parameter(name="*", group=TRAINING)

@@ -1,9 +1,10 @@
 """A fit of the unknowns under one law, with its evidence, force and place.
 
 The evidence of a law is Laplace's approximation of the integral of likelihood times prior: with the
-residuals r over φ σ, the sensitivities A and the standardised values z of `Estimate`, for n observations
+residuals r over φ σ, the sensitivities A and the standardised values z of `Estimate`, whose prior has the
+mean m and the precision P, for n observations
 
-    log Z = -n log φ - (r . r + z . z) / 2 - log det(A^T A + 1) / 2
+    log Z = -n log φ - (r . r + (z - m) . P (z - m)) / 2 - log det(A^T A + P) / 2 + log det P / 2
 
 Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
 """
@@ -13,6 +14,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
+from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.boundary import mean_thickness
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
@@ -22,6 +24,7 @@ from pinnray.solvers.identification.unknowns import (
     CONTACT,
     CONTACT_ODDS,
     CYLINDER,
+    FINGER,
     INDENTATION,
     LAW_ODDS,
     SHARE,
@@ -36,6 +39,9 @@ SOURCES = {
     "markers": "the errors of the markers: film nearer or sharper, or use more markers",
     "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
     "contact": "place, width and pressure of the contact: put markers nearer to it",
+    "corners": "the roundings of the cavities' corners, which the drawing leaves out: draw them "
+    "(fillet_radius)",
+    "modulus": "Young's modulus: weigh one press, or test a printed strip",
     "finger": "walls, clamp and Poisson's ratio: measure the walls, and leave those that are as drawn out of "
     "the parameters",
     "frames": "the frames of the pictures: show fiducials, and fix the camera",
@@ -85,10 +91,9 @@ class Fit(NamedTuple):
         """Logarithm of the evidence, up to a constant that all laws share."""
         found = self.estimate
         a, r = found.sensitivities[found.kept], found.residuals[found.kept]
-        _, volume = np.linalg.slogdet(a.T @ a + np.eye(a.shape[1]))
-        misfit = float(r @ r + found.z @ found.z)
+        misfit = float(r @ r) + found.prior.misfit(found.z)
         wrong = float(self.measurement.errors.log_odds[self.doubted].sum())
-        return wrong - len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
+        return wrong - len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + found.prior.log_volume(a))
 
     @property
     def doubted(self) -> IntArray:
@@ -145,8 +150,9 @@ class Fit(NamedTuple):
     def variances(self, direction: FloatArray) -> dict[str, float]:
         """Variance of that component, (N/mm)^2, by what it comes from: names of `SOURCES`.
 
-        With the estimate's error C A^T e - C p, for unit errors e of the observations and p of the priors, it
-        is the sum of independent parts. Where φ is above one, all but 1 / φ^2 of the observations' is misfit.
+        With the estimate's error C A^T e - C R^T p, for unit errors e of the observations and p of the prior,
+        it is the sum of independent parts; of unknowns that are known together each has its share. Where φ is
+        above one, all but 1 / φ^2 of the observations' is misfit.
         """
         found, unknowns = self.estimate, self.model.unknowns
         slopes = self.response.force_slopes @ direction * found.slopes
@@ -156,12 +162,38 @@ class Fit(NamedTuple):
         value = float(self.response.force @ direction)
         parts = dict.fromkeys(SOURCES, 0.0)
         parts["third dimension"] = (self.model.doubt.force * value) ** 2
+        parts["corners"] = (self.model.doubt.corners * value) ** 2
         parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
-        for name, part in zip(unknowns.names, spread.tolist(), strict=True):
+        shares = spread * (found.prior.precision @ spread)
+        for name, part in zip(unknowns.names, shares.tolist(), strict=True):
             contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
             frame = name.startswith(("pressed", "drawn"))
-            parts["contact" if contact else "frames" if frame else "finger"] += part**2
+            finger = "modulus" if name == "young" else "finger"
+            parts["contact" if contact else "frames" if frame else finger] += part
         return parts
+
+    @property
+    def learned(self) -> Learned | None:
+        """What the markers, and those of earlier pictures, say of the finger; None if it has no unknowns."""
+        found, problem = self.estimate, self.model.unknowns.problem
+        before, seen = problem.learned, problem.observations
+        rows = [row for row, name in enumerate(self.model.unknowns.names) if name in FINGER]
+        if not rows:
+            return before
+        own = [found.parameters[row] for row in rows]
+        covariance = found.covariance[np.ix_(rows, rows)] * (found.quantile / NORMAL) ** 2
+        deviation = np.sqrt(np.diagonal(covariance))
+        middle, scale = np.array([(each.middle, each.scale) for each in own]).T
+        return Learned(
+            pictures=1 + (before.pictures if before else 0),
+            weighed=int(bool(seen and seen.weighed)) + (before.weighed if before else 0),
+            unknowns=tuple(each.name for each in own),
+            mean=(middle + scale * found.z[rows]).tolist(),
+            deviation=(scale * deviation).tolist(),
+            drawn_mean=middle.tolist(),
+            drawn_deviation=scale.tolist(),
+            correlation=(covariance / np.outer(deviation, deviation)).tolist(),
+        )
 
 
 def component_of(
@@ -173,7 +205,8 @@ def component_of(
     """
     component = float(response.force @ direction)
     spread = response.force_slopes @ direction @ errors
-    return component, float(np.hypot(np.linalg.norm(spread), model.doubt.force * component))
+    doubt = np.hypot(model.doubt.force, model.doubt.corners) * component
+    return component, float(np.hypot(np.linalg.norm(spread), doubt))
 
 
 def place_of(unknowns: Unknowns, response: Response, errors: FloatArray) -> tuple[float, float]:

@@ -6,7 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.assimilation.estimation import Parameter, Prediction, estimate, values_of
+from pinnray.solvers.assimilation.estimation import (
+    MAX_ROUNDS,
+    Parameter,
+    Prediction,
+    Prior,
+    estimate,
+    values_of,
+)
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import EXACT, MarkerData, MarkerModel, Response, ResponseModel
@@ -25,14 +32,19 @@ class LawFits:
 
     Args:
         model: The finger by a law.
-        parameters: The unknowns, whose priors the laws share.
+        parameters: The unknowns, which the laws share.
+        prior: Of their standardised values.
         cost_change: Relative change of the cost below which a search has converged.
     """
 
     def __init__(
-        self, model: Callable[[LawName], ResponseModel], parameters: Sequence[Parameter], cost_change: float
+        self,
+        model: Callable[[LawName], ResponseModel],
+        parameters: Sequence[Parameter],
+        prior: Prior,
+        cost_change: float,
     ) -> None:
-        self._model, self.parameters, self._cost_change = model, parameters, cost_change
+        self._model, self.parameters, self.prior, self._cost_change = model, parameters, prior, cost_change
         self._names = [parameter.name for parameter in parameters]
         self.progress: Progress = silent
 
@@ -47,6 +59,7 @@ class LawFits:
             self.parameters,
             fit.estimate.z,
             measurement.errors,
+            prior=self.prior,
         )
         return fit._replace(
             estimate=found, response=fit.model.extrapolated(about, found.values), measurement=measurement
@@ -59,9 +72,9 @@ class LawFits:
         near: Fit | FloatArray,
         *,
         held: Sequence[str] = (),
-        **limits: int,
+        rounds: int = MAX_ROUNDS,
     ) -> Fit:
-        """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`.
+        """The fit of a law from another fit or from standardised values (p,), in some rounds of `estimate`.
 
         The values are at rest: the indentation that a linear finger would need is added. What is `held`
         stays, and its value in the fit is zero.
@@ -92,10 +105,11 @@ class LawFits:
                 kept = near.estimate.kept
         else:
             start = self._pressed(model, markers, near)
-        parameters = self.parameters
+        parameters, prior = self.parameters, self.prior
         if held:
-            parameters = self._holding(held, start)
-            start = np.where(np.isin(self._names, held), 0.0, start)
+            still = np.isin(self._names, held)
+            parameters, prior = self._holding(held, start), prior.apart(still)
+            start = np.where(still, 0.0, start)
         first, lost, reached = model.evaluations + 1, list[FloatArray](), dict[bytes, Response]()
         nothing = NoSolutionError(
             f"no equilibrium of the {law} law was found near the markers, from rest or from where a linear "
@@ -109,8 +123,9 @@ class LawFits:
             start,
             measurement.errors,
             kept,
+            prior=prior,
             cost_change=self._cost_change,
-            **limits,
+            rounds=rounds,
         )
         if (rough := reached.get(found.values.tobytes())) is None:
             raise nothing

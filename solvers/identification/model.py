@@ -22,7 +22,6 @@ from math import log
 
 import numpy as np
 
-from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
@@ -33,7 +32,9 @@ from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
 from pinnray.solvers.identification.front_contact import Stage
-from pinnray.solvers.identification.unknowns import RESOLVED, Doubt, Hypothesis, Unknowns
+from pinnray.solvers.identification.unknowns import Doubt, Hypothesis, Unknowns
+from pinnray.solvers.problem import Problem
+from pinnray.solvers.solution import stroke_axes
 from pinnray.solvers.solver import NoSolutionError
 
 MAX_ITERATIONS, HALVINGS = 8, 4
@@ -75,7 +76,7 @@ class ResponseModel:
 
     def __init__(self, body: Body, unknowns: Unknowns, *, weighed: bool = False) -> None:
         self.body, self.unknowns = body, unknowns
-        self.doubt = RESOLVED if weighed else Doubt.of_the_plane(unknowns.problem)
+        self.doubt = Doubt.of(unknowns.problem, weighed=weighed)
         self._clamp = Clamp(unknowns.problem.mesh)
         self._last: Response | None = None
         self._marker_rows: dict[tuple[bytes, float], tuple[FloatArray, FloatArray]] = {}
@@ -313,33 +314,33 @@ class ResponseModel:
 
 @dataclass(frozen=True, eq=False)
 class MarkerData:
-    """Displacements of m markers and, if known, the force."""
+    """Displacements of m markers and, if it was weighed, the force."""
 
     points: FloatArray  # Markers at rest, shape (m, 2), mm
     displacements: FloatArray  # Shape (m, 2), mm
     deviations: FloatArray  # Their standard deviations, shape (m, 2), mm
     radius: float  # Of the discs over which the displacement is averaged, mm
-    # Force of the indenter along y per depth, with its standard deviation, N/mm
-    reaction: tuple[float, float] | None = None
+    # Force of the indenter along its stroke per depth, with its standard deviation, N/mm
+    force: tuple[float, float] | None = None
 
     @classmethod
-    def of(
-        cls,
-        mesh: TriangleMesh,
-        observations: Observations,
-        radius: float | None,
-        reaction: tuple[float, float] | None,
-    ) -> "MarkerData":
+    def of(cls, problem: Problem, observations: Observations, radius: float | None) -> "MarkerData":
         """All markers that were seen; see `MarkerSettings.marker_radius` for the radius, mm."""
-        points = observations.points[observations.visible]
+        points, force = observations.points[observations.visible], observations.weighed
         if not len(points):
             raise UserError("there are no markers to find a force by")
+        if force is not None:
+            if problem.finger is None:
+                raise UserError(
+                    "a weighed force is that of a finger with a depth: give the problem its finger"
+                )
+            force = force[0] / problem.finger.depth, force[1] / problem.finger.depth
         return cls(
             points,
             observations.displacements[observations.visible],
             standard_deviations(observations),
-            radius_within(mesh, points, observations.marker_radius if radius is None else radius),
-            reaction,
+            radius_within(problem.mesh, points, observations.marker_radius if radius is None else radius),
+            force,
         )
 
     @property
@@ -350,13 +351,13 @@ class MarkerData:
 
     @property
     def observed(self) -> FloatArray:
-        """Displacements u v u v ..., then the reaction if there is one."""
-        return np.append(self.displacements.ravel(), self.reaction[:1] if self.reaction else [])
+        """Displacements u v u v ..., then the force if it was weighed."""
+        return np.append(self.displacements.ravel(), self.force[:1] if self.force else [])
 
     @property
     def noise(self) -> FloatArray:
         """Standard deviations of `observed`."""
-        return np.append(self.deviations.ravel(), self.reaction[1:] if self.reaction else [])
+        return np.append(self.deviations.ravel(), self.force[1:] if self.force else [])
 
 
 class MarkerModel:
@@ -395,6 +396,9 @@ class MarkerModel:
         seen_slopes += np.tensordot(by.pressed, pressed.slopes(seen), axes=1)
         moved, moved_slopes = pressed.moved(seen) - points, seen_slopes
         values, derivatives = moved.ravel(), moved_slopes.reshape(len(moved_slopes), -1).T
-        if self.measurement.reaction is None:
+        if self.measurement.force is None:
             return values, derivatives
-        return np.append(values, response.force[1]), np.vstack([derivatives, response.force_slopes[:, 1]])
+        stroke, _ = stroke_axes(self.unknowns.problem.load)
+        return np.append(values, response.force @ stroke), np.vstack(
+            [derivatives, response.force_slopes @ stroke]
+        )

@@ -75,6 +75,7 @@ class Identified:
             shares,
             f"{100 * share:.0f} % of the variance of the force comes from {SOURCES[first]}.",
             self.best.contact,
+            self.best.learned,
         )
 
     def _cylinder(self) -> float | None:

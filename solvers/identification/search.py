@@ -41,7 +41,7 @@ class Identifier:
     """Finds the unknowns of one finger for any observations; each search starts from the last result.
 
     Args:
-        settings: Unknowns, priors, radius of the markers and reaction.
+        settings: Unknowns, priors and radius of the markers.
         problem: The finger; of its load the drawn contact and a cylinder count, of its law nothing unless
             it is given.
         body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
@@ -62,7 +62,7 @@ class Identifier:
         flexibility: float | None = None,
         weighed: bool = False,
     ) -> None:
-        self._settings, self._mesh = settings, problem.mesh
+        self._settings, self._problem = settings, problem
         sought = settings.unknowns if names is None else names
         names = [INDENTATION if name == "normal_force" else name for name in sought]
 
@@ -78,15 +78,16 @@ class Identifier:
         unknowns = Unknowns(problem, names)
         self._names, self._feet = unknowns.names, unknowns.feet.names
         self.parameters = unknowns.parameters(self.flexibility, settings.prior)
-        self._fits = LawFits(model, self.parameters, cost_change)
+        self._fits = LawFits(model, self.parameters, unknowns.prior(self.parameters), cost_change)
         self._known: dict[LawName, Fit] = {}
 
     def measurement(self, observations: Observations) -> MarkerData:
-        """The markers that were seen and, if the settings have one, the reaction."""
-        chosen, reaction = self._settings, None
-        if chosen.reaction is not None:
-            reaction = chosen.reaction, chosen.reaction_error * abs(chosen.reaction)
-        return MarkerData.of(self._mesh, observations, chosen.marker_radius, reaction)
+        """The markers that were seen and, if it was weighed, the force.
+
+        Raises:
+            UserError: If none was seen, or a force was weighed and the finger has no depth.
+        """
+        return MarkerData.of(self._problem, observations, self._settings.marker_radius)
 
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
         """The unknowns under every law, and the laws' probabilities.
@@ -116,11 +117,11 @@ class Identifier:
         cylinder is known nearly.
         """
         if INDENTATION not in self._names:
-            return self._fits.fit(law, measurement, np.zeros(len(self._names)))
+            return self._fits.fit(law, measurement, self._fits.prior.mean)
         best: Fit | None = None
         for position, width in STARTS:
             contact = {"position": position, "width": width}
-            start = np.array([contact.get(name, 0.0) for name in self._names])
+            start = self._fits.prior.mean + np.array([contact.get(name, 0.0) for name in self._names])
             try:
                 fit = self._fits.fit(law, measurement, start, held=self._feet, rounds=ROUNDS)
             except NoSolutionError as error:

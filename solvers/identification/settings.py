@@ -1,16 +1,17 @@
 """Settings of the solvers that identify contact, walls and law from the markers."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-import numpy as np
-
+from pinnray.geometry.finger.learned import Learned
+from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.identification.transfer import transferred
 from pinnray.solvers.identification.unknowns import CONTACT, CYLINDER, DEFAULT, parse_unknowns
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
-from pinnray.solvers.solver import FieldSettings
+from pinnray.solvers.solver import FieldSettings, Progress, Solver, silent, with_law
 
 LawChoice = Literal["evidence", "given"]
 
@@ -20,12 +21,10 @@ class IdentifyingSolver(FieldSettings):
     """A solver that identifies contact, walls and law.
 
     Attributes:
-        parameters: Names of the unknowns, with commas between them, of `sought` and `young`; empty for all of
-            `sought`.
+        parameters: Names of the unknowns, with commas between them, of `sought`; empty for all of them.
+            Young's modulus is one, too, where it is not known exactly.
         law: "evidence": the law of finite strain with the largest evidence; "given": the problem's.
         prior: Factor of the parameters' prior standard deviations.
-        reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
-        reaction_error: Standard deviation of the reaction over its size.
         marker_radius: Radius of the discs over which the displacement is averaged, mm; None: the
             observations' own; zero: the markers' centres alone.
     """
@@ -33,23 +32,12 @@ class IdentifyingSolver(FieldSettings):
     parameters: str = ""
     law: LawChoice = "evidence"
     prior: float = 1.0
-    reaction: float | None = None
-    reaction_error: float = 0.02
     marker_radius: float | None = None
     sought: ClassVar[tuple[str, ...]] = DEFAULT
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if "young" in self.unknowns and self.reaction is None:
-            raise UserError(
-                f"{self.name} cannot find young from displacements alone: forces and stresses are in "
-                "proportion to it; give reaction=, N/mm"
-            )
-        self.check_positive("prior", "reaction_error")
-        if self.reaction is not None and not (np.isfinite(self.reaction) and self.reaction):
-            raise UserError(
-                f"{self.name}: the reaction must be a force other than zero, N/mm, got {self.reaction}"
-            )
+        self.check_positive("prior")
         self.check_not_negative("marker_radius")
 
     def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
@@ -66,3 +54,24 @@ class IdentifyingSolver(FieldSettings):
         """Those with the unknowns of a cylinder in place of a patch's, of which the place may be none."""
         own = (name for name in CYLINDER if name not in CONTACT or name in self.unknowns)
         return *own, *(name for name in self.unknowns if name not in CONTACT)
+
+
+def taught(
+    solver: Solver, problem: Problem, presses: Sequence[Observations], progress: Progress = silent
+) -> Learned | None:
+    """What pictures of a problem's finger teach a solver that identifies it, one after another.
+
+    Each is fitted with what those before it have taught: as one fit of all of them, to first order.
+
+    Raises:
+        UserError: If a picture cannot be fitted.
+    """
+    learned, material = problem.learned, with_law(problem.material, solver)
+    for number, press in enumerate(presses):
+        progress(number / len(presses), press.source)
+        own = replace(problem, observations=press, learned=learned, material=material)
+        found = solver.solve(own, silent)
+        if not found.status.converged or found.identified is None:
+            raise UserError(f"{press.source}: {found.status.message}")
+        learned = found.identified.learned
+    return learned

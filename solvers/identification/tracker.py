@@ -21,7 +21,7 @@ from scipy.optimize import lsq_linear
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.estimation import degrees_of_freedom, inflation_of, quantile_of, values_of
+from pinnray.solvers.assimilation.estimation import Prior, inflation_of, quantile_of, values_of
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
 from pinnray.solvers.identification.fit import NORMAL, component_of, place_of
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
@@ -64,13 +64,6 @@ class _Linearised(NamedTuple):
     response: Response  # The equilibrium
 
 
-class _Prior(NamedTuple):
-    """Mean, shape (p,), and precision, (p, p), of z."""
-
-    mean: FloatArray
-    precision: FloatArray
-
-
 class _Posterior(NamedTuple):
     """Estimate of z, shape (p,), its covariance, φ, half an interval over its deviation."""
 
@@ -101,7 +94,7 @@ class ForceTracker:
         measurement = MarkerData(points, still, still, inside)
         self._markers = MarkerModel(model, measurement)
         self._of_finger = ~np.isin(names, (*CONTACT, SHARE, *model.unknowns.feet.names))
-        self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
+        self._drawn = model.unknowns.prior(self._parameters)
         self._known, self._learnt = self._drawn, 0
         self._largest = 0.0  # root mean square motion of the markers, mm
         rest = self._linearised(np.zeros(len(names)))
@@ -147,7 +140,7 @@ class ForceTracker:
         return self._reading(found, "; ".join(remarks))
 
     def _searched(
-        self, prior: _Prior, rows: BoolArray, observed: FloatArray, noise: FloatArray
+        self, prior: Prior, rows: BoolArray, observed: FloatArray, noise: FloatArray
     ) -> _Posterior | None:
         """The estimate; None if no equilibrium is found near it."""
         for _ in range(17):  # equilibria: enough for a jump from rest by forty millimetres
@@ -169,16 +162,15 @@ class ForceTracker:
             self._evaluations += 1
         return None
 
-    def _posterior(self, prior: _Prior, slopes: FloatArray, residuals: FloatArray) -> _Posterior:
+    def _posterior(self, prior: Prior, slopes: FloatArray, residuals: FloatArray) -> _Posterior:
         """The minimum for residuals (n,) over σ at the last equilibrium and their derivatives (n, p)."""
-        root, inflation = np.linalg.cholesky(prior.precision).T, 1.0
-        spread = np.linalg.inv(root)
+        root, inflation = prior.root, 1.0
         observed = slopes @ self._last.z - residuals
         for _ in range(20):  # φ is known to a thousandth much earlier
             rows = np.vstack([slopes / inflation, root])
             right = np.concatenate([observed / inflation, root @ prior.mean])
             z = np.asarray(lsq_linear(rows, right, self._bounds, method="bvls").x)
-            freedom = degrees_of_freedom(slopes @ spread / inflation)
+            freedom = prior.freedom(slopes / inflation)
             used, inflation = inflation, inflation_of(slopes @ z - observed, freedom)
             if abs(inflation / used - 1) < 1e-3:
                 break
@@ -208,7 +200,7 @@ class ForceTracker:
             precision[finger] = np.linalg.inv(found.covariance[finger])
         else:
             mean = self._known.mean + (mean - self._known.mean) / self._learnt
-        self._known = _Prior(mean, precision)
+        self._known = Prior(mean, precision)
 
     def _reading(self, found: _Posterior, status: str) -> ForceReading:
         values, derivatives = values_of(self._parameters, found.z)

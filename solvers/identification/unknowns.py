@@ -12,7 +12,7 @@ from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.geometry.picture_frame import PARTS, Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.estimation import Parameter
+from pinnray.solvers.assimilation.estimation import Parameter, Prior
 from pinnray.solvers.assimilation.picture_frames import picture_parameters, pictures_of
 from pinnray.solvers.cylinder_contact import FRICTION_STEP, touching_centre
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
@@ -33,8 +33,10 @@ WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson", "feet")
 """What is found unless other names are given; the table of docs/how-to/force.md describes each. `feet` stands
 for all motions of `pinnray.solvers.identification.boundary.Feet`."""
-NAMES = (*DEFAULT, "young")
-"""Everything that can be found."""
+FINGER = (*WALLS, "base_compliance", "poisson", "young")
+"""Those that belong to the finger, and not to a picture of it."""
+LEAST_KNOWN = 0.3
+"""Standard deviation of the logarithm of a Young's modulus of which nothing is said: a third."""
 
 
 LAW_ODDS: Mapping[LawName, float] = {"neo-hookean": 150.0, "st-venant-kirchhoff": 1.0}
@@ -56,24 +58,34 @@ class Doubt(NamedTuple):
 
     force: float
     stress: float
+    corners: float = 0.0  # Of the force, for the roundings that a drawing leaves out
 
     @classmethod
-    def of_the_plane(cls, problem: Problem) -> "Doubt":
-        """Of plane strain alone, where markers are not known to be in it and the finger has a depth.
+    def of(cls, problem: Problem, *, weighed: bool) -> "Doubt":
+        """Of a finger and its markers, which may have weighed plane strain against free side faces.
 
-        Half of the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger
-        is in neither state.
+        Where they have not, are not known to be in plane strain and the finger has a depth, it is half of
+        the difference between the moduli E / (1 - ν²) of plane strain and E of plane stress: a finger is in
+        neither state.
         """
-        seen = problem.observations
-        if problem.finger is None or (seen is not None and seen.plane):
-            return RESOLVED
+        seen, finger = problem.observations, problem.finger
+        resolved = weighed or finger is None or (seen is not None and seen.plane)
         share = 0.5 * problem.material.poisson**2
-        return cls(share, share)
+        doubt = RESOLVED if resolved else cls(share, share)
+        if finger is None or seen is None or seen.simulated:
+            return doubt
+        if seen.weighed or (problem.learned and problem.learned.weighed):  # the modulus makes up for it
+            return RESOLVED
+        sharp = not any(np.any(loop.bulges) for loop in finger.section.cavities)
+        return doubt._replace(corners=CORNERS if sharp else 0.0)
 
 
 RESOLVED = Doubt(0.01, 0.05)
 """Where the markers tell plane strain from free side faces, or there are none: what elements of 1 mm and few
 functions of the depth leave on the default finger."""
+CORNERS = 0.03
+"""Where the cavities of a real finger are drawn with sharp corners: with roundings of 0.3 mm the force that
+the markers of a default finger tell is 3 % larger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +134,8 @@ class Unknowns:
     Args:
         problem: It has the values of everything else; its load only gives the drawn contact, or a cylinder
             and its way, and the friction, its observations how well the frames of their pictures are known.
-        names: Some of `DEFAULT`, and `young`; a finger without cavities has no walls to be found, a base in
-            one piece no feet.
+        names: Some of `DEFAULT`; a finger without cavities has no walls to be found, a base in one piece no
+            feet. `young` joins them where it is known with a deviation, or a press was weighed or learned.
     """
 
     def __init__(self, problem: Problem, names: Sequence[str]) -> None:
@@ -136,6 +148,9 @@ class Unknowns:
         finger = [name for name in names if name not in (*WALLS, "feet") or name in self.motion.names]
         if problem.load.friction:
             finger = [SHARE if name == "shear_force" else name for name in finger]
+        learned = problem.learned is not None and "young" in problem.learned.unknowns
+        if problem.material.young_deviation or learned or (seen is not None and seen.weighed):
+            finger.append("young")
         finger += self.feet.names
         self.names = (*finger, *(parameter.name for parameter in self._pictures))
 
@@ -189,6 +204,7 @@ class Unknowns:
         """
         front, material, friction = self.traction, self.problem.material, self.problem.load.friction
         middle, width = self.place
+        modulus = material.young_deviation / material.young or LEAST_KNOWN
         # The force that would press the contact in by half of the front's extent.
         size = 0.5 * front.extent / flexibility
         # A contact narrower than half of the longest edge has too few points of quadrature.
@@ -204,7 +220,7 @@ class Unknowns:
             Parameter("friction", "", friction or 0.5, 0.3 * prior, 0.0, max(1.0, 2 * friction)),
             Parameter("base_compliance", "mm", 0.02, log(10) * prior, logarithmic=True),
             Parameter("poisson", "", material.poisson, 0.03 * prior, 0.0, 0.49),
-            Parameter("young", "MPa", material.young, 0.3 * prior, logarithmic=True),
+            Parameter("young", "MPa", material.young, modulus * prior, logarithmic=True),
         ]
         for name, drawn in zip(self.motion.names, self.motion.thickness.tolist(), strict=True):
             # A printed wall is within 5 %; of the wall at the base the clamp may hold more or less.
@@ -216,6 +232,20 @@ class Unknowns:
             known.append(Parameter(name, "mm" if name.endswith("give") else "rad", 0.0, tolerance * prior))
         by_name = {parameter.name: parameter for parameter in [*known, *self._pictures]}
         return [by_name[name] for name in self.names]
+
+    def prior(self, parameters: Sequence[Parameter]) -> Prior:
+        """Of the standardised values of the unknowns, with what is learned of the finger."""
+        learned, prior = self.problem.learned, Prior.independent(len(parameters))
+        rows = [row for row, name in enumerate(self.names) if learned and name in learned.unknowns]
+        if learned is None or not rows:
+            return prior
+        gained, pull = learned.information([self.names[row] for row in rows])
+        scale = np.array([parameters[row].scale for row in rows])
+        middle = np.array([parameters[row].middle for row in rows])
+        precision, pulled = prior.precision.copy(), np.zeros(len(parameters))
+        precision[np.ix_(rows, rows)] += gained * np.outer(scale, scale)
+        pulled[rows] = scale * (pull - gained @ middle)
+        return Prior(np.linalg.solve(precision, pulled), precision)
 
     def hypothesis(self, values: FloatArray, normal: float = 0.0) -> Hypothesis:
         """The finger and the contact of values, shape (p,), and of a normal force that is none of them."""
@@ -293,15 +323,15 @@ class Unknowns:
 
 
 def parse_unknowns(solver: str, text: str, sought: Sequence[str]) -> tuple[str, ...]:
-    """The names in a text such as `position,normal_force`, of those that a solver seeks, or `young`.
+    """The names in a text such as `position,normal_force`, of those that a solver seeks.
 
     Raises:
         UserError: If one is not known or is there twice, or there is no force among them.
     """
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     for name in names:
-        if name not in (known := (*sought, "young")):
-            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(known)}")
+        if name not in sought:
+            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(sought)}")
         if names.count(name) > 1:
             raise UserError(f"{solver}: the parameter {name!r} is there twice")
     if "normal_force" not in names:

@@ -26,6 +26,7 @@ from pinnray.options.shared import (
     OptionalOutputPath,
     OutputFlag,
     PhysicsOptions,
+    PressOptions,
     SolverOptions,
     comma_list,
     read_millimetres,
@@ -43,6 +44,7 @@ def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
+    taught: PressOptions = PressOptions(),
     adapt: Annotated[float | None, Parameter(group=FINGER)] = None,
     solvers: str | None = None,
     measurements: str | None = None,
@@ -95,6 +97,7 @@ def command(
     from pinnray.options.solver_choice import spare_solvers
     from pinnray.runtime.output_folder import RUN_FILE, check_output, check_same_job
     from pinnray.runtime.stages import Stages
+    from pinnray.vision.measurements import parse_weighed
 
     earlier = read_options_file(from_) if from_ else None
     if from_ and earlier:
@@ -103,13 +106,13 @@ def command(
     material, load = physics.read(options.preset)
     names = job_defaults(options.preset).solvers if solvers is None else solvers
     given = given_options(
-        *(finger, physics, options, film),
+        *(finger, physics, options, taught, film),
         **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
         **{"reference": reference, "pictures": pictures, "width": width},
     )
     folder = out or _own_folder(design.name, measurements)
     if out is None and not resume:
-        check_same_job(folder, given, usual_options(finger, physics, options, film))
+        check_same_job(folder, given, usual_options(finger, physics, options, taught, film))
     job = Job(
         design=design,
         mesh=mesh,
@@ -118,6 +121,10 @@ def command(
         load=load,
         truth=truth,
         measurements=_measurements(measurements, film),
+        weighed=None if taught.weighed is None else parse_weighed(taught.weighed),
+        presses=taught.files,
+        learned=finger.learned(),
+        learn=taught.learn,
         reference=reference,
         out=folder,
         resume=resume,
@@ -159,6 +166,8 @@ def command(
             if evaluation.identified:
                 found = evaluation.identified.phrase(job.design.depth)
                 console.print(f"{evaluation.label} found: {found}", soft_wrap=True, highlight=False)
+        if job.learn is not None:
+            console.print(f"learned: {job.learn}", soft_wrap=True, highlight=False)
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
     for fault in comparison.unfinished:
         say(f"error: {fault}")

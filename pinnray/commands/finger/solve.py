@@ -1,5 +1,6 @@
 """Solve one finger with one solver."""
 
+from dataclasses import replace
 from math import hypot, isfinite, isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,6 +9,7 @@ from pinnray.options.shared import (
     FingerOptions,
     OutputPath,
     PhysicsOptions,
+    PressOptions,
     SolverOptions,
     comma_list,
     existing_table,
@@ -25,6 +27,7 @@ def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
+    taught: PressOptions = PressOptions(),
     measurements: Path | None = None,
     strokes: str | None = None,
     out: OutputPath = Path("out/solution.vtu"),
@@ -42,8 +45,11 @@ def command(
     from pinnray.comparison.figures.force_charts import draw_force_displacement
     from pinnray.comparison.report.output_files import write_vtu
     from pinnray.functions import solve
+    from pinnray.geometry.drawing.drawn_finger import finger_lines
+    from pinnray.geometry.finger.learned import write_learned
     from pinnray.solvers.finger_figures import break_answer
     from pinnray.solvers.registry import make_solver, unknown_solver
+    from pinnray.vision.measurements import parse_weighed, read_measurements
 
     if not solver:
         raise UserError(unknown_solver(solver))
@@ -63,9 +69,22 @@ def command(
         stops = [min(each / travel, 1.0) for each in at_strokes]
         made = make_solver(made.name, **made.settings() | {"stops": stops})
     file = existing_table(measurements)
+    seen = None if file is None else read_measurements(file, marker_radius=chosen.marker_radius)
+    if taught.weighed is not None and seen is not None:
+        seen = replace(seen, weighed=parse_weighed(taught.weighed))
+    if seen is None and (taught.weighed or taught.presses or taught.learn):
+        raise UserError("--presses, --weighed and --learn belong to a measured finger; give --measurements")
     finger.check_cost(chosen, settings, [made])
     solution = solve(
-        chosen, made, size=settings, material=material, load=load, measurements=file, progress=True
+        chosen,
+        made,
+        size=settings,
+        material=material,
+        load=load,
+        measurements=seen,
+        presses=taught.files,
+        learned=finger.learned(),
+        progress=True,
     )
     mesh = solution.problem.mesh
     evaluation = evaluated(solution, mesh)
@@ -82,8 +101,11 @@ def command(
     if figures:
         print("\n".join(_lines(figures, forces)))
         print(break_answer(figures.strain_over_break, figures.peak_radius))
-    if solution.identified:
-        print(solution.identified.advice)
+    if found := solution.identified:
+        print(found.advice)
+        if taught.learn is not None and found.learned is not None:
+            write_learned(taught.learn, found.learned, finger_lines(chosen))
+            written.append(taught.learn)
     for path in written:
         print(path)
     whole = all(isfinite(force) for _, force in forces)

@@ -16,7 +16,7 @@ from pinnray.solvers.assimilation.estimation import (
     GrossErrors,
     Parameter,
     Prediction,
-    degrees_of_freedom,
+    Prior,
     estimate,
     inflation_of,
 )
@@ -184,8 +184,8 @@ def test_intervals_are_quantiles_of_the_normal_or_of_students_t(inflation: float
 def test_degrees_of_freedom_are_those_of_the_ridge_and_at_least_one() -> None:
     matrix = np.random.default_rng(0).normal(size=(7, 3))
     hat = matrix @ np.linalg.inv(matrix.T @ matrix + np.eye(3)) @ matrix.T
-    assert degrees_of_freedom(matrix) == pytest.approx(7 - np.trace(hat), rel=1e-12)
-    assert degrees_of_freedom(1e6 * np.eye(3)) == 1
+    assert Prior.independent(matrix.shape[1]).freedom(matrix) == pytest.approx(7 - np.trace(hat), rel=1e-12)
+    assert Prior.independent(3).freedom(1e6 * np.eye(3)) == 1
 
 
 def test_the_misfit_is_noise_up_to_the_95th_percentile() -> None:
