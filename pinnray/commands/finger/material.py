@@ -37,7 +37,8 @@ def command(
             young, ratio = number(known.material.young, 3), known.material.poisson
             elastic = f"E = {young} MPa, ν = {ratio:g}"
             facts = f"{known.density:g} g/cm3, breaks at {known.strain_at_break:.0%}"
-            print(f"{name:<{width}}  {elastic}, {facts}; {known.source}")
+            loss = f", a cycle loses {known.material.loss:.0%}" if known.material.loss else ""
+            print(f"{name:<{width}}  {elastic}, {facts}{loss}; {known.source}")
         return 0
     if not -1 < poisson < 0.5:
         raise UserError(f"--poisson {poisson:g}: give a ratio above -1 and below 0.5")
