@@ -59,8 +59,6 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
     definition = study.definition(given)
     with stages.stage("mesh"):
         mesh = finger_mesh(study.design, settings=study.mesh)
-        if mesh.moduli is not None:
-            raise UserError("crossval takes a body of one material, and parts of this one have their own")
         if given:
             check_positions(given, mesh)
         problem = Problem(mesh, study.material, study.load)

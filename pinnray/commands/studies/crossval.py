@@ -26,7 +26,7 @@ def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
+    solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp",
     schemes: str = "one-out,tip-out,random,load-out",
     truth: str = "sliding",
     layouts: str | None = None,

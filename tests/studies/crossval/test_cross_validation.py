@@ -253,16 +253,16 @@ def test_a_class_of_the_calling_script_is_judged_beside_solvers_in_processes(tmp
 
 
 @pytest.mark.slow
-def test_turned_pictures_are_told_and_cost_statfem_little(tmp_path, in_line):
+def test_turned_pictures_are_told_and_cost_gp_little(tmp_path, in_line):
     """Its held-out error is that of straight pictures within a half; `fem` knows of no picture."""
     frame, errors = '--frame "turn 3 deg, shift 0.3 mm, scale 1 %"', {}
     for name, option in (("straight", ""), ("turned", frame)):
-        line = f"--solvers statfem,fem --schemes one-out --seeds 1 {option}"
+        line = f"--solvers gp,fem --schemes one-out --seeds 1 {option}"
         assert run(line, tmp_path / name) == 0
         means = scores_of(tmp_path / name)["mean"]
         own = means.xs(("one-out", HELD_OUT), level=("scheme", "score"))
         errors[name] = dict(zip(own.index.get_level_values("solver"), own, strict=True))
-    assert errors["turned"]["statfem"] < 1.5 * errors["straight"]["statfem"]
+    assert errors["turned"]["gp"] < 1.5 * errors["straight"]["gp"]
     assert errors["turned"]["fem"] > errors["straight"]["fem"] + 0.1
 
 

@@ -134,7 +134,7 @@ def test_a_class_that_cannot_be_made_from_its_settings_is_refused_in_one_line():
         of_draw(Fixed(), 1)
 
 
-@pytest.mark.parametrize("name", ["gp", "fem-asm", pytest.param("fem-id", marks=pytest.mark.slow), "statfem"])
+@pytest.mark.parametrize("name", ["gp", "fem-asm", pytest.param("fem-id", marks=pytest.mark.slow)])
 def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name):
     """A marker that is held out is moved by 5 mm: so is its error, and no prediction changes."""
     fold = Fold(ONE, "marker 4", (3,))
@@ -153,7 +153,7 @@ def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name)
     assert all(after[name] == before[name] for name in FIELDS)
 
 
-@pytest.mark.parametrize("name", ["gp", "fem-asm", "statfem"])
+@pytest.mark.parametrize("name", ["gp", "fem-asm"])
 def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     task, coarse_mesh, observations, truth, name
 ):
@@ -179,14 +179,14 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     mine = solution.state(rule.location).von_mises
     squares = [(rule.weights * values**2).sum() for values in (mine - true, true)]
     assert outcome["von_mises"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
-    if name in ("gp", "statfem"):
+    if name == "gp":
         spread = solution.field.standard_deviation(coarse_mesh.locate(observations.points))  # type: ignore[attr-defined]
         np.testing.assert_allclose(outcome["deviations_mm"], np.hypot(spread, NOISE), rtol=1e-5)
     else:
         assert outcome["deviations_mm"] is None
 
 
-@pytest.mark.parametrize("name", ["gp", "fem-asm", "statfem"])
+@pytest.mark.parametrize("name", ["gp", "fem-asm"])
 def test_what_was_learnt_is_carried_to_half_the_load(task, name):
     """All of it is linear, and so is this truth: half the load has half the errors."""
     settings = SETTINGS.get(name, {"degree": 1})
