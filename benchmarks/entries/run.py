@@ -50,7 +50,10 @@ ALL: dict[str, tuple[Callable[[], Any], str]] = {
     "pinn-std local": (_own("pinn-std", preset="local"), ""),
     "pinn-std trained": (_own("pinn-std", preset="trained"), ""),
     "pinn-std paper": (_own("pinn-std", preset="paper"), ""),
-    "deep-energy": (_outside("deep_energy:DeepEnergySolver"), ""),
+    "deep-energy": (
+        _outside("deep_energy:DeepEnergySolver", width=30, layers=5, adam=50, lbfgs=350),
+        "Best of five settings on a finger that is not scored.",
+    ),
     "deep-energy-fourier": (
         _outside(
             "deep_energy:DeepEnergySolver", features=32, scale=2.0, width=30, layers=2, adam=50, lbfgs=600
