@@ -8,6 +8,7 @@ import numpy as np
 from rich.table import Table
 
 from pinnray.comparison.figures.force_charts import draw_force_track
+from pinnray.film.loading_path import FIRST, Loading, LoadingPath
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.settings import MeshSettings
@@ -36,12 +37,14 @@ class FrameForce(NamedTuple):
         time: Of the frame, s.
         reading: The force with its intervals.
         delay: Time from the end of the frame's tracking to the force, s.
+        loading: Travel of the markers, and the branch of the frame.
     """
 
     frame: int
     time: float
     reading: ForceReading
     delay: float
+    loading: Loading
 
 
 def force_tracker(
@@ -84,16 +87,17 @@ def force_tracker(
     return ForceTracker(model, points, finger.marker_radius, stiffness)
 
 
-def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> list[FrameForce]:
+def forces_of(tracking: Tracking, tracker: ForceTracker, loss: float, progress: Progress) -> list[FrameForce]:
     """The force in every frame of a track, against the mean of its frames at rest.
 
     Args:
         tracking: Of the film.
         tracker: With the markers of the track.
+        loss: Of the material.
         progress: Told of the frames.
     """
     rest, places = tracking.rest_positions[0], tracking.positions
-    found = []
+    found, path = [], LoadingPath(loss)
     for number, (when, at, noise) in enumerate(
         zip(tracking.times.tolist(), places, tracking.covariances, strict=True)
     ):
@@ -104,8 +108,10 @@ def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> 
                 rest[seen], at[seen], tracking.initial.covariances[seen], noise[seen]
             )
             deviations[seen] = np.sqrt(np.diag(covariance)).reshape(-1, 2)
-        reading = tracker.update(np.where(seen[:, None], at - rest, 0.0), deviations, seen)
-        found.append(FrameForce(number, when, reading, reading.seconds))
+        moved = np.where(seen[:, None], at - rest, 0.0)
+        loading = path.follow(when, moved, deviations, seen)
+        reading = path.widened(tracker.update(moved, deviations, seen), loading)
+        found.append(FrameForce(number, when, reading, reading.seconds, loading))
         progress((number + 1) / len(places), f"frame {number + 1}, {reading.force.value:.3g} N/mm")
     return found
 
@@ -136,10 +142,11 @@ def force_row(force: FrameForce, depth: float) -> dict[str, Cell | None]:
         for end, value in zip(("", "_low", "_high"), values, strict=True)
     }
     numbers["inflation"] = reading.inflation
+    numbers["travel_mm"] = force.loading.travel
     row: dict[str, Cell | None] = {"frame": force.frame, "time_s": force.time}
     row |= {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
     row |= {"equilibria": reading.evaluations, "seconds": reading.seconds, "delay_s": force.delay}
-    return row | {"remark": reading.status}
+    return row | {"branch": force.loading.branch, "remark": reading.status}
 
 
 def write_forces(folder: Path, forces: Sequence[FrameForce], depth: float) -> None:
@@ -149,15 +156,37 @@ def write_forces(folder: Path, forces: Sequence[FrameForce], depth: float) -> No
     times = np.array([force.time for force in forces])
     newtons = np.array([_newtons(reading.force, depth) for reading in readings])
     places = np.array([reading.position for reading in readings])
-    draw_force_track(times, newtons, places, depth=depth).save(folder / "force.png")
+    travel = np.array([force.loading.travel for force in forces])
+    back = [comes_back(forces) and force.loading.branch not in FIRST for force in forces]
+    draw_force_track(times, newtons, places, travel, np.array(back), depth=depth).save(folder / "force.png")
 
 
-def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int | None = None) -> Table:
+def comes_back(forces: Sequence[FrameForce]) -> bool:
+    """Whether the finger goes back in a film."""
+    return any(force.loading.branch == "unloading" for force in forces)
+
+
+def loss_remark(forces: Sequence[FrameForce], loss: float) -> str | None:
+    """A sentence on the intervals of the way back, or of a hold; None if a first loading is all there is."""
+    if loss and any(force.loading.branch not in FIRST for force in forces):
+        return f"on the way back and after a hold the interval reaches lower, by the loss of {loss:.3g}"
+    if not loss and comes_back(forces):
+        return (
+            "the film has a way back, where the intervals hold for a material without loss only: the force "
+            "of a printed or cast finger is lower; give loss, the share of the loading work that is lost"
+        )
+    return None
+
+
+def force_table(
+    forces: Sequence[FrameForce], depth: float, loss: float, passed_over: int | None = None
+) -> Table:
     """The largest and the last force, for the terminal.
 
     Args:
         forces: At least one.
         depth: Of the finger, mm.
+        loss: Of the material.
         passed_over: Number of frames without a force, as an earlier one was sought; None if not live.
     """
     known = [force for force in forces if np.isfinite(force.reading.force.value)]
@@ -173,6 +202,8 @@ def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int | N
         f"markers are farther off than noise explains; {delays.mean():.0f} ms after a frame, at most "
         f"{delays.max():.0f} ms"
     )
+    if loss and (remark := loss_remark(forces, loss)):
+        caption += f"; {remark}"
     if passed_over is not None:
         caption += f"; {passed_over} frames were passed over"
     headings = ("", "time, s", "force, N", "tangential force, N", "contact, x in mm")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pinnray.film.force_estimate import FrameForce, force_line, force_row
+from pinnray.film.loading_path import Loading, LoadingPath
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.identification.tracker import ForceTracker
 from pinnray.vision.frames.frame import Frame
@@ -30,14 +31,15 @@ class LiveForce:
     Args:
         tracker: With the design's markers.
         depth: Of the finger, mm.
+        loss: Of the material.
 
     Attributes:
         passed_over: Number of frames that have no force.
     """
 
-    def __init__(self, tracker: ForceTracker, depth: float) -> None:
+    def __init__(self, tracker: ForceTracker, depth: float, loss: float) -> None:
         self.passed_over = 0
-        self._tracker, self.depth = tracker, depth
+        self._tracker, self.depth, self._path = tracker, depth, LoadingPath(loss)
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._forces: list[Future[FrameForce]] = []
         self._moves = False
@@ -55,11 +57,13 @@ class LiveForce:
         known, count = seen & (self._count > 0).all(axis=1), np.maximum(self._count, 1)
         deviations = np.repeat(noise[:, None] * np.sqrt(1 + 1 / count), 2, axis=1)
         moved = np.where(known[:, None], places - self._rest, 0.0)
+        loading = self._path.follow(frame.time, moved, deviations, known)
         if self._forces and self._forces[-1].cancel():
             self._forces.pop()
             self.passed_over += 1
         tracked = time.perf_counter()
-        self._forces.append(self._thread.submit(self._answer, frame, moved, deviations, known, tracked))
+        answer = self._thread.submit(self._answer, frame, moved, deviations, known, loading, tracked)
+        self._forces.append(answer)
 
     def newest(self) -> FrameForce | None:
         """The last force that was found; None before there is one."""
@@ -89,11 +93,12 @@ class LiveForce:
         displacements: FloatArray,
         deviations: FloatArray,
         visible: BoolArray,
+        loading: Loading,
         tracked: float,
     ) -> FrameForce:
         """In the thread: the force, for what `ForceTracker.update` takes, known at the time `tracked`, s."""
-        reading = self._tracker.update(displacements, deviations, visible)
-        return FrameForce(frame.number, frame.time, reading, time.perf_counter() - tracked)
+        reading = self._path.widened(self._tracker.update(displacements, deviations, visible), loading)
+        return FrameForce(frame.number, frame.time, reading, time.perf_counter() - tracked, loading)
 
 
 def frame_lines(force: LiveForce | None, *, publish: bool) -> Callable[[Frame, FrameDetections], str]:

@@ -1,6 +1,5 @@
 """A film as the source of the markers of a comparison."""
 
-from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,14 +9,13 @@ from pinnray.geometry.finger.finger import Finger
 if TYPE_CHECKING:
     from pinnray.comparison.pipeline.job import Measured
     from pinnray.runtime.stages import Stages
-    from pinnray.vision.frames.frame import Frame
 
 
 class MeasuredFilm(Film):
     """A film that is tracked when a comparison begins; see `comparison.pipeline.job.MarkerSource`."""
 
     def measured(self, design: Finger, folder: Path, stages: "Stages") -> "Measured":
-        """Track the film into the folder `track`; solutions are drawn into its last frame.
+        """Track the film into the folder `track`; solutions are drawn into a frame of the pressed finger.
 
         Raises:
             UserError: If the film cannot be read or tracked.
@@ -26,16 +24,13 @@ class MeasuredFilm(Film):
         from pinnray.film.predicted_frame import predicted_frame
         from pinnray.film.track_film import track_figures, track_film
 
-        last: deque[Frame] = deque(maxlen=1)
         track = folder / "track"
         with stages.stage("track") as progress:
             track.mkdir()
-            tracking, observations = track_film(
-                self, design, track, progress, video=False, watch=lambda frame, _: last.append(frame)
-            )
+            tracking, observations, pressed = track_film(self, design, track, progress, video=False)
         return Measured(
             observations,
             tracking.warnings,
             track_figures(track, tracking),
-            lambda comparison: [predicted_frame(track, comparison, tracking, last[0].image)],
+            lambda comparison: [predicted_frame(track, comparison, tracking, pressed)],
         )

@@ -1,4 +1,4 @@
-"""The last frame of a film with the deformed finger of every solver over it, as in Fig. 5 of the paper."""
+"""A frame of the pressed finger with the deformed one of every solver over it, as in Fig. 5 of the paper."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from pinnray.comparison.figures.overlay import errors_note
 from pinnray.geometry.picture_frame import nearest_similarity
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import COLUMN, INK, MEASURED, PAGE, SMALL, Figure, figure
-from pinnray.vision.frames.frame import Image
+from pinnray.vision.frames.frame import Frame, Image
 from pinnray.vision.tracking.trajectories import Tracking
 
 HEAD, TITLE, GAP = 0.75, 0.36, 0.12
@@ -30,29 +30,29 @@ RIM = [patheffects.withStroke(linewidth=1.3, foreground=INK)]
 """Keeps it legible on a light finger, which it hides as little as possible."""
 
 
-def predicted_frame(folder: Path, comparison: Results, tracking: Tracking, image: Image) -> Picture:
+def predicted_frame(folder: Path, comparison: Results, tracking: Tracking, frame: Frame) -> Picture:
     """Write `predicted.png` into a folder.
 
     Args:
         folder: Of the files of the tracking.
         comparison: The solutions.
         tracking: What the film says.
-        image: Its last frame.
+        frame: Of the pressed finger.
     """
     camera = "virtual camera’s" if tracking.simulated else "camera’s"
     return Picture(
-        draw_predictions(comparison, tracking, image).save(folder / "predicted.png"),
+        draw_predictions(comparison, tracking, frame).save(folder / "predicted.png"),
         "Predicted finger in the film",
-        f"The {camera} last frame, and in it (yellow) the outline that each solver predicts, mapped through "
-        "the plane that the film gave: the paper’s Fig. 5. Circles: the markers as they were tracked. "
-        "Crosses: the solver’s.",
+        f"The {camera} frame of the pressed finger, and in it (yellow) the outline that each solver "
+        "predicts, mapped through the plane that the film gave: the paper’s Fig. 5. Circles: the markers as "
+        "they were tracked. Crosses: the solver’s.",
     )
 
 
-def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> Figure:
+def draw_predictions(comparison: Results, tracking: Tracking, frame: Frame) -> Figure:
     """Draw the outline of every solver's deformed finger into a frame, one panel each."""
     plane = tracking.final_plane or tracking.plane
-    nodes = comparison.mesh.points
+    nodes, image = comparison.mesh.points, frame.image
     bodies = [plane.pixels(_pictured(each, comparison)) for each in comparison.evaluations]
     shown = [body for body, each in zip(bodies, comparison.evaluations, strict=True) if each.converged]
     (left, top), (right, bottom) = _window(np.concatenate([plane.pixels(nodes), *shown]), image)
@@ -62,7 +62,7 @@ def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> F
     width = (page - GAP * (columns + 1)) / columns
     height = width * (bottom - top) / (right - left)
     with figure(HEAD + rows * (TITLE + height + GAP), page) as drawn:
-        write_heading(drawn, "Predicted finger in the last frame")
+        write_heading(drawn, "Predicted finger in the film")
         for number, (body, evaluation) in enumerate(zip(bodies, comparison.evaluations, strict=True)):
             row, column = divmod(number, columns)
             place = (GAP + column * (width + GAP), HEAD + TITLE + row * (TITLE + height + GAP))
@@ -73,7 +73,7 @@ def draw_predictions(comparison: Results, tracking: Tracking, image: Image) -> F
             edges = body[comparison.mesh.boundary_edges]
             axes.add_collection(LineCollection(list(edges), colors=BODY, lw=0.7, path_effects=RIM))
             computed = comparison.observations.points + evaluation.shown_displacement
-            _markers(axes, tracking, plane.pixels(computed))
+            _markers(axes, tracking.pixels[frame.number], plane.pixels(computed))
             _name(axes, comparison, evaluation)
         label = f"markers, {comparison.observations.label}"
         handles = [
@@ -110,9 +110,8 @@ def _red_first(image: Image) -> Image:
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
 
 
-def _markers(axes: Axes, tracking: Tracking, computed: FloatArray) -> None:
-    """The markers of the last frame, and those of a solver, shape (m, 2), pixels."""
-    seen = tracking.pixels[-1]
+def _markers(axes: Axes, seen: FloatArray, computed: FloatArray) -> None:
+    """The markers of the frame, and those of a solver, shape (m, 2), pixels."""
     for size, colour in ((2.0, "white"), (1.1, MEASURED)):
         axes.plot(*seen.T, "o", ms=5, mfc="none", mec=colour, mew=size)
     for size, colour in ((2.0, "white"), (0.9, INK)):

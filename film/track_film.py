@@ -17,7 +17,7 @@ from pinnray.runtime.atomic import write_json
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import NONE, Cell, significant, terminal_table, write_csv
 from pinnray.solvers.solver import Progress
-from pinnray.vision.frames.frame import DEFAULT_RATE, RIG_MARK, Frame, Image
+from pinnray.vision.frames.frame import DEFAULT_RATE, RIG_MARK, Frame
 from pinnray.vision.frames.pictures import write_picture
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.frames.video import video_writer
@@ -27,6 +27,8 @@ from pinnray.vision.tracking.frame_tracker import FrameDetections
 from pinnray.vision.tracking.tracker import track
 from pinnray.vision.tracking.trajectories import Tracking
 
+FARTHEST = 0.995
+"""Motion of the markers, over the largest, of frames that show the finger as good as farthest."""
 BEFORE_AND_AFTER = 2
 """Number of pictures whose times nobody asks for."""
 UNTIMED = (
@@ -43,8 +45,10 @@ def track_film(
     *,
     video: bool = True,
     watch: Callable[[Frame, FrameDetections], str | None] | None = None,
-) -> tuple[Tracking, Observations]:
+) -> tuple[Tracking, Observations, Frame]:
     """Track a film and write `observations.csv`, `tracks.csv`, `track.json` and pictures into a folder.
+
+    Returns, besides, the last frame that shows the finger farthest from its place in the first one.
 
     Args:
         film: The film.
@@ -58,7 +62,8 @@ def track_film(
         UserError: If the film cannot be read or tracked.
     """
     scene = film.scene(design)
-    kept: dict[str, tuple[Image, FrameDetections]] = {}
+    kept: dict[str, tuple[Frame, FrameDetections]] = {}
+    farthest = 0.0
     with open_frames(film.source, rate=film.fps) as frames, ExitStack() as stack:
         if film.fps and frames.count is not None and frames.rate != film.fps:
             raise UserError(
@@ -76,8 +81,12 @@ def track_film(
             )
 
         def see(frame: Frame, detections: FrameDetections) -> None:
-            kept.setdefault("initial", (frame.image, detections))
-            kept["final"] = (frame.image, detections)
+            nonlocal farthest
+            first = kept.setdefault("initial", (frame, detections))[1]
+            away = float(np.linalg.norm(detections.places - first.places))
+            if away >= FARTHEST * farthest:
+                kept["final"] = (frame, detections)
+            farthest = max(farthest, away)
             seen = int(np.isfinite(detections.markers.radii).sum())
             status = f"{seen} of {len(detections.places)} markers"
             if write is not None:
@@ -92,14 +101,16 @@ def track_film(
             tracking = replace(tracking, warnings=(*tracking.warnings, UNTIMED))
     observations = tracking.observations(_sentence(film, tracking))
     for name, end in (("initial", tracking.rest.initial), ("final", tracking.rest.final)):
-        image, detections = kept[name]
+        frame, detections = kept[name]
         trajectories = list(tracking.pixels.swapaxes(0, 1)) if name == "final" else []
         lines = [f"{name}: frames {end.start} to {end.stop - 1} are at rest", *tracking.warnings]
-        write_picture(folder / f"{name}.png", annotated(image, detections, lines, trajectories=trajectories))
+        write_picture(
+            folder / f"{name}.png", annotated(frame.image, detections, lines, trajectories=trajectories)
+        )
     write_measurements(folder / "observations.csv", observations)
     write_csv(folder / "tracks.csv", track_rows(tracking))
     write_json(folder / "track.json", track_summary(tracking, observations) | film.provenance())
-    return tracking, observations
+    return tracking, observations, kept["final"][0]
 
 
 def _sentence(film: Film, tracking: Tracking) -> str:

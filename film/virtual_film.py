@@ -106,7 +106,8 @@ def film_finger(
     with replaced_folder(out) as folder:
         with stages.stage("film") as progress:
             record(recording, folder, source=source, codec=codec, progress=progress)
-        write_csv(folder / "truth_force.csv", true_forces(solution, recording, finger.depth))
+        forces = true_forces(solution, recording, finger.depth, problem.material.loss)
+        write_csv(folder / "truth_force.csv", forces)
         if rig.boards:
             with stages.stage("boards") as progress:
                 poses = board_poses(board, camera, rig.boards, seed=seed)

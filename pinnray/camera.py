@@ -1,5 +1,6 @@
 """Functions of the front door for experimenters: calibrate, track, force from a film, and the virtual rig."""
 
+import warnings
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
@@ -99,7 +100,7 @@ def track(
         stages.stage("track") as report,
     ):
         Path(folder).mkdir(parents=True, exist_ok=True)
-        _, found = track_film(opened, finger, Path(folder), report, video=out is not None)
+        _, found, _ = track_film(opened, finger, Path(folder), report, video=out is not None)
     return found
 
 
@@ -117,13 +118,15 @@ def film_forces(
         source: The film, as for `track`.
         design: The finger.
         material: The elastic constants, or the name of a material; unless a law of finite strain
-            is given, the neo-Hookean one is taken. The force is in proportion to Young's modulus.
+            is given, the neo-Hookean one is taken. The force is in proportion to Young's modulus. On the
+            way back, and after a hold, its interval is wider by the material's `loss`.
         progress: Whether to show the stages; if None in a notebook only.
         given: How the film is read, as for `track`, and parameters of the finger and the material, as for
             `solve`.
 
     Returns:
-        A row for every frame, with time, force in N and N/mm and contact's place in mm, with 95 % intervals.
+        A row for every frame, by the columns of `force.csv`: time, force in N and contact's place in mm with
+        95 % intervals, the markers' travel in mm and the branch, such as "loading" or "unloading".
 
     Raises:
         UserError: If the film does not show the finger, or DOLFINx is missing.
@@ -131,7 +134,7 @@ def film_forces(
     import numpy as np
     import pandas as pd
 
-    from pinnray.film.force_estimate import MESH, force_row, force_tracker, forces_of
+    from pinnray.film.force_estimate import MESH, force_row, force_tracker, forces_of, loss_remark
     from pinnray.film.track_film import track_film
     from pinnray.geometry.cache import finger_mesh, mesh_sizes
     from pinnray.runtime.stages import shown_stages
@@ -141,13 +144,15 @@ def film_forces(
     finger, elastic, _ = read_job(design, material, None, given, besides=words, allowed=MATERIAL)
     with shown_stages(progress) as stages:
         with TemporaryDirectory() as folder, stages.stage("track") as report:
-            tracking, seen = track_film(film, finger, Path(folder), report, video=False)
+            tracking, seen, _ = track_film(film, finger, Path(folder), report, video=False)
         with stages.stage("mesh"):
             mesh = finger_mesh(finger, settings=mesh_sizes(finger, usual=MESH))
         with stages.stage("force") as report:
             known = learned_of(design)
             tracker = force_tracker(mesh, finger, elastic, seen.points, plane=seen.plane, learned=known)
-            forces = forces_of(tracking, tracker, report)
+            forces = forces_of(tracking, tracker, elastic.loss, report)
+    if not elastic.loss and (remark := loss_remark(forces, 0.0)):
+        warnings.warn(remark, stacklevel=2)
     return pd.DataFrame([force_row(force, finger.depth) for force in forces]).fillna(np.nan)
 
 

@@ -83,6 +83,15 @@ class Material(CheckedModel):
     law: LawName = Field(
         default="linear", description="Material law of the solvers that have it; the others keep their own"
     )
+    loss: float = bounded(
+        0.0,
+        0,
+        0.9,
+        "",
+        "",
+        "Share of the loading work that a cycle of loading and unloading loses; it is in the intervals of "
+        "forces in films and in films of the rig, and in no equilibrium",
+    )
     _substance: Substance | None = PrivateAttr(None)  # beside the constants, which alone decide a solution
 
     @model_validator(mode="before")

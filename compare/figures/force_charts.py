@@ -9,9 +9,12 @@ from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.force_curves import ForceCurve, follows_load
 from pinnray.comparison.figures.layout import axes_at, legend_above, legend_height, write_heading
 from pinnray.comparison.figures.solver_colours import solver_look
-from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.figure import COLUMN, CONTACT, INK, MEASURED, WIDTH, Figure, figure
 from pinnray.runtime.tables import number
+
+WAY_BACK = "#0072b2"
+"""Colour of the frames that are held or on the way back."""
 
 
 def draw_force_displacement(
@@ -97,33 +100,56 @@ def _end_label(name: str, force: float) -> str:
     return f"{name}, {number(force, 3)} N"
 
 
-def draw_force_track(times: FloatArray, forces: FloatArray, places: FloatArray, *, depth: float) -> Figure:
+def draw_force_track(
+    times: FloatArray,
+    forces: FloatArray,
+    places: FloatArray,
+    travel: FloatArray,
+    back: BoolArray,
+    *,
+    depth: float,
+) -> Figure:
     """Draw the force over time, and its place where there is at least a tenth of the largest force.
 
     Args:
         times: Shape (f,), s.
         forces: Force and the ends of its interval, shape (f, 3), N; nan and inf where it is not known.
         places: Abscissa of the contact and the ends of its interval, shape (f, 3), mm.
+        travel: Of the markers, shape (f,), mm.
+        back: Mask of the frames that are on the way back or held, shape (f,); if there is any, the force is
+            drawn over the travel, too.
         depth: Of the finger, mm.
     """
     known = np.isfinite(forces).all(axis=1)
-    top = float(forces[known, 2].max(initial=0.0)) or 1.0
     pressed = known & (forces[:, 0] > 0.1 * forces[known, 0].max(initial=0.0))
-    head, height, gap, left = 0.5, 1.1, 0.15, 0.65  # inches
-    with figure(head + 2 * height + gap + 0.45, COLUMN) as drawn:
+    rows = [(times, forces, [known], "force, N"), (times, places, [pressed], "contact, x in mm")]
+    if back.any():
+        rows.append((travel, forces, [known & ~back, known & back], "force, N"))
+    # inches
+    head, height, gap, left, foot = 0.5, 1.1, 0.15, 0.65, 0.45
+    tops = [head, head + height + gap, head + 2 * height + gap + foot]
+    with figure(tops[len(rows) - 1] + height + foot, COLUMN) as drawn:
         note = f"for a depth of {depth:g} mm; bands: intervals of 95 %"
         write_heading(drawn, "Force of the indenter, by the markers", note)
-        rows = ((forces, known, "force, N"), (places, pressed, "contact, x in mm"))
-        for row, (values, shown, label) in enumerate(rows):
-            axes = axes_at(drawn, (left, head + row * (height + gap), COLUMN - left - 0.15, height))
-            value, low, high = np.where(shown[:, None], values, np.nan).T
-            axes.fill_between(times, low, high, color=CONTACT, alpha=0.25, linewidth=0)
-            axes.plot(times, value, color=CONTACT, linewidth=1.2)
+        for row, (along, values, parts, label) in enumerate(rows):
+            axes = axes_at(drawn, (left, tops[row], COLUMN - left - 0.15, height))
+            for part, colour, name in zip(
+                parts, (CONTACT, WAY_BACK), ("loading", "held, way back"), strict=False
+            ):
+                value, low, high = np.where(part[:, None], values, np.nan).T
+                axes.fill_between(along, low, high, color=colour, alpha=0.25, linewidth=0)
+                style = "-" if colour == CONTACT else (0, (4, 2))  # what they share is seen of both
+                axes.plot(along, value, color=colour, linewidth=1.2, linestyle=style, label=name)
             axes.set_ylabel(label)
             axes.grid()
-            axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-3))
-            if row == 0:
+            axes.set_xlim(
+                float(np.nanmin(along)), max(float(np.nanmax(along)), float(np.nanmin(along)) + 1e-3)
+            )
+            if values is forces:
+                top = float(forces[known, 2].max(initial=0.0)) or 1.0
                 axes.set_ylim(1.05 * min(forces[known, 1].min(initial=0.0), 0.0), 1.05 * top)
-                axes.tick_params(labelbottom=False)
-        axes.set_xlabel("time, s")
+            axes.tick_params(labelbottom=row > 0)
+            axes.set_xlabel(("", "time, s", "travel of the markers, mm")[row])
+        if back.any():
+            axes.legend(loc="upper left")
     return drawn

@@ -144,14 +144,18 @@ class TriangleMesh:
         """Locates points of this mesh on another mesh of one body.
 
         Both meshes replace arcs by chords, so that a point may lie beyond the other's boundary: up to a tenth
-        of this mesh's longest boundary edge it counts to the nearest triangle.
+        of the longest boundary edge of either it counts to the nearest triangle.
 
         Raises:
             OutsideBodyError: If a point lies farther outside.
         """
+        return other._locator.locate(points, 0.1 * max(self._longest_edge, other._longest_edge))
+
+    @cached_property
+    def _longest_edge(self) -> float:
+        """Of the boundary, mm."""
         ends = self.points[np.concatenate(list(self.boundaries.values()))]
-        longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
-        return other._locator.locate(points, 0.1 * longest)
+        return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
 
     @cached_property
     def _locator(self) -> Locator:

@@ -11,6 +11,7 @@ import pytest
 from pinnray.cli import main
 from pinnray.film.force_estimate import FrameForce, force_row, force_tracker
 from pinnray.film.live_force import LiveForce, frame_lines
+from pinnray.film.loading_path import Loading
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
@@ -46,8 +47,11 @@ def reading(force=0.1, status=""):
 
 
 FORCES = [
-    FrameForce(0, 0.0, reading(), 0.06),
-    FrameForce(2, 0.1, reading(np.nan, "2 of 9 markers are seen, too few for a force"), 0.01),
+    FrameForce(0, 0.0, reading(), 0.06, Loading(1.5, "loading")),
+    FrameForce(
+        *(2, 0.1, reading(np.nan, "2 of 9 markers are seen, too few for a force"), 0.01),
+        Loading(np.nan, "hold"),
+    ),
 ]
 
 
@@ -59,6 +63,8 @@ def test_a_row_has_forces_for_the_depth_and_nothing_where_nothing_is_known():
     assert (first["position_mm"], first["delay_s"]) == (34.0, 0.06)
     assert second["force_N"] is second["force_high_N"] is second["position_mm"] is None
     assert second["force_low_N"] is None
+    assert (first["travel_mm"], first["branch"]) == (1.5, "loading")
+    assert (second["travel_mm"], second["branch"]) == (None, "hold")
     assert second["remark"].startswith("2 of 9 markers")
     assert first.keys() == second.keys()
 
@@ -102,7 +108,7 @@ def frame(number):
 
 def followed(frames):
     recorder = Recorder()
-    force = LiveForce(recorder, DEPTH)
+    force = LiveForce(recorder, DEPTH, loss=0.0)
     for number, detections in enumerate(frames):
         force.watch(frame(number), detections)
         while len(recorder.given) <= number:  # so that none is passed over
@@ -153,7 +159,7 @@ class Slow(Recorder):
 
 def test_frames_that_come_while_a_force_is_sought_are_passed_over_but_for_the_newest():
     slow = Slow()
-    force = LiveForce(slow, DEPTH)
+    force = LiveForce(slow, DEPTH, loss=0.0)
     force.watch(frame(0), seen(REST))
     assert slow.started.wait(10)
     assert force.newest() is None
@@ -170,7 +176,7 @@ def test_an_error_of_the_estimate_ends_the_tracking():
         def update(self, *_):
             raise UserError("no force")
 
-    force = LiveForce(Broken(), DEPTH)
+    force = LiveForce(Broken(), DEPTH, loss=0.0)
     force.watch(frame(0), seen(REST))
     with pytest.raises(UserError, match="no force"):
         force.finished()
@@ -179,7 +185,7 @@ def test_an_error_of_the_estimate_ends_the_tracking():
 
 
 def test_a_published_line_has_the_markers_of_its_frame_and_the_newest_force(capsys):
-    force = LiveForce(Recorder(), DEPTH)
+    force = LiveForce(Recorder(), DEPTH, loss=0.0)
     see = frame_lines(force, publish=True)
     see(frame(0), seen(REST))
     while force.newest() is None:

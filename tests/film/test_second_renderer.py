@@ -31,7 +31,7 @@ def tracked(name, folder):
                 cv2.imwrite(str(pictures / f"{frame.number}.png"), frame.image)
     settings = FilmSettings(camera=DATA / "camera.json", workspace=DATA / "fiducials.json", fps=15.0)
     film = settings.of(str(pictures))
-    return track_film(film, FINGER, folder / "out", silent, video=False)
+    return track_film(film, FINGER, folder / "out", silent, video=False)[:2]
 
 
 def identified(observations):

@@ -18,7 +18,7 @@ class Motion(CheckedModel):
     """Number of frames of each part of a recording, and the load as a function of time.
 
     The shutter opens at the start of a frame. The load grows at constant speed, from the closing of the
-    shutter in the last frame at rest until its opening in the first frame that is held.
+    shutter in the last frame at rest until its opening in the first frame held, and goes back likewise.
     """
 
     rest: int = bounded(30, 1, 100_000, "frames", "", "Frames before the pressing")
@@ -26,17 +26,34 @@ class Motion(CheckedModel):
         30, 0, 100_000, "frames", "", "Frames of the pressing; 0: a jump between two frames"
     )
     held: int = bounded(30, 1, 100_000, "frames", "", "Frames held under full load")
+    back: int = bounded(
+        0, 0, 100_000, "frames", "", "Frames of the way back, after which the finger rests as long; 0: none"
+    )
     rate: float = bounded(30.0, 0.1, 1000, "1/s", "", "Frames a second")
     shutter: float = bounded(0.3, 0, 0.9, "", "", "Share of the time for which the shutter is open")
 
     def __len__(self) -> int:
         """Number of frames."""
+        return self._leaves + (self.back + self.rest if self.back else 0)
+
+    @property
+    def loading_time(self) -> float:
+        """Time in which the load grows, frames."""
+        return 1 - self.shutter + self.moving
+
+    @property
+    def _leaves(self) -> int:
+        """The first frame after those held."""
         return self.rest + self.moving + self.held
 
     def load(self, time: ArrayLike) -> FloatArray:
         """Share of the load that acts at times, both of shape (n,); the frames start at 0, 1, 2, ..."""
-        start = self.rest - 1 + self.shutter
-        return np.asarray(np.clip((np.asarray(time) - start) / (self.rest + self.moving - start), 0.0, 1.0))
+        time = np.asarray(time)
+        start, turn = self.rest - 1 + self.shutter, self._leaves - 1 + self.shutter
+        grown = np.clip((time - start) / (self.rest + self.moving - start), 0.0, 1.0)
+        if not self.back:
+            return np.asarray(grown)
+        return np.asarray(grown - np.clip((time - turn) / (self._leaves + self.back - turn), 0.0, 1.0))
 
     def exposed(self, frame: int, steps: int) -> FloatArray:
         """Shares of the load at `steps` times within a frame's exposure; one share if they are equal."""

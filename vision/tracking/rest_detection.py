@@ -23,7 +23,7 @@ class RestIntervals(NamedTuple):
 
 
 def find_rest_intervals(positions: FloatArray, noise: float = 0.0) -> RestIntervals:
-    """Find the frames at rest.
+    """Find the frames at rest; if the finger comes back in the end, those around its farthest place instead.
 
     Args:
         positions: Of markers in every frame, shape (f, m, 2), mm; nan where one was not detected.
@@ -46,13 +46,18 @@ def find_rest_intervals(positions: FloatArray, noise: float = 0.0) -> RestInterv
                 f"{fewest} frames; film it at rest before it is pressed and while it is held"
             )
     rest = RestIntervals(range(first), range(count - last, count))
-    moved = _distance(_centre(positions[: rest.initial.stop]), _centre(positions[rest.final.start :]))
-    if not moved > limit:
+    start = _centre(positions[: rest.initial.stop])
+    if _distance(start, _centre(positions[rest.final.start :])) > limit:
+        return rest
+    away = np.nan_to_num([_distance(frame, start) for frame in positions])
+    if not away.max() > 2 * limit:
         raise UserError(
-            f"the finger is in the end where it was at the start, within {limit:.2g} mm; "
-            "the film must end while it is pressed"
+            f"the finger does not move by more than {2 * limit:.2g} mm; film it while it is pressed"
         )
-    return rest
+    farthest = int(away.argmax())
+    near = [_distance(frame, positions[farthest]) <= limit for frame in positions]
+    before, after = near[farthest::-1].index(False), near[farthest:].index(False)
+    return RestIntervals(rest.initial, range(farthest - before + 1, farthest + after))
 
 
 def _resting(positions: FloatArray, fewest: int, limit: float) -> int:

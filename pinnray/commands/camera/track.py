@@ -50,7 +50,8 @@ def command(
         source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
         force: Estimate the indenter's force and its place in every frame; with --live in the newest one. It
             is in proportion to Young's modulus; the markers correct Poisson's ratio. The law is the
-            neo-Hookean one unless --law gives one of finite strain.
+            neo-Hookean one unless --law gives one of finite strain. On the way back, and after a hold, its
+            interval is wider by --loss.
         learn: Design file to write, .toml, with what the frames with the largest motion say of walls, clamp
             and modulus; --design takes it.
         live: Show the newest force or, without --force, the displacements of every frame as it comes.
@@ -60,7 +61,14 @@ def command(
         out: Output folder; default out/track, unless that holds the finished run of another job, or any of a
             camera or a pipe.
     """
-    from pinnray.film.force_estimate import MESH, force_table, force_tracker, forces_of, write_forces
+    from pinnray.film.force_estimate import (
+        MESH,
+        force_table,
+        force_tracker,
+        forces_of,
+        loss_remark,
+        write_forces,
+    )
     from pinnray.film.live_force import LiveForce, frame_lines
     from pinnray.film.track_film import track_film, track_table
     from pinnray.geometry.cache import finger_mesh
@@ -96,10 +104,10 @@ def command(
                 tracker = force_tracker(
                     mesh, design, material, design.markers, plane=film.simulated, learned=learned
                 )
-                following = LiveForce(tracker, design.depth)
+                following = LiveForce(tracker, design.depth, material.loss)
             watch = frame_lines(following, publish=publish) if live else None
             with stages.stage("track") as report:
-                tracking, observations = track_film(
+                tracking, observations, _ = track_film(
                     film, design, partial, report, video=not without_video, watch=watch
                 )
             if following is not None:
@@ -108,7 +116,7 @@ def command(
                 with stages.stage("force") as report:
                     points, plane = observations.points, observations.plane
                     tracker = force_tracker(mesh, design, material, points, plane=plane, learned=learned)
-                    forces = forces_of(tracking, tracker, report)
+                    forces = forces_of(tracking, tracker, material.loss, report)
         made = {"versions": package_versions(), "machine": machine()}
         provenance = {"options": given, "design": design.definition(), **made}
         if tracker is not None and material:
@@ -127,8 +135,10 @@ def command(
         say(f"warning: {warning}")
     said = console if publish else Console()
     said.print(track_table(tracking, observations))
-    if forces:
-        said.print(force_table(forces, design.depth, passed_over))
+    if forces and material:
+        said.print(force_table(forces, design.depth, material.loss, passed_over))
+        if not material.loss and (remark := loss_remark(forces, 0.0)):
+            say(f"warning: {remark}")
     for path in sorted(folder.iterdir()):
         print(path, file=said.file)
     return 0

@@ -60,8 +60,9 @@ def others() -> list[Figure]:
     times = np.linspace(0.0, 3.0, 60)
     track = np.stack([times, 0.9 * times, 1.1 * times], axis=1)
     solution = pr.solve("default", "fem", size=3.0)
-    drawn = [draw_tensile_test(test, fitted(test)), draw_force_track(times, track, 35 + track, depth=20.0)]
-    return [*drawn, solution.plot("von_mises"), solution.problem.mesh.plot(), pr.Design().plot()]
+    force = draw_force_track(times, track, 35 + track, times, times > 2, depth=20.0)
+    drawn = [draw_tensile_test(test, fitted(test)), force, solution.plot("von_mises")]
+    return [*drawn, solution.problem.mesh.plot(), pr.Design().plot()]
 
 
 @pytest.mark.slow

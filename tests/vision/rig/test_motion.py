@@ -23,3 +23,11 @@ def test_the_load_grows_at_constant_speed_between():
     assert motion.travel(5) == pytest.approx(0.5 / 7.5)
     assert motion.travel(1) == 0
     assert 0 < means[0] < means[-1] < 1
+
+
+def test_a_finger_that_goes_back_rests_as_long_as_before():
+    motion = Motion(rest=3, moving=7, held=4, back=7, shutter=0.5)
+    assert len(motion) == 24
+    means = np.array([motion.exposed(frame, 5).mean() for frame in range(24)])
+    np.testing.assert_allclose(means[14:21], 1 - means[3:10], atol=1e-12)
+    assert not means[21:].any()

@@ -48,3 +48,14 @@ def test_one_stray_frame_is_no_motion():
 
 def test_two_pictures_are_before_and_after():
     assert find_rest_intervals(film([0, 1])) == RestIntervals(range(1), range(1, 2))
+
+
+@pytest.mark.parametrize("held", [1, 10])
+def test_a_finger_that_comes_back_was_pressed_where_it_was_farthest(held):
+    way = np.linspace(0, 1, 30)
+    rest = find_rest_intervals(
+        film([*np.zeros(12), *way, *np.ones(held - 1), *way[::-1], *np.zeros(9)], noise=0.002)
+    )
+    assert 11 <= rest.initial.stop <= 13
+    assert 40 <= rest.final.start <= 41
+    assert abs(rest.final.stop - (41 + held)) <= 1
