@@ -51,12 +51,6 @@ class Misfit:
         """The misfit of displacements at the markers, shape (m, 2), mm: N mm / mm."""
         return 0.5 * float((self.weights * (displacement - self.observed) ** 2).sum())
 
-    def without(self, marker: int) -> "Misfit":
-        """The misfit of the other markers, with unchanged weights."""
-        arrays = (self.points, self.observed, self.weights)
-        points, observed, weights = (np.delete(values, marker, axis=0) for values in arrays)
-        return Misfit(points, observed, weights, self.radius)
-
 
 FACTORS: FloatArray = 10.0 ** np.arange(-9, 3.25, 0.25)
 """Factors of the weights on the L-curve, among which one can be chosen."""

@@ -83,11 +83,6 @@ class FreePictures:
         parameters = picture_parameters(observations)
         return cls(points[seen], observations.displacements[seen], parameters, points.mean(axis=0))
 
-    def without(self, marker: int) -> "FreePictures":
-        """Those of the other markers, about the same centre."""
-        points, shown = (np.delete(values, marker, axis=0) for values in (self.points, self.shown))
-        return replace(self, points=points, shown=shown)
-
     def at(self, z: FloatArray) -> Pictures:
         """The frames of standardised values, shape (p,)."""
         values, _ = values_of(self.parameters, z)

@@ -350,7 +350,7 @@ def test_a_tolerance_that_is_missed_ends_with_its_own_code(folder, monkeypatch, 
     options = ["--adapt", "1e-6", "--measurements", "good.csv", "--out", "adapted"]
     assert main([*SMALL, *options]) == NOT_CONVERGED
     assert "error: the markers are known to 0.01" in capsys.readouterr().err
-    assert len(Path("adapted/adapt.csv").read_text(encoding="utf-8").splitlines()) == 3
+    assert Path("adapted/report.html").exists()
 
 
 @pytest.mark.parametrize(("given", "threads"), [("", {1}), ("OPENBLAS_NUM_THREADS=2", {2})])

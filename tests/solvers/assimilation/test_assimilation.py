@@ -71,15 +71,6 @@ def test_the_gradient_of_the_misfit_is_the_weighted_residual(problem, weights):
         assert rise == pytest.approx(size**2 * misfit.value(misfit.observed + step), rel=1e-6)
 
 
-def test_without_a_marker_the_others_weigh_the_same(problem):
-    misfit = MarkerSettings().misfit(problem)
-    rest = misfit.without(4)
-    moved = np.random.default_rng(2).normal(size=misfit.observed.shape)
-    moved[4] = misfit.observed[4]
-    assert rest.value(np.delete(moved, 4, axis=0)) == pytest.approx(misfit.value(moved), rel=1e-14)
-    assert rest.points.tolist() == np.delete(misfit.points, 4, axis=0).tolist()
-
-
 def test_a_prediction_without_a_marker_is_what_was_seen_less_the_residual(problem):
     given = problem.observations
     residuals = np.random.default_rng(0).normal(size=(len(given.visible) - 1, 2))
@@ -127,7 +118,6 @@ def test_a_disc_does_not_reach_beyond_the_body(problem):
     """The markers are in the middle of a wall of 2 mm."""
     assert MarkerSettings().misfit(problem).radius == 0.8
     assert MarkerSettings(marker_radius=3.0).misfit(problem).radius == pytest.approx(1.0, rel=1e-9)
-    assert MarkerSettings().misfit(problem).without(0).radius == 0.8
 
 
 @pytest.mark.parametrize("preset", ["default", "slender"])
