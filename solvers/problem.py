@@ -16,9 +16,6 @@ from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import brief
-from pinnray.solvers.load import LEAST_TRAVEL as LEAST_TRAVEL
-from pinnray.solvers.load import RADIUS as RADIUS
-from pinnray.solvers.load import ROUGHEST as ROUGHEST
 from pinnray.solvers.load import Load as Load
 from pinnray.solvers.load import LoadKind as LoadKind
 from pinnray.solvers.load import Physics as Physics

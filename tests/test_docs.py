@@ -369,7 +369,7 @@ def test_the_docs_have_the_settings_of_assimilation_as_they_are(preset):
     assert own.items() >= shared.items()
     if preset == "paper":  # the rows say so
         documented["marker_radius"] = "0.0"
-        del documented["choose"], documented["contact_deviation"]
+        del documented["choose"]
     assert {key: str(own[key]) for key in own if key not in shared} == documented
 
 
@@ -452,7 +452,7 @@ def test_the_measurements_in_the_docs_can_be_read(tmp_path):
 @pytest.mark.parametrize(
     ("page", "column", "listed"),
     [
-        (FORCE, "parameter that can be found", "pinnray.solvers.identification.unknowns:NAMES"),
+        (FORCE, "parameter that can be found", "pinnray.solvers.identification.unknowns:DEFAULT"),
         (OWN_TRUTH, "scheme", "pinnray.studies.crossval.folds:SCHEMES"),
         (OWN_TRUTH, "truth", "pinnray.comparison.evaluation.truths:TRUTHS"),
     ],

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pinnray.comparison.evaluation.differences import relative_l2
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.metrics import solver_scores, truth_scores
 from pinnray.comparison.evaluation.scores import Measurements, Scores
@@ -26,9 +25,6 @@ if TYPE_CHECKING:
 
 TRUTH = "truth"
 """Name of the field of the virtual experiment."""
-
-NEAR = 0.01
-"""Relative difference of two displacements below which one of them is drawn for both."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,26 +87,6 @@ class Results:
         """The evaluations whose fields are drawn and written: all, and the truth's under the name `truth`."""
         true = [] if self.truth is None else [replace(self.truth, solver=TRUTH)]
         return [*self.evaluations, *true]
-
-    @cached_property
-    def near_pairs(self) -> dict[str, tuple[str, float]]:
-        """Solvers whose displacement is near that of one before them, which is drawn, and how near, relative.
-
-        One that found the load is drawn in any case.
-        """
-        drawn: list[Evaluation] = [self.reference]
-        near = {}
-        for each in self.evaluations:
-            pairs = (
-                (other.solver, relative_l2(each.displacement, other.displacement, other.weights))
-                for other in drawn
-            )
-            found = next((pair for pair in pairs if pair[1] < NEAR), None)
-            if found and each is not self.reference and each.identified is None:
-                near[each.solver] = found
-            else:
-                drawn.append(each)
-        return near
 
     def observed(self, evaluation: Evaluation) -> FloatArray:
         """Places where markers were seen, shape (k, 2), mm, in the finger's frame as a solver found it."""

@@ -9,16 +9,13 @@ from typing import NamedTuple
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backend_bases import RendererBase
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
-from PIL import Image
 
 from pinnray.comparison.evaluation.differences import weighted_percentile
 from pinnray.comparison.figures.canvas import Canvas, Extent, Pixels
@@ -107,31 +104,10 @@ def prepare(axes: Axes, extent: Extent) -> None:
 
 def show(axes: Axes, canvas: Canvas, colours: Pixels, points: FloatArray | None = None) -> None:
     """Show a canvas with triangles in `colours`, shape (t, 3), and nodes at `points` if given, mm."""
-    axes.add_image(_BodyImage(axes, canvas.picture(colours, points), canvas.extent))
-
-
-class _BodyImage(AxesImage):
-    """A picture that Pillow brings to the page's pixels, in a quarter of matplotlib's time."""
-
-    def __init__(self, axes: Axes, picture: Pixels, extent: Extent) -> None:
-        limits = (extent.left, extent.right, extent.bottom, extent.top)
-        super().__init__(axes, extent=limits, zorder=1)
-        self._A = picture  # by set_data it would be copied as a masked array
-        self._picture = Image.fromarray(np.ascontiguousarray(picture[::-1]))
-
-    def make_image(
-        self, renderer: RendererBase, magnification: float = 1.0, unsampled: bool = False
-    ) -> tuple[Pixels, float, float, Affine2D]:
-        """The whole pixels of the page that it covers, magnified, and the place of their lower left corner.
-
-        As matplotlib's backends take them: rows from the bottom, and places in pixels without magnification.
-        """
-        corner, opposite = magnification * self.get_window_extent().get_points()
-        first, last = np.ceil(corner), np.floor(opposite)
-        scale = np.array(self._picture.size) / (opposite - corner)
-        box = np.concatenate([first - corner, last - corner]) * np.tile(scale, 2)
-        image = self._picture.resize(tuple((last - first).astype(int)), Image.Resampling.HAMMING, tuple(box))
-        return np.array(image), *(first / magnification), Affine2D()
+    limits = (canvas.extent.left, canvas.extent.right, canvas.extent.bottom, canvas.extent.top)
+    image = AxesImage(axes, extent=limits, zorder=1, interpolation="hanning")
+    image.set_data(canvas.picture(colours, points))
+    axes.add_image(image)
 
 
 def panel(

@@ -94,8 +94,7 @@ def drawn_solvers(
 ) -> list[Evaluation]:
     """The fields that a picture has room for: what they are compared with, the reference, then the others.
 
-    Those that converged come before those that did not. `solvers` are the chosen ones; if empty, all but
-    those of `Results.near_pairs`.
+    Those that converged come before those that did not. `solvers` are the chosen ones; all if empty.
 
     Raises:
         UserError: If one of them is no solver of the comparison.
@@ -108,8 +107,6 @@ def drawn_solvers(
     columns, width = _columns(comparison, page)
     extent = body.field_extent(comparison.mesh, width)
     panels = int((TALLEST - HEAD - FOOT) / (PANEL_TITLE + width * extent.height / extent.width)) * columns
-    if not solvers:
-        known = [each for each in known if each.solver not in comparison.near_pairs]
     chosen = fitting(
         known, comparison.reference, (panels - 1) // 2 if columns == 1 else panels // 2 - 1, solvers
     )

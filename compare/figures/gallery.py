@@ -1,8 +1,7 @@
 """The pictures of a comparison by name, in the order of the report, with their captions."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
-from types import MappingProxyType
 from typing import NamedTuple
 
 from pinnray.comparison.evaluation.comparison import Results
@@ -15,7 +14,6 @@ from pinnray.comparison.figures.overlay import Panels, draw_overlay
 from pinnray.comparison.figures.solver_charts import draw_losses, draw_marker_errors
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.figure import NARROW, WIDTH, Figure
-from pinnray.runtime.tables import percent
 
 
 class Illustration(NamedTuple):
@@ -61,7 +59,7 @@ def _field(
         if len(comparison.shown_fields) > 1:
             where = "Below" if page < NARROW else "Right"
             caption += f" {where}: the field minus {reference}, each on the scale above its panel."
-        caption += _absent(comparison.shown_fields, drawn, comparison.near_pairs)
+        caption += _absent(comparison.shown_fields, drawn)
     return Illustration(draw_field(comparison, quantity, solvers, page), quantity.title, caption)
 
 
@@ -137,18 +135,11 @@ def draw(comparison: Results, name: str, solvers: Collection[str] = (), page: fl
     return drawing
 
 
-def _absent(
-    every: Sequence[Evaluation],
-    drawn: Sequence[Evaluation],
-    near: Mapping[str, tuple[str, float]] = MappingProxyType({}),
-) -> str:
-    """The solvers that a picture does not have, if there are any, and to which other they are near."""
+def _absent(every: Sequence[Evaluation], drawn: Sequence[Evaluation]) -> str:
+    """The solvers that a picture does not have, if there are any."""
     names = {each.solver for each in drawn}
-    absent = [each.solver for each in every if each.solver not in names]
-    twins = [f"{name} ({percent(near[name][1], 2)} from {near[name][0]})" for name in absent if name in near]
-    rest = [each.label for each in every if each.solver in absent and each.solver not in near]
-    said = f" Not drawn, as their displacement is near another’s: {', '.join(twins)}." if twins else ""
-    return said + (f" Left out: {', '.join(rest)}." if rest else "")
+    absent = [each.label for each in every if each.solver not in names]
+    return f" Left out: {', '.join(absent)}." if absent else ""
 
 
 def _given(comparison: Results) -> str:

@@ -20,17 +20,11 @@ from pinnray.comparison.figures.layout import (
     write_heading,
 )
 from pinnray.comparison.figures.solver_colours import solver_look
-from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import BoolArray
 from pinnray.runtime.figure import INK, MUTED, NARROW, SMALL, WIDTH, Figure, figure
 
 HEAD = 0.3
 """Height of the heading, inches."""
-
-
-def wants_log(values: FloatArray) -> bool:
-    """True if a logarithmic axis helps: all values are positive, the largest above 20 times the smallest."""
-    finite = values[np.isfinite(values)]
-    return bool(finite.size and finite.min() > 0 and finite.max() > 20 * finite.min())
 
 
 def draw_losses(comparison: Results, page: float = WIDTH) -> Figure | None:
@@ -55,9 +49,8 @@ def draw_losses(comparison: Results, page: float = WIDTH) -> Figure | None:
                     (colour, mark), label = solver_look(evaluation.solver), evaluation.label_at_markers
                     style: dict[str, Any] = {"marker": mark, "ms": 3.6, "markevery": max(len(losses) // 8, 1)}
                     axes.plot(epochs, losses, color=colour, lw=1, label=label, **style)
-                    if wants_log(losses):
-                        axes.set_yscale("log")
-                        axes.yaxis.set_major_formatter("{x:g}")
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter("{x:g}")
             axes.set_ylabel(f"{term} loss, {units[term]}")
             axes.grid()
             if row == 0:

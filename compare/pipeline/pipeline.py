@@ -18,7 +18,7 @@ from pinnray.comparison.evaluation.virtual_experiment import (
 )
 from pinnray.comparison.figures import Picture, draw_all
 from pinnray.comparison.pipeline.job import Job, MarkerSource, checked
-from pinnray.comparison.pipeline.shared_mesh import shared_mesh, write_rounds
+from pinnray.comparison.pipeline.shared_mesh import shared_mesh
 from pinnray.comparison.pipeline.solving import ERRORS, solve_all
 from pinnray.comparison.report.comparison import Comparison
 from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
@@ -179,8 +179,6 @@ def _write(
     from pinnray.comparison.report.html_report import write_report
     from pinnray.comparison.report.output_files import write_vtu
 
-    if comparison.adaptation is not None:
-        write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
     comparison.scores.write(folder)
     if job.learn is not None:

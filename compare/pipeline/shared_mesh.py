@@ -1,14 +1,12 @@
 """The mesh that the solvers share, refined first if a tolerance asks for it."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.stages import Stages
-from pinnray.runtime.tables import Cell, write_csv
 from pinnray.solvers.fem.adaptive_refinement import Adaptation
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
@@ -58,18 +56,3 @@ def shared_mesh(
         if not adaptation.reached:
             progress(1.0, adaptation.message)
     return adaptation.mesh, adaptation
-
-
-def write_rounds(path: Path, adaptation: Adaptation) -> None:
-    """Write a row for every mesh on the way, the last one the shared mesh."""
-    rows: list[dict[str, Cell]] = [
-        {
-            "round": number,
-            "triangles": step.triangles,
-            "nodes": step.nodes,
-            "markers_mm": step.at_markers,
-            "energy_norm_rel": step.energy_norm,
-        }
-        for number, step in enumerate(adaptation.rounds)
-    ]
-    write_csv(path, rows)

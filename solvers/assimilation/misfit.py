@@ -14,7 +14,7 @@ for the posterior's mode.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from scipy.special import roots_legendre
@@ -23,42 +23,15 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
+from pinnray.solvers.assimilation.marker_forces import MarkerForces, root_mean_square
 from pinnray.solvers.problem import Problem
+from pinnray.solvers.solver import FieldSettings
 
 Weighting = Literal["paper", "precision"]
 Choice = Literal["given", "left-out"]
 
 MIN_STANDARD_DEVIATION = 0.005
 """Minimum standard deviation of an observation, mm: a well-calibrated camera's; simulated ones have none."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MarkerSettings:
-    """Settings of a solver that minimises the misfit to the markers together with the energy.
-
-    Attributes:
-        weights: "paper": W = 2 A λ_ASM / m, from the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density
-            and the body's area A. "precision": W = scale / σ², with standard deviations σ of at least
-            `MIN_STANDARD_DEVIATION`, so that the minimiser of J is the mode of the posterior for the prior
-            exp(-E / scale) and independent normal errors of the observations.
-        asm_weight: λ_ASM, MPa/mm², for "paper".
-        scale: Model error for "precision", as an energy per depth, N mm / mm: a typical deviation from the
-            model's solution has half of it in every degree of freedom.
-        marker_radius: Radius of the discs over which the displacement is averaged, mm; 0: the centres; None:
-            the observations' own; less where a marker is nearer to the boundary of the body.
-        contact_deviation: Standard deviation of the contact's displacement about the prescribed one, mm: a
-            spring of stiffness scale / contact_deviation² between contact and indenter, or none if zero.
-        choose: Factor of the weights: "given" (one), or of `FACTORS` the one with the least error at markers
-            left out one at a time ("left-out").
-    """
-
-    weights: Weighting = "paper"
-    asm_weight: float = 1000.0
-    scale: float = 1.0
-    marker_radius: float | None = None
-    contact_deviation: float = 0.0
-    choose: Choice = "given"
-    assimilates: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,28 +51,90 @@ class Misfit:
         """The misfit of displacements at the markers, shape (m, 2), mm: N mm / mm."""
         return 0.5 * float((self.weights * (displacement - self.observed) ** 2).sum())
 
-    def without(self, marker: int) -> "Misfit":
-        """The misfit of the other markers, with unchanged weights."""
-        arrays = (self.points, self.observed, self.weights)
-        points, observed, weights = (np.delete(values, marker, axis=0) for values in arrays)
-        return Misfit(points, observed, weights, self.radius)
+
+FACTORS: FloatArray = 10.0 ** np.arange(-9, 3.25, 0.25)
+"""Factors of the weights on the L-curve, among which one can be chosen."""
 
 
-def misfit_of(problem: Problem, settings: MarkerSettings | None = None) -> Misfit | None:
-    """The misfit to the markers that were seen; None where the problem has no observations."""
-    settings, observations = settings or MarkerSettings(), problem.observations
-    if observations is None:
-        return None
-    seen = observations.visible
-    if settings.weights == "paper":
-        area = float(problem.mesh.areas.sum())
-        diagonal = np.full((int(seen.sum()), 2), 2 * area * settings.asm_weight / seen.sum())
-    else:
-        diagonal = settings.scale / standard_deviations(observations) ** 2
-    points = observations.points[seen]
-    radius = observations.marker_radius if settings.marker_radius is None else settings.marker_radius
-    radius = radius_within(problem.mesh, points, radius)
-    return Misfit(points, observations.displacements[seen], diagonal, radius)
+@dataclass(frozen=True, kw_only=True)
+class MarkerWeights(FieldSettings):
+    """Settings of a solver that minimises the misfit to the markers together with the energy.
+
+    Attributes:
+        weights: "paper": W = 2 A λ_ASM / m, from the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density
+            and the body's area A. "precision": W = scale / σ², with standard deviations σ of at least
+            `MIN_STANDARD_DEVIATION`, so that the minimiser of J is the mode of the posterior for the prior
+            exp(-E / scale) and independent normal errors of the observations.
+        asm_weight: λ_ASM, MPa/mm², for "paper".
+        scale: Model error for "precision", as an energy per depth, N mm / mm: a typical deviation from the
+            model's solution has half of it in every degree of freedom.
+        marker_radius: Radius of the discs over which the displacement is averaged, mm; 0: the centres; None:
+            the observations' own; less where a marker is nearer to the boundary of the body.
+    """
+
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
+    marker_radius: float | None = None
+    assimilates: ClassVar[bool] = True
+
+    def check_weights(self) -> None:
+        """Raise a `UserError` if a setting is none of its names, or below zero."""
+        for setting, kind in (("weights", Weighting), ("choose", Choice)):
+            names, value = get_args(kind), getattr(self, setting, None)
+            if value is not None and value not in names:
+                raise UserError(f"{self.name}: {setting} must be {' or '.join(names)}, got {value!r}")
+        self.check_not_negative("asm_weight", "scale", "marker_radius")
+
+    def misfit(self, problem: Problem) -> Misfit | None:
+        """The misfit to the markers that were seen; None without observations, or with weights of zero."""
+        if (observations := problem.observations) is None or not self.asm_weight * self.scale:
+            return None
+        seen = observations.visible
+        if self.weights == "paper":
+            area = float(problem.mesh.areas.sum())
+            diagonal = np.full((int(seen.sum()), 2), 2 * area * self.asm_weight / seen.sum())
+        else:
+            diagonal = self.scale / standard_deviations(observations) ** 2
+        points = observations.points[seen]
+        radius = observations.marker_radius if self.marker_radius is None else self.marker_radius
+        radius = radius_within(problem.mesh, points, radius)
+        return Misfit(points, observations.displacements[seen], diagonal, radius)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarkerSettings(MarkerWeights):
+    """Settings of a solver that can choose a factor of the weights.
+
+    Attributes:
+        choose: Factor of the weights: "given" (one), or of `FACTORS` the one with the least error at markers
+            left out one at a time ("left-out").
+    """
+
+    choose: Choice = "given"
+
+    def misfit(self, problem: Problem) -> Misfit | None:
+        """See `MarkerWeights`; a `UserError` refuses to choose a factor at finite strain."""
+        found = super().misfit(problem)
+        if found is not None and problem.material.law != "linear" and self.choose != "given":
+            raise UserError(f"{self.name}: choose={self.choose} is for the linear law; take given")
+        return found
+
+    def curve(self, forces: MarkerForces) -> dict[str, FloatArray]:
+        """The L-curve: energy and misfits over the factors of the weights."""
+        fits = [forces.fit(factor) for factor in FACTORS]
+        return {
+            "weight_factor": FACTORS,
+            "curve_energy": np.array([fit.energy for fit in fits]),
+            "curve_in_sample_mm": np.array([root_mean_square(fit.residual) for fit in fits]),
+            "curve_left_out_mm": np.array([root_mean_square(fit.residual_without) for fit in fits]),
+        }
+
+    def factor(self, forces: MarkerForces) -> float:
+        """The factor chosen."""
+        if self.choose == "given":
+            return 1.0
+        return float(FACTORS[self.curve(forces)["curve_left_out_mm"].argmin()])
 
 
 def disc_quadrature(centres: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:

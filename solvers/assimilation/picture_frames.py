@@ -21,8 +21,7 @@ from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Pictures, R
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Parameter, values_of
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
-from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
-from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
+from pinnray.solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution
 
@@ -84,11 +83,6 @@ class FreePictures:
         parameters = picture_parameters(observations)
         return cls(points[seen], observations.displacements[seen], parameters, points.mean(axis=0))
 
-    def without(self, marker: int) -> "FreePictures":
-        """Those of the other markers, about the same centre."""
-        points, shown = (np.delete(values, marker, axis=0) for values in (self.points, self.shown))
-        return replace(self, points=points, shown=shown)
-
     def at(self, z: FloatArray) -> Pictures:
         """The frames of standardised values, shape (p,)."""
         values, _ = values_of(self.parameters, z)
@@ -111,30 +105,30 @@ class FreePictures:
             z = solve(self.about(z))
         return z
 
-    def by_forces(self, forces: MarkerForces, weighting: MarkerWeighting) -> FramedFit:
+    def by_forces(self, forces: MarkerForces, settings: MarkerSettings) -> FramedFit:
         """The frames at the least energy plus misfit.
 
         Args:
             forces: At the markers, of the displacements that the pictures show as they are.
-            weighting: Of the markers.
+            settings: Of the markers' weights.
         """
         undisturbed = forces.prior_residual - self.shown
 
         def joint(framed: FramedData) -> tuple[MarkerForces, FloatArray, float]:
             """With the frames' compliance, their rows (p, 2 m), and the factor of the weights."""
             rows = framed.frames.reshape(len(framed.frames), forces.prior_residual.size)
-            compliance = forces.compliance + rows.T @ rows / weighting.scale
+            compliance = forces.compliance + rows.T @ rows / settings.scale
             own = replace(forces, compliance=compliance, prior_residual=undisturbed + framed.observed)
-            return own, rows, weighting.factor(own)
+            return own, rows, settings.factor(own)
 
         def found(framed: FramedData) -> FloatArray:
             own, rows, factor = joint(framed)
-            return rows @ own.fit(factor).forces.ravel() / weighting.scale
+            return rows @ own.fit(factor).forces.ravel() / settings.scale
 
         z = self.found(found)
         own, rows, factor = joint(self.about(z))
         springs = own.compliance + np.diag(1 / (factor * own.weights.ravel()))
-        known = rows @ np.linalg.solve(springs, rows.T) / weighting.scale
+        known = rows @ np.linalg.solve(springs, rows.T) / settings.scale
         pictures = self.at(z)
         seen = pictures.pressed.undone(self.points + self.shown)
         residual = np.einsum("mij,mj->mi", pictures.jacobians(seen), own.fit(factor).residual_without)

@@ -1,7 +1,7 @@
 """`fem-asm`: the displacement of least energy plus misfit to the markers, exactly, on the shared mesh.
 
 At a stationary point of E(u) + 1/2 (B u - d)^T W (B u - d) the force f_j acts on component j of the markers,
-where b_j . u + f_j / W_jj = d_j: the misfit is a compliant spring, as is a contact with a standard deviation.
+where b_j . u + f_j / W_jj = d_j: the misfit is a compliant spring.
 For the linear law the forces follow from the compliance at the markers. At finite strain the observed
 displacements grow with the load on its path; to leave a marker out, Newton's method continues from the
 solution without its two springs and, where that does not converge, from rest.
@@ -15,7 +15,6 @@ import numpy as np
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerForces, residual_phrase
-from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
 from pinnray.solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
 from pinnray.solvers.assimilation.picture_frames import FreePictures
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
@@ -66,13 +65,13 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self.weighting
+        self.check_weights()
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve for the minimiser; see `Solver`. Without markers it is `fem` or `fem-nonlinear`."""
         check_problem(self, problem)
         linear = problem.material.law in FemSolver.laws
-        if self.weighting.misfit(problem) is not None:
+        if self.misfit(problem) is not None:
             return self._minimiser(problem, progress) if linear else self._stationary(problem, progress)
         alone = (
             FemSolver(degree=self.degree, estimate=False)
@@ -84,19 +83,14 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
         return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
     def _misfit(self, problem: Problem) -> Misfit:
-        if (misfit := self.weighting.misfit(problem)) is None:
+        if (misfit := self.misfit(problem)) is None:
             raise UserError("fem-asm was given no markers to assimilate")
         return misfit
-
-    @property
-    def weighting(self) -> MarkerWeighting:
-        """The weights of the markers and the choice of their factor."""
-        return MarkerWeighting.of(self)
 
     def _compliance(self, problem: Problem) -> MarkerCompliance:
         """Factorise, and solve for the problem and for every component of a marker."""
         misfit, space = self._misfit(problem), LagrangeSpace(problem.mesh, self.degree)
-        constraints = DisplacementConstraints.of(problem, space, self.weighting.slack)
+        constraints = DisplacementConstraints.of(problem, space)
         equilibrium = DiscreteEquilibrium(problem, space, constraints)
         rows = DisplacementConstraints.springs(misfit, space).functionals
         markers = ConstrainedElimination(rows, equilibrium.responses(rows))
@@ -110,7 +104,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
         if observations is None or not (pictures := FreePictures.of(observations)).parameters:
             solution = self._fitted(problem, finger)
         else:
-            found = pictures.by_forces(finger.forces(self._misfit(problem)), self.weighting)
+            found = pictures.by_forces(finger.forces(self._misfit(problem)), self)
             straight = replace(problem, observations=pictures.straightened(observations, found.z))
             solution = pictures.framed(self._fitted(straight, finger), problem, found)
         finger.equilibrium.factors.destroy()
@@ -119,7 +113,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
     def _fitted(self, problem: Problem, finger: MarkerCompliance) -> Solution:
         misfit = self._misfit(problem)
         forces = finger.forces(misfit)
-        factor = self.weighting.factor(forces)
+        factor = self.factor(forces)
         fit = forces.fit(factor)
         nodal, space = finger.under(fit.forces), LagrangeSpace(problem.mesh, self.degree)
         residual = finger.equilibrium.internal_force(nodal)
@@ -138,7 +132,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
                 "misfit": factor * misfit.value(misfit.observed - fit.residual),
                 "marker_force": float(np.linalg.norm(fit.forces, axis=1).max()),
             },
-            history=self.weighting.curve(forces),
+            history=self.curve(forces),
             left_out=leave_one_out_displacements(problem, fit.residual_without),
         )
 
@@ -149,7 +143,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
         # Shorter steps do not help: large forces at the markers invert elements.
         solver = FemNonlinearSolver(degree=self.degree, min_step=0.01)
         springs = DisplacementConstraints.springs(misfit, space)
-        constraints = DisplacementConstraints.of(problem, space, self.weighting.slack).joined(springs)
+        constraints = DisplacementConstraints.of(problem, space).joined(springs)
         path = solver.path(problem, space, constraints)
         path.follow(lambda done, text: progress(0.5 * done, text))
         stats, phrase, history, last = path.stats, path.phrase, path.history(), path.points[-1]
@@ -158,7 +152,7 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
         residual = (springs.targets - springs.values(last.nodal)).reshape(-1, 2)
         if last.fraction < 1:
             left_out = None
-            advice = "let the contact slide, give it a contact_deviation or take smaller weights"
+            advice = "let the contact slide, or take smaller weights"
             status = Status(False, f"{phrase}: load and markers contradict each other; {advice}")
         else:
             missed = _left_out(path, solver, springs, progress)

@@ -32,15 +32,15 @@ class DisplacementConstraints:
     slacks: FloatArray
 
     @classmethod
-    def of(cls, problem: Problem, space: NodalSpace, slack: float = 0.0) -> "DisplacementConstraints":
-        """The constraints of a `mean` or `point` load, all of one slack; else none."""
+    def of(cls, problem: Problem, space: NodalSpace) -> "DisplacementConstraints":
+        """The constraints of a `mean` or `point` load; else none."""
         if problem.load.kind not in ("mean", "point"):
             return cls(np.zeros((0, *space.nodes.shape)), np.zeros(0), np.zeros(0))
         coefficients, targets = space.mean_value(*contact_functional(problem)), problem.load.values
         functionals = np.zeros((len(targets), *space.nodes.shape))
         for row, axis in enumerate(problem.load.prescribed):
             functionals[row, :, axis] = coefficients
-        return cls(functionals, targets, np.full(len(targets), slack))
+        return cls(functionals, targets, np.zeros(len(targets)))
 
     @classmethod
     def springs(cls, misfit: Misfit, space: LagrangeSpace) -> "DisplacementConstraints":

@@ -141,11 +141,6 @@ class DolfinxSpace(Generic[SpaceT]):
         self.function = dolfinx.fem.Function(self.dolfinx_space)
         self._node_of_dof = _nodes_of_dofs(space, self.domain, self.dolfinx_space)
 
-    def move(self, points: FloatArray) -> None:
-        """Put the corners of the cells at other points, shape (n, d), mm."""
-        where = np.asarray(self.domain.geometry.input_global_indices)
-        self.domain.geometry.x[:, : self.dimension] = points[where]
-
     def moduli(self, lame: Lame) -> Lame:
         """Lamé's constants λ and μ as numbers that can change without compiling a form again."""
         λ, μ = (dolfinx.fem.Constant(self.domain, PETSc.ScalarType(value)) for value in lame[:2])

@@ -10,17 +10,18 @@ import numpy as np
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
+from pinnray.solvers.cylinder_contact import contact_of
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps, check_stops
 from pinnray.solvers.fem.finite_strain.nested_path import followed
-from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
+from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver, path_status
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.solution import Solution, Status, unstable_phrase
+from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
 
 STEPS = LoadSteps(first_step=1.0, max_step=1.0, min_step=0.01, max_iterations=20)
 """In small ones the friction of a solid hardly settles."""
+REMARK = "the field is that of the side face; its discretisation error was not estimated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +105,8 @@ class Fem3dSolver(FieldSettings):
             way = FemNonlinearSolver().path(problem, space.section, rough=True)
         path = LoadPath(problem, space, steps=replace(STEPS, stops=self.stops))
         whole = followed(path, way, progress)
-        last, history, region = path.points[-1], whole.history(), whole.regions()[-1]
+        last, history, regions = path.points[-1], whole.history(), whole.regions()
+        region = regions[-1]
         unstable = 0 if linear else path.equilibrium.unstable
         abscissa = path.force_abscissa(last)
         whole.close()
@@ -114,7 +116,7 @@ class Fem3dSolver(FieldSettings):
             field=FaceField(space, last.nodal),
             energy=float(history["energy"][-1]),
             reaction=np.array([history["reaction_x"][-1], history["reaction_y"][-1]]),
-            status=_status(path, whole.phrase, region, unstable),
+            status=path_status(path, whole.phrase, regions, unstable, REMARK),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": last.nodal.size,
@@ -130,18 +132,3 @@ class Fem3dSolver(FieldSettings):
             states=[FaceField(space, nodal) for nodal in whole.states()],
             contact=contact_of(problem, abscissa, region),
         )
-
-
-def _status(path: LoadPath, taken: str, region: ContactRegion | None, unstable: int) -> Status:
-    """Success at the full load, or advice."""
-    if path.points[-1].fraction < 1:
-        return Status(False, f"{taken}; {path.advice}")
-    if region and region.at_end:
-        return Status(False, CONTACT_AT_END)
-    if unstable:
-        return Status(False, f"all of the load applied, but {unstable_phrase(unstable)}")
-    return Status(
-        True,
-        f"{taken}, solved directly; the field is that of the side face; its discretisation error was not "
-        "estimated",
-    )

@@ -10,7 +10,6 @@ from functools import partial
 
 import numpy as np
 
-from pinnray.geometry.mesh.boundary import evenly_spaced_points
 from pinnray.geometry.observations import Observations
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements, standard_deviations
 from pinnray.solvers.assimilation.picture_frames import FramedData, FreePictures
@@ -39,7 +38,6 @@ class GaussianProcessSolver(FieldSettings):
     one is left out.
     """
 
-    clamp: bool = False  # Whether the process is conditioned on a base at rest, a stronger null model
     name = "gp"
     family = "statistics"
     laws = ("linear",)
@@ -78,18 +76,9 @@ class GaussianProcessSolver(FieldSettings):
                 f"gp goes through markers: it needs {least} that were seen, not {count}"
             )
         pictures, deviations = FreePictures.of(observations), standard_deviations(observations)
-        base = evenly_spaced_points(problem.mesh, "base", 5) if self.clamp else np.zeros((0, 2))
 
         def conditioned(framed: FramedData) -> Posterior:
-            """Of the markers and the base, which is at rest whatever the pictures' frames are."""
-            rest = np.zeros_like(base)
-            data = MarkerData(
-                points=np.concatenate([pictures.points, base]),
-                observed=np.concatenate([framed.observed, rest]),
-                deviations=np.concatenate([deviations, np.full_like(base, deviations.min())]),
-                frames=np.concatenate([framed.frames, np.zeros((len(framed.frames), *base.shape))], axis=1),
-            )
-            return Posterior.of(data)
+            return Posterior.of(MarkerData(pictures.points, framed.observed, deviations, framed.frames))
 
         z = pictures.found(lambda framed: conditioned(framed).frames[0])
         posterior = conditioned(pictures.about(z))

@@ -93,7 +93,7 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
             field=LagrangeField(space, last.nodal),
             energy=float(history["energy"][-1]),
             reaction=np.array([history[name][-1] for name in ("reaction_x", "reaction_y")]),
-            status=_status(path, whole.phrase, regions, unstable, "; ".join(filter(None, remarks))),
+            status=path_status(path, whole.phrase, regions, unstable, "; ".join(filter(None, remarks))),
             stats={
                 "seconds": solved - started,
                 "estimate_seconds": time.perf_counter() - solved,
@@ -124,7 +124,7 @@ def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstim
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 
 
-def _status(
+def path_status(
     path: LoadPath, taken: str, regions: Sequence[ContactRegion | None], unstable: int, remarks: str
 ) -> Status:
     """Success at the full load with remarks, or advice."""

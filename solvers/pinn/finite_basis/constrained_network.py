@@ -9,7 +9,7 @@ import torch
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
-from pinnray.solvers.assimilation.marker_weighting import MarkerWeighting
+from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION, NetworkEnergy
 from pinnray.solvers.pinn.finite_basis.load_conditions import load_conditions
@@ -61,7 +61,7 @@ class PointSprings(NamedTuple):
 class ConstrainedNetwork:
     """A network with springs, each of which pulls a functional of its displacement to a target.
 
-    Springs of the load are rigid, or nearly so; those of the markers have the compliance 1 / weight, which
+    Springs of the load are rigid; those of the markers have the compliance 1 / weight, which
     makes their energy the misfit.
     """
 
@@ -70,12 +70,12 @@ class ConstrainedNetwork:
     targets: FloatArray  # Their prescribed or observed values, shape (n,), mm
     compliance: FloatArray  # Of the springs, shape (n,), mm per N/mm
     springs: tuple[PointSprings, ...]  # Where these functionals come from: the load, then the markers
-    weighting: MarkerWeighting | None  # Chooses a factor of the markers' weights; None without markers
+    weighting: MarkerSettings | None  # Chooses a factor of the markers' weights; None without markers
     factor: float | None = None  # That factor, where it is held
 
     @classmethod
     def of(
-        cls, energy: NetworkEnergy, problem: Problem, weighting: MarkerWeighting | None = None
+        cls, energy: NetworkEnergy, problem: Problem, weighting: MarkerSettings | None = None
     ) -> "ConstrainedNetwork":
         """The network of an energy under the load and, with a weighting, the markers of a problem."""
         conditions = load_conditions(problem)
@@ -86,7 +86,7 @@ class ConstrainedNetwork:
         if weighting is not None and misfit is not None:
             springs.append(PointSprings(*misfit.sampling(), [0, 1]))
             targets = np.concatenate([targets, misfit.observed.ravel()])
-            compliance = np.concatenate([compliance + weighting.slack, 1 / misfit.weights.ravel()])
+            compliance = np.concatenate([compliance, 1 / misfit.weights.ravel()])
         return cls(
             energy,
             _functionals(springs, energy.basis),

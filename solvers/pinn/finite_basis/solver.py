@@ -86,7 +86,13 @@ class FiniteBasisSolver(NetworkSolver):
         self.check_positive(*(name for name in self._of_network if name not in ("seed", "growth")))
         if self.seed < 0 or self.neurons < 2 or self.coarser <= 1 or self.growth < 0:
             raise UserError(f"{self.name} needs seed >= 0, neurons >= 2, coarser > 1 and growth >= 0")
-        _ = self.weighting
+        if self.weighting is not None:
+            self.weighting.check_weights()
+
+    @property
+    def weighting(self) -> MarkerSettings | None:
+        """The settings of the markers' weights; None for a solver that does not assimilate them."""
+        return self if isinstance(self, MarkerSettings) else None
 
     @property
     def _of_network(self) -> dict[str, object]:

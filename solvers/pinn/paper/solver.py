@@ -11,7 +11,7 @@ from pinnray.geometry.mesh.boundary import evenly_spaced_points
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.misfit import Weighting
+from pinnray.solvers.assimilation.misfit import MarkerWeights
 from pinnray.solvers.pinn.network_solver import NetworkSolver
 from pinnray.solvers.pinn.paper.checkpoint import CheckpointStore
 from pinnray.solvers.pinn.paper.loss import DisplacementTerm, EnergyTerm, Loss, LossTerm, stiffness_matrix
@@ -68,7 +68,6 @@ class PaperPinnSolver(NetworkSolver):
         self.check_not_negative("checkpoint_every", "seed")
         if self.device == "cuda" and not torch.cuda.is_available():
             raise UserError(f"{self.name}: device cuda needs a GPU and torch's CUDA build; take device=cpu")
-        _ = self.weighting
 
     def in_context(self, context: TrainingContext) -> "PaperPinnSolver":
         """The same solver that saves and resumes in `context`; see `TrainedSolver`."""
@@ -155,7 +154,8 @@ class PaperPinnSolver(NetworkSolver):
             ),
         ]
         factors = {"PDE": 1.0, "BC": self.bc_weight}
-        if (misfit := self.misfit(problem)) is not None:
+        misfit = self.misfit(problem) if isinstance(self, MarkerWeights) else None
+        if misfit is not None:
             points, means = misfit.sampling()
             total = float(misfit.weights.sum())
             factors["ASM"] = total / (4 * float(problem.mesh.areas.sum()))
@@ -172,17 +172,17 @@ class PaperPinnSolver(NetworkSolver):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaperPinnAsmSolver(PaperPinnSolver):
+class PaperPinnAsmSolver(MarkerWeights, PaperPinnSolver):
     """The networks and the training of `PaperPinnSolver`, with the paper's L_ASM in the loss.
 
     Attributes:
-        marker_radius: As in `MarkerSettings`; the paper takes the displacement of the centre.
+        marker_radius: As in `MarkerWeights`; the paper takes the displacement of the centre.
     """
 
-    weights: Weighting = "paper"
-    asm_weight: float = 1000.0
-    scale: float = 1.0
     marker_radius: float | None = 0.0
     name: ClassVar[str] = "pinn-asm"
     twin: ClassVar[str] = "fem-asm"
-    assimilates: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check_weights()

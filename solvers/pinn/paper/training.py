@@ -59,7 +59,7 @@ class Training:
         return np.array(self._rows).reshape(-1, len(self.columns))
 
     def run(self, epochs: int, checkpoint_every: int, progress: Progress) -> None:
-        """Train, and report the terms of the loss, the energy and the time left after each epoch.
+        """Train, and report the terms of the loss and the energy after each epoch.
 
         Args:
             epochs: In all, those of a checkpoint included.
@@ -69,18 +69,14 @@ class Training:
         Raises:
             TrainingDiverged: If the loss is not a number or has grown beyond all bounds.
         """
-        last, done, started = self._state(), self.epoch, time.perf_counter()
+        last = self._state()
         try:
             while self.epoch < epochs:
                 terms = self._step()
                 last = self._state()
                 if checkpoint_every and self.epoch % checkpoint_every == 0:
                     self._save(last)
-                pace = (time.perf_counter() - started) / (self.epoch - done)
-                left = _duration(pace * (epochs - self.epoch))
-                progress(
-                    self.epoch / epochs, f"epoch {self.epoch} of {epochs}: {self._said(terms)}, {left} left"
-                )
+                progress(self.epoch / epochs, f"epoch {self.epoch} of {epochs}: {self._said(terms)}")
         except KeyboardInterrupt:
             self._save(last)
             raise
@@ -126,9 +122,3 @@ class Training:
             history = self.history[: state["epoch"]]
             self._store.save({**state, "history": torch.from_numpy(history)})
             self._store.write_history(self.columns, history)
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 100 * 60 else f"{seconds / 3600:.1f} h"

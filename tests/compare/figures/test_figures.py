@@ -260,21 +260,3 @@ def test_a_picture_of_fields_fits_a_page_and_has_the_chosen_solvers(fem, pinn, c
     assert "solver-1 (not converged)" in drawing.caption.split("Left out")[1]
     chosen = page_of(draw(comparison, "von_mises", ["solver-13", "solver-12"]).figure)
     assert [word for word, _ in chosen.words if word.startswith("solver-")] == ["solver-12", "solver-13"]
-
-
-def test_one_of_two_near_fields_is_drawn_and_both_that_found_the_load(fem, pinn, evaluate, compared):
-    force = IdentifiedForce(Estimated(0.5, 0.4, 0.8), Estimated(0.0, -0.1, 0.1), None)
-    near = evaluate("pinn-near", 1.001)
-    found = [replace(pinn, solver=name, in_sample=True, identified=force) for name in ("fem-id", "pinn-id")]
-    comparison = compared(fem, near, pinn, *found)
-    assert comparison.near_pairs == {"pinn-near": ("fem", pytest.approx(0.001))}
-    drawing = draw(comparison, "von_mises")
-    assert "near another’s: pinn-near (0.10\N{NO-BREAK SPACE}% from fem)." in drawing.caption
-    text = page_of(drawing.figure).text
-    assert [name in text for name in ("pinn-near", "fem-id", "pinn-id", "pinn-std")] == [
-        False,
-        True,
-        True,
-        True,
-    ]
-    assert "pinn-near" in page_of(draw(comparison, "von_mises", ["pinn-near"]).figure).text

@@ -11,7 +11,6 @@ from pinnray.solvers.assimilation.misfit import (
     MarkerSettings,
     disc_quadrature,
     leave_one_out_displacements,
-    misfit_of,
     radius_within,
 )
 from pinnray.solvers.problem import Problem
@@ -32,7 +31,7 @@ def problem(coarse_mesh):
 
 
 def test_no_observations_no_misfit(coarse_mesh):
-    assert misfit_of(Problem(coarse_mesh)) is None
+    assert MarkerSettings().misfit(Problem(coarse_mesh)) is None
 
 
 def test_paper_weights_are_its_loss_times_the_area(problem):
@@ -44,7 +43,7 @@ def test_paper_weights_are_its_loss_times_the_area(problem):
         (u - observations.displacements[marker, 0]) ** 2 + (v - observations.displacements[marker, 1]) ** 2
         for marker, (u, v) in zip(seen, moved, strict=True)
     ) / len(seen)
-    misfit = misfit_of(problem, MarkerSettings(asm_weight=7.0))
+    misfit = MarkerSettings(asm_weight=7.0).misfit(problem)
     assert misfit.value(moved) == pytest.approx(problem.mesh.areas.sum() * 7.0 * loss, rel=1e-12)
 
 
@@ -52,7 +51,7 @@ def test_precision_weights_are_the_log_likelihood_times_the_scale(problem):
     """The density of the errors by SciPy, whose logarithm falls by the misfit over the scale."""
     from scipy.stats import norm
 
-    misfit = misfit_of(problem, MarkerSettings(weights="precision", scale=0.3))
+    misfit = MarkerSettings(weights="precision", scale=0.3).misfit(problem)
     seen = problem.observations.visible
     deviations = np.maximum(problem.observations.standard_deviations[seen], 0.005)
     assert deviations.min() == 0.005, "the smallest that counts"
@@ -63,22 +62,13 @@ def test_precision_weights_are_the_log_likelihood_times_the_scale(problem):
 @pytest.mark.parametrize("weights", ["paper", "precision"])
 def test_the_gradient_of_the_misfit_is_the_weighted_residual(problem, weights):
     """Taylor's remainder of a quadratic is the misfit of the step itself, for any step."""
-    misfit = misfit_of(problem, MarkerSettings(weights=weights))
+    misfit = MarkerSettings(weights=weights).misfit(problem)
     random = np.random.default_rng(5)
     moved, step = random.normal(size=(2, *misfit.observed.shape))
     slope = -(misfit.weights * (misfit.observed - moved) * step).sum()
     for size in (1.0, 1e-3):
         rise = misfit.value(moved + size * step) - misfit.value(moved) - size * slope
         assert rise == pytest.approx(size**2 * misfit.value(misfit.observed + step), rel=1e-6)
-
-
-def test_without_a_marker_the_others_weigh_the_same(problem):
-    misfit = misfit_of(problem)
-    rest = misfit.without(4)
-    moved = np.random.default_rng(2).normal(size=misfit.observed.shape)
-    moved[4] = misfit.observed[4]
-    assert rest.value(np.delete(moved, 4, axis=0)) == pytest.approx(misfit.value(moved), rel=1e-14)
-    assert rest.points.tolist() == np.delete(misfit.points, 4, axis=0).tolist()
 
 
 def test_a_prediction_without_a_marker_is_what_was_seen_less_the_residual(problem):
@@ -92,8 +82,8 @@ def test_a_prediction_without_a_marker_is_what_was_seen_less_the_residual(proble
 
 def test_a_marker_moves_by_the_mean_over_its_disc(problem):
     """That of x^2 y over a disc around (a, b) is a^2 b + b r^2 / 4, of a square distance more by r^2 / 2."""
-    misfit = misfit_of(problem, MarkerSettings(marker_radius=0.5))
-    points, shares = misfit_of(problem, MarkerSettings(marker_radius=0.0)).sampling()
+    misfit = MarkerSettings(marker_radius=0.5).misfit(problem)
+    points, shares = MarkerSettings(marker_radius=0.0).misfit(problem).sampling()
     np.testing.assert_array_equal(shares @ points, misfit.points)  # without a radius the centre
     (x, y), shares = misfit.sampling()[0].T, misfit.sampling()[1]
     a, b = misfit.points.T
@@ -126,9 +116,8 @@ def test_a_disc_is_as_large_as_the_distance_from_the_boundary(coarse_mesh):
 
 def test_a_disc_does_not_reach_beyond_the_body(problem):
     """The markers are in the middle of a wall of 2 mm."""
-    assert misfit_of(problem).radius == 0.8
-    assert misfit_of(problem, MarkerSettings(marker_radius=3.0)).radius == pytest.approx(1.0, rel=1e-9)
-    assert misfit_of(problem).without(0).radius == 0.8
+    assert MarkerSettings().misfit(problem).radius == 0.8
+    assert MarkerSettings(marker_radius=3.0).misfit(problem).radius == pytest.approx(1.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("preset", ["default", "slender"])
@@ -136,5 +125,5 @@ def test_a_disc_does_not_reach_beyond_the_body(problem):
 def test_the_disc_is_that_of_the_designs_markers(problem, preset, name):
     radius = load_design(preset).marker_diameter / 2
     observed = replace(problem, observations=replace(problem.observations, marker_radius=radius))
-    assert make_solver(name).weighting.misfit(observed).radius == radius  # type: ignore[attr-defined]
-    assert make_solver(name, marker_radius=0.3).weighting.misfit(observed).radius == 0.3  # type: ignore[attr-defined]
+    assert make_solver(name).misfit(observed).radius == radius  # type: ignore[attr-defined]
+    assert make_solver(name, marker_radius=0.3).misfit(observed).radius == 0.3  # type: ignore[attr-defined]

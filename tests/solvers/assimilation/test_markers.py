@@ -9,9 +9,8 @@ import pytest
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
-from pinnray.solvers.assimilation.marker_weighting import FACTORS, MarkerWeighting
-from pinnray.solvers.assimilation.misfit import misfit_of
-from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.assimilation.misfit import FACTORS, MarkerSettings
+from pinnray.solvers.problem import Material, Problem
 from tests.solvers.conftest import observed_at
 
 MARKERS, UNKNOWNS = 3, 9
@@ -83,7 +82,13 @@ def test_a_direction_in_which_nothing_gives_way_stays_as_it_is() -> None:
     np.testing.assert_allclose(forces.fit(1e14).residual.ravel(), stiff, atol=0.05)
 
 
-PAPER = MarkerWeighting(solver_name="a-solver")
+class Settings(MarkerSettings):
+    """Those of a solver with a name."""
+
+    name = "a-solver"
+
+
+PAPER = Settings()
 PRECISE = replace(PAPER, weights="precision", scale=0.3)
 
 
@@ -102,13 +107,8 @@ def problem(coarse_mesh) -> Problem:
     return Problem(coarse_mesh, observations=observed_at(coarse_mesh.markers, moved, 0.02))
 
 
-def test_the_compliance_of_the_contact_is_its_variance_over_the_scale():
-    assert replace(PRECISE, contact_deviation=0.3).slack == pytest.approx(0.09 / 0.3)
-    assert PAPER.slack == 0
-
-
 def test_markers_without_weight_are_no_markers(problem):
-    assert PAPER.misfit(problem).value(np.zeros((9, 2))) == misfit_of(problem).value(np.zeros((9, 2)))
+    assert PAPER.misfit(problem).value(np.zeros((9, 2))) > 0
     assert replace(PAPER, asm_weight=0.0).misfit(problem) is None
     assert replace(PAPER, scale=0.0).misfit(problem) is None
     assert PAPER.misfit(replace(problem, observations=None)) is None
@@ -121,14 +121,6 @@ def test_a_factor_is_chosen_for_the_linear_law_only(problem):
         chosen.misfit(bent)
     assert PAPER.misfit(bent) is not None
     assert chosen.misfit(problem) is not None
-
-
-def test_a_patch_has_no_deviation(problem):
-    pressed, uncertain = replace(problem, load=Load(kind="patch")), replace(PAPER, contact_deviation=0.1)
-    with pytest.raises(UserError, match="every point of a patch moves as prescribed; contact_deviation"):
-        uncertain.misfit(pressed)
-    assert PAPER.misfit(pressed) is not None
-    assert uncertain.misfit(problem) is not None
 
 
 def test_the_curve_has_every_factors_fit(forces):

@@ -27,7 +27,6 @@ SETTINGS = QUICK | {
     "pinn-asm paper": {"preset": "paper", "epochs": 2, "width": 8, "layers": 1, "base_points": 20},
     "pinn-std trained": TINY,
     "pinn-asm trained": TINY,
-    "gp": {"clamp": True},
     "fem-id": {"law": "given"},
     "pinn-id": {"spacing": 3.0, "law": "given"},
 }

@@ -20,7 +20,6 @@ SOLVERS: dict[str, dict[str, object]] = {
     "gp": {},
     "pinn-asm": QUICK,
     "pinn-asm, weights chosen": QUICK | PRECISE | {"choose": "left-out"},
-    "pinn-asm, a soft contact": QUICK | PRECISE | {"contact_deviation": 1.0},
 }
 
 

@@ -12,7 +12,7 @@ from pinnray.solvers.pinn.finite_basis.newton import find_equilibrium
 from pinnray.solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalAsmSolver, PinnStdSolver
 from pinnray.solvers.pinn.paper.solver import PaperPinnAsmSolver
 from pinnray.solvers.pinn.paper.trained_field import MlpField
-from pinnray.solvers.problem import Load, Material, Problem, contact_functional
+from pinnray.solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import bar_mesh, hiding, observed_at
 from tests.solvers.pinn.autograd_reference import PlainPinn
 
@@ -26,7 +26,7 @@ PINN_ASM = PinnAsmSolver(**QUICK)
 def l_curve(solver: PinnAsmSolver, problem: Problem) -> dict[str, np.ndarray]:
     """Energy and misfits for all weights, on one level."""
     level = solver.level(problem, 1.0)
-    return solver.weighting.curve(level.step(level.zero_output).markers)
+    return solver.curve(level.step(level.zero_output).markers)
 
 
 def observed(problem: Problem, markers: np.ndarray, displacements: np.ndarray) -> Problem:
@@ -148,23 +148,6 @@ def test_what_it_says_of_a_marker_that_is_left_out_is_what_it_says_without(probl
     assert np.abs(solution.left_out - again.displacement(problem.mesh.markers))[:6].max() > 1e-3
 
 
-def test_a_contact_that_is_not_certain_is_one_on_springs(problem):
-    """Their force is the indenter's; near the same of finite elements, far from a contact that is certain."""
-    settings = {"weights": "precision", "contact_deviation": 0.8, "scale": 0.02}
-    solver = PinnAsmSolver(**FINER, **settings)
-    # markers that went as if the contact had moved by a millimetre less
-    less = replace(problem.observations, displacements=0.9 * problem.observations.displacements)
-    problem = replace(problem, observations=less)
-    solution, exact = solver.solve(problem), FemAsmSolver(**settings).solve(problem)
-    points, weights = contact_functional(problem)
-    moved = weights @ solution.displacement(points)
-    np.testing.assert_allclose(0.02 / 0.8**2 * ([0.0, -10.0] - moved), solution.reaction, rtol=1e-6)
-    assert max(distances(solution, exact, problem)) < 0.01
-    np.testing.assert_allclose(solution.left_out, exact.left_out, atol=0.05)
-    certain = FemAsmSolver(**{**settings, "contact_deviation": 0.0}).solve(problem)
-    assert max(distances(certain, exact, problem)) > 0.02
-
-
 @pytest.mark.parametrize("settings", [None, {"asm_weight": 0.0}, {"weights": "precision", "scale": 0.0}])
 def test_without_markers_or_weight_it_is_the_network_without_them(problem, plain, settings):
     given = replace(problem, observations=None) if settings is None else problem
@@ -203,7 +186,7 @@ def test_the_papers_loss_is_energy_plus_misfit_over_the_area(problem, settings):
     solver = PaperPinnAsmSolver(width=8, layers=2, precision="double", bc_weight=1e-300, **settings)
     loss, parameters = solver.loss(problem), solver.network.initial(0, torch.float64)
     evaluation = loss(parameters)
-    misfit = solver.weighting.misfit(problem)
+    misfit = solver.misfit(problem)
     points, shares = misfit.sampling()
     moved = shares @ MlpField(solver.network, parameters).displacement(problem.mesh.locate(points))
     value = misfit.value(moved) / problem.mesh.areas.sum()

@@ -1,7 +1,6 @@
 """`gp` against its own definition, and how it treats what it is not told."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -90,14 +89,6 @@ def test_a_marker_that_is_left_out_has_no_say_at_all(problem, solution):
         again = GaussianProcessSolver().solve(hiding(problem, marker))
         expected = again.displacement(observations.points[[marker]])[0]
         np.testing.assert_allclose(solution.left_out[marker], expected, atol=1e-8)
-
-
-def test_it_knows_of_the_clamp_only_if_it_is_told(problem, coarse_mesh):
-    shifted = replace(problem, observations=observed(coarse_mesh, lambda points: bump(points) + 4.0))
-    base = coarse_mesh.points[np.unique(coarse_mesh.boundary("base"))]
-    for clamp in (False, True):
-        moved = np.abs(GaussianProcessSolver(clamp=clamp).solve(shifted).displacement(base)).max()
-        assert bool(moved < 0.1) is clamp
 
 
 def test_three_markers_will_do_where_none_is_left_out(coarse_mesh):

@@ -12,7 +12,7 @@ from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.picture_frame import Homography, Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.assimilation.misfit import misfit_of
+from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.registry import make_solver
@@ -165,7 +165,7 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     visible = ~np.isin(np.arange(9), held)
     problem = Problem(coarse_mesh, observations=replace(observations, visible=visible))
     solution = make_solver(name, **settings).solve(problem)
-    disc = misfit_of(Problem(coarse_mesh, observations=observations))
+    disc = MarkerSettings().misfit(Problem(coarse_mesh, observations=observations))
     points, means = disc.sampling()
     np.testing.assert_allclose(
         outcome["errors_mm"], means @ solution.displacement(points) - observations.displacements, atol=1e-7
@@ -204,7 +204,7 @@ def test_an_identified_finger_is_carried_to_half_the_load(task, coarse_mesh, obs
     problem = Problem(coarse_mesh, Material(law="neo-hookean"), observations=observations)
     half = replace(problem, load=task.load_cases[1].load)
     carried = solver.transferred(solver.refitter(problem)(observations), problem, half)  # type: ignore[attr-defined]
-    points, means = misfit_of(problem).sampling()
+    points, means = MarkerSettings().misfit(problem).sampling()
     errors = means @ carried.displacement_in_space(points) - 0.5 * observations.displacements
     np.testing.assert_allclose(outcome["errors_mm"], errors, atol=1e-6)
 
