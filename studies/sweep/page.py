@@ -7,14 +7,14 @@ from typing import Any
 from pinnray.runtime.figure import WIDTH, Figure
 from pinnray.runtime.html import write_html
 from pinnray.runtime.tables import TextTable
-from pinnray.studies.sweep.pictures import SHOWN, draw_pairs
+from pinnray.studies.sweep.pictures import SHOWN, draw_maps, draw_pairs
 from pinnray.studies.sweep.sweep import Sweep
 from pinnray.studies.sweep.tables import (
     correlation_grid,
     failure_grid,
+    known_quantities,
     quantity_grid,
     sample_table,
-    training_grid,
     write_frame,
 )
 
@@ -78,7 +78,14 @@ def write_sweep(
     """
     files = write_frame(sample_table(sweep), folder / "samples")
     drawn: dict[str, tuple[Figure, str]] = {}
-    tables = [training_grid(sweep), quantity_grid(sweep), failure_grid(sweep)]
+    if sweep.study.sampling == "grid" and len(sweep.study.varied) == 2:
+        trained = "rel_l2_displacement" in known_quantities(sweep)
+        names = ("rel_l2_displacement", "boundary_violation") if trained else SHOWN[:2]
+        drawn["map"] = (
+            draw_maps(sweep, names, page),
+            "Quantities over both parameters; framed: the least value.",
+        )
+    tables = [quantity_grid(sweep), failure_grid(sweep)]
     if len(sweep.good) > 1 and not sweep.study.settings_alone:
         drawn["pairs"] = (
             draw_pairs(sweep, page),

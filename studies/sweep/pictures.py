@@ -1,12 +1,17 @@
 """Pictures of a sweep: quantities over its parameters."""
 
-import numpy as np
+from collections.abc import Sequence
 
-from pinnray.comparison.figures.layout import write_heading
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.patches import Rectangle
+
+from pinnray.comparison.figures.layout import HALO, axes_at, write_heading
 from pinnray.comparison.figures.solver_colours import solver_look
-from pinnray.runtime.figure import WIDTH, Figure, figure
+from pinnray.runtime.figure import INK, NARROW, SMALL, WIDTH, Figure, figure
 from pinnray.solvers.finger_figures import QUANTITIES
-from pinnray.studies.sweep.study import unit_of
+from pinnray.studies.sweep.study import Value, unit_of
 from pinnray.studies.sweep.sweep import Sweep
 
 SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
@@ -61,6 +66,43 @@ def draw_pairs(sweep: Sweep, page: float = WIDTH) -> Figure:
     return drawn
 
 
+def draw_maps(sweep: Sweep, names: Sequence[str], page: float = WIDTH) -> Figure:
+    """Draw quantities as colours over the two parameters of a grid; the least value of each has a frame."""
+    first, second = sweep.study.varied
+    x, y = (list(dict.fromkeys(sample[name] for sample in sweep.samples)) for name in (first, second))
+    head, cell, left, gap = 0.68, 0.34, 0.95, 0.25
+    columns = 1 if page < NARROW else len(names)
+    width, row_height = (page - left - 0.1) / columns - gap, cell * len(y) + 0.75
+    with figure(head - 0.25 + row_height * -(-len(names) // columns), page) as drawn:
+        write_heading(drawn, f"Quantities over the grid: {sweep.study.name}", "framed: the least value")
+        for number, name in enumerate(names):
+            line, column = divmod(number, columns)
+            place = left + column * (width + gap), head + line * row_height
+            axes = axes_at(drawn, (*place, width, cell * len(y)))
+            table = np.full((len(y), len(x)), np.nan)
+            for each in sweep.measurements:
+                at, value = sweep.samples[each.number], each.values.get(name, np.nan)
+                here = x.index(at[first]), y.index(at[second])
+                table[here[::-1]] = value
+                words = f"{value:.3g}" if np.isfinite(value) else each.state
+                axes.text(*here, words, ha="center", va="center", size=SMALL, path_effects=HALO)
+            if np.isfinite(table).any():
+                scale = LogNorm() if np.nanmin(table) > 0 else Normalize()
+                axes.imshow(table, norm=scale, cmap=colormaps["viridis_r"], aspect="auto")
+                row, best = np.unravel_index(np.nanargmin(table), table.shape)
+                corner = (float(best) - 0.5, float(row) - 0.5)
+                axes.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor=INK, lw=1.8, clip_on=False))
+            axes.set(xlim=(-0.5, len(x) - 0.5), ylim=(-0.5, len(y) - 0.5))
+            axes.set_xticks(range(len(x)), [_short(value) for value in x])
+            axes.set_yticks(range(len(y)), [] if column else [_short(value) for value in y])
+            axes.tick_params(length=0)
+            axes.set_title(name.replace("_", " "), fontsize=8.5)
+            axes.set_xlabel(_words(first))
+            if not column:
+                axes.set_ylabel(_words(second, "\n"))
+    return drawn
+
+
 def _varies(sweep: Sweep, name: str) -> bool:
     values = np.array([each.values[name] for each in sweep.good])
     if len(values) < 2 or not np.isfinite(values).all():
@@ -85,3 +127,7 @@ def _ends(sweep: Sweep, parameter: str) -> tuple[str, str]:
     if values.values is not None:
         return str(values.values[0])[:9], str(values.values[-1])[:9]
     return f"{values.low:g}", f"{values.high:g}"
+
+
+def _short(value: Value) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

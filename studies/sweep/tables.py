@@ -11,7 +11,6 @@ import pandas as pd
 from pinnray.runtime.atomic import write_bytes, write_text
 from pinnray.runtime.tables import NONE, TextTable
 from pinnray.solvers.finger_figures import QUANTITIES, Quantity, heading
-from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.quantities import TRAINING
 from pinnray.studies.sweep.sampling import places_of
 from pinnray.studies.sweep.study import title
@@ -60,22 +59,6 @@ def quantity_grid(sweep: Sweep) -> TextTable:
     headings = ("quantity", "unit", "least", "median", "largest", "meaning")
     title = f"Quantities of {len(sweep.good)} fingers"
     return TextTable(title, headings, rows, left=("quantity", "unit", "meaning"))
-
-
-def training_grid(sweep: Sweep) -> TextTable:
-    """The trainings of a sweep, those nearest to `fem` first; no row where none was trained."""
-    names = list(sweep.study.varied)
-    rows = []
-    for each in sorted((each for each in sweep.measurements if "loss" in each.values), key=_distance):
-        given = [str(sweep.samples[each.number][name]) for name in names]
-        rows.append((*given, *(f"{each.values[name]:.3g}" for name in TRAINING), each.state))
-    headings = [*(name.removeprefix(f"{sweep.study.solver}.") for name in names), *TRAINING, "state"]
-    return TextTable("Trainings, the nearest to fem first", headings, rows, left=("state",))
-
-
-def _distance(training: Measurement) -> float:
-    """The difference of a training from `fem`."""
-    return float(training.values["rel_l2_displacement"])
 
 
 def correlation_grid(sweep: Sweep, names: Sequence[str]) -> TextTable:

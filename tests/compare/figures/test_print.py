@@ -13,9 +13,10 @@ from pinnray.studies.optimum.pictures import draw_front, draw_front_fingers
 from pinnray.studies.optimum.question import Question
 from pinnray.studies.optimum.search import Optimum
 from pinnray.studies.sweep.measurement import Measurement
-from pinnray.studies.sweep.pictures import draw_pairs
+from pinnray.studies.sweep.pictures import draw_maps, draw_pairs
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.study import Range
+from pinnray.studies.sweep.study import Range, Study
+from pinnray.studies.sweep.sweep import Sweep
 from tests.compare.figures.drawn_pages import page_of, printed
 
 WALLS = dict.fromkeys(("rib_thickness", "front_thickness", "back_thickness"), (0.8, 2.5))
@@ -29,6 +30,7 @@ RANGES = {
     }.items()
 }
 LIMITS = {"von_mises": {"at_most": 2.0}}
+CHOICES = {"young": Range(values=(1.0, 3.8)), "rib_count": Range(values=(3, 4, 5))}
 
 
 def searched(**ranges: Range) -> Optimum:
@@ -43,10 +45,12 @@ def searched(**ranges: Range) -> Optimum:
 
 def of_a_study(page: float) -> list[Figure]:
     """Those with `--width`."""
-    search = searched(**RANGES)
+    search, grid = searched(**RANGES), Study(name="grid", sampling="grid", varied=CHOICES)
+    found = [Measurement(n, "done", "", 0.1, {"force": 9.25 - n, "wrap": -1.125 * n}) for n in range(6)]
+    maps = draw_maps(Sweep(grid, samples(grid), found), ("force", "wrap"), page)
     solved = {run: pr.solve("default", "fem", size=3.0) for run in (10, 15, 19)}
     drawn = [draw_front(search, list(solved), page), draw_front_fingers(search, solved, page)]
-    return [*drawn, draw_pairs(search, page)]
+    return [*drawn, draw_pairs(search, page), maps]
 
 
 def others() -> list[Figure]:

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from pinnray.studies.sweep.measurement import Measurement
-from pinnray.studies.sweep.pictures import SHOWN, draw_pairs
+from pinnray.studies.sweep.pictures import SHOWN, draw_maps, draw_pairs
 from pinnray.studies.sweep.sampling import samples
-from pinnray.studies.sweep.study import Study
+from pinnray.studies.sweep.study import Range, Study
 from pinnray.studies.sweep.sweep import Sweep
 from pinnray.studies.sweep.tables import correlation_grid
 from tests.compare.figures.drawn_pages import page_of
@@ -55,3 +56,24 @@ def test_dots_and_ends_of_ranges_are_seen(tmp_path: Path, count: int) -> None:
         assert low < np.min(dots.get_xdata()) <= np.max(dots.get_xdata()) < high
     assert all(end in page.text for end in ("2", "5", "1", "2.5", "0.3"))
     assert (page.cut_off(), page.overlaps()) == ([], [])
+
+
+def test_a_grid_over_two_parameters_has_maps_with_the_least_value_framed() -> None:
+    study = Study(
+        name="grid",
+        sampling="grid",
+        varied={"young": Range(values=(1.0, 3.8)), "rib_count": Range(values=(3, 4, 5))},
+    )
+    drawn = samples(study)
+    found = [Measurement(n, "done", "", 0.1, {"force": 9.0 - n, "wrap": -1.0 * n}) for n in range(5)]
+    found.append(Measurement(5, "failed", "its worker process died", 0.1))
+    page = page_of(draw_maps(Sweep(study, drawn, found), ("force", "wrap")))
+    assert (page.cut_off(), page.overlaps()) == ([], [])
+    assert page.text.count("failed") == 2  # one sample, on both maps
+    for axes in page.figure.axes:
+        frames = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
+        assert [frame.get_xy() for frame in frames] == [(0.5, 0.5)]
+        assert [label.get_text() for label in axes.get_xticklabels()] == ["1", "3.8"]
+    lost = [Measurement(n, "failed", "died", 0.1) for n in range(6)]
+    page = page_of(draw_maps(Sweep(study, drawn, lost), ("force",)))
+    assert page.text.count("failed") == 6

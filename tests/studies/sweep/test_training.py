@@ -88,15 +88,14 @@ def test_a_run_without_a_solution_says_why(tmp_path, monkeypatch, error, state):
 
 
 @pytest.mark.slow
-def test_a_wider_grid_trains_what_is_new_alone(tmp_path, in_line):
+def test_a_wider_grid_trains_what_is_new_alone(tmp_path, in_line, capsys):
     out = tmp_path / "out"
     study = study_file(tmp_path, "10.0")
     assert main(["sweep", str(study), "--out", str(out)]) == 3  # two epochs are no training
     before = load_sweep(out)
     histories = {path: path.read_text() for path in out.rglob("history.csv")}
     assert len(histories) == 2
-    page = (out / "sweep.html").read_text()
-    assert page.index("Trainings, the nearest to fem first") < page.index("Quantities of")
+    assert str(out / "map.png") in capsys.readouterr().out
     assert main(["sweep", str(study_file(tmp_path, "10.0, 100.0")), "--out", str(out)]) == 3
     assert {path: path.read_text() for path in histories} == histories  # nothing was trained again
     wider = load_sweep(out)
