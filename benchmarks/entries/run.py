@@ -94,9 +94,10 @@ def page() -> Table:
             draw_front(found).save(DOCS / "pictures" / f"benchmark-{which}.png")
         for name, table in {"entries": summary_table(found), "broken claims": broken_table(found)}.items():
             headings = [heading.replace("\n", " ") for heading in table.headings]
-            fill(PAGE, f"{name}: {which}", markdown(headings, table.rows, left=3))
-    shown = summary_table(found)
-    return terminal_table(shown.title, shown.headings, shown.rows, left=shown.left)
+            shown = markdown(headings, table.rows, left=3) if table.rows else "None.\n"
+            fill(PAGE, f"{name}: {which}", shown)
+    last = summary_table(found)
+    return terminal_table(last.title, last.headings, last.rows, left=last.left)
 
 
 small, full = partial(run, "small"), partial(run, "full")
