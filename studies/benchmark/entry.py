@@ -84,7 +84,7 @@ class Entry:
 
 
 def load_entries(folder: Path, problems: ProblemSet) -> tuple[list[Entry], list[str]]:
-    """The entries in a folder for a set of problems, and remarks on those of other sets, left out.
+    """The entries in a folder for a set of problems, and remarks on those of its other versions, left out.
 
     Raises:
         UserError: If the folder is missing, or a file in it is no entry.
@@ -93,8 +93,9 @@ def load_entries(folder: Path, problems: ProblemSet) -> tuple[list[Entry], list[
         raise UserError(f"there is no folder {folder} of entries")
     every = [Entry.load(file) for file in sorted(folder.glob("*.json"))]
     fitting = [each for each in every if each.problems == problems.described]
-    left_out = [each.label for each in every if each not in fitting]
-    remark = f"left out, since they are of another set of problems: {', '.join(left_out)}"
+    named = [each for each in every if each.problems["name"] == problems.name]
+    left_out = [each.label for each in named if each not in fitting]
+    remark = f"left out, since they are of another version of the problems: {', '.join(left_out)}"
     return fitting, [remark] if left_out else []
 
 
