@@ -14,7 +14,7 @@ if TYPE_CHECKING:  # options are of this class, and `--help` has to be quick
 
 
 class FilmSettings(CheckedModel):
-    """Camera, fiducials and marker colour of a film."""
+    """Camera, fiducials, marker colour and tracking method of a film."""
 
     camera: Path | None = Field(
         default=None, description="Camera file of `pinnray calibrate`; none: the camera is not calibrated"
@@ -22,8 +22,9 @@ class FilmSettings(CheckedModel):
     workspace: Path | None = Field(
         default=None, description="JSON file of the fiducials; none: those around the design"
     )
-    colour: Literal["dark", "light"] = Field(
-        default="dark", description="Whether the markers are darker or lighter than what is around them"
+    colour: str = Field(default="dark", description="Colour of the markers, as printed by `pinnray pick`")
+    method: Literal["precise", "hough"] = Field(
+        default="precise", description="Disc detector; hough is the paper's pipeline"
     )
     fps: float | None = Field(
         default=None,
@@ -79,7 +80,7 @@ class Film(FilmSettings):
             UserError: If a file cannot be read.
         """
         from pinnray.vision.calibration.camera_file import load_camera
-        from pinnray.vision.discs.colour import DARK, LIGHT
+        from pinnray.vision.discs.colour import read_colour
         from pinnray.vision.tracking.scene import FilmedScene
         from pinnray.vision.tracking.workspace import default_workspace, load_workspace
 
@@ -87,7 +88,8 @@ class Film(FilmSettings):
             design=design,
             workspace=load_workspace(self.workspace) if self.workspace else default_workspace(design),
             camera=load_camera(self.camera) if self.camera else None,
-            colour=LIGHT if self.colour == "light" else DARK,
+            colour=read_colour(self.colour),
+            method=self.method,
             markers_only=self.workspace is None,
         )
 
@@ -97,4 +99,4 @@ class Film(FilmSettings):
         hashes = {
             f"{name}_sha256": file_digest(path) for name, path in files.items() if path and path.is_file()
         }
-        return self.model_dump(include={"source", "colour", "fps"}) | hashes
+        return self.model_dump(include={"source", "colour", "method", "fps"}) | hashes

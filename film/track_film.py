@@ -121,7 +121,7 @@ def _sentence(film: Film, tracking: Tracking) -> str:
     camera = "a calibrated camera" if film.camera else "no calibrated camera"
     origin = f"{RIG_MARK}, tracked" if tracking.simulated else "measured"
     return (
-        f"{origin} by pinnray track ({camera}) in {Path(film.source).name}, "
+        f"{origin} by pinnray track ({film.method}, {camera}) in {Path(film.source).name}, "
         f"means of {initial} and {final} frames at rest, standard deviations {deviations.min():.2g} to "
         f"{deviations.max():.2g} mm{aligned}"
     )

@@ -85,7 +85,7 @@ def track(
         out: Folder for observations, tracks and pictures; nothing is kept if None.
         progress: Whether to show the stages; if None in a notebook only.
         film: How it is read, by the words of `pinnray.film.film.FilmSettings`: `camera`, `workspace`,
-            `colour`, `fps`.
+            `colour`, `method`, `fps`.
 
     Raises:
         UserError: If the film does not show the finger.

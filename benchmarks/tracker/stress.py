@@ -28,6 +28,9 @@ from pinnray.geometry.finger.design import Design
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.tables import terminal_table
 from pinnray.vision.calibration.camera import Pose
+from pinnray.vision.discs.colour import DARK
+from pinnray.vision.discs.colour_picker import pick_colour
+from pinnray.vision.discs.disc_detector import METHODS, DetectionMethod
 from pinnray.vision.frames.frame import Frames, Image
 from pinnray.vision.frames.sources import open_frames
 from pinnray.vision.rig.bench import BENCH, Bench
@@ -79,6 +82,7 @@ class Case:
     codec: str = ""
     paint: str = "dark"
     irregular: float = 0.0
+    picked: bool = False
     layout: str = "front"
     fiducials: bool = True
     bumped: bool = False
@@ -119,7 +123,8 @@ CASES: dict[tuple[str, str], Case] = {
     **{("size", f"{w}x{h}"): Case(size=(w, h)) for w, h in ((640, 360), (1920, 1080))},
     **{("tilt, degrees", f"{tilt}"): Case(tilt=tilt) for tilt in (0, 5, 15)},
     ("motion", "a jump of 10 mm"): Case(motion=JUMP),
-    **{("markers", paint): Case(paint=paint) for paint in ("red", "blue")},
+    ("markers", "red, called dark"): Case(paint="red"),
+    **{("markers", f"{paint}, picked"): Case(paint=paint, picked=True) for paint in ("red", "blue")},
     ("markers", "at the joints"): Case(layout="joints"),
     **{("print, irregular", f"{x:.0%}"): Case(irregular=x) for x in (0.03, 0.05, 0.08)},
     ("print", "irregular 5 %, sharpened by 1.5"): Case(irregular=0.05, exposure={"sharpen": 1.5}),
@@ -145,14 +150,14 @@ CASES: dict[tuple[str, str], Case] = {
 
 HEADER = (
     *("varied", "to", "error, mm", "worst marker", "hidden", "missed", "swapped", "invented"),
-    *("std, mm", "below 1 std, %", "1.96 std", "of"),
+    *("std, mm", "below 1 std, %", "1.96 std", "Hough: error, mm", "missed", "swapped", "invented", "of"),
 )
 
 
 class Outcome(NamedTuple):
-    """Score, or the line of a refusal, and the number of markers hidden at rest or held."""
+    """Scores of the methods, or messages of refusal, and the number of markers hidden at rest or held."""
 
-    score: Score | str
+    scores: Mapping[DetectionMethod, Score | str]
     hidden: int
     count: int
 
@@ -206,23 +211,28 @@ def filmed(case: Case, finger: Finger, number: int) -> Recording:
     return Bumped(**vars(recording), after=after)
 
 
-def seen(case: Case, recording: Recording) -> Outcome:
-    """Score of a film, or the line that refuses it."""
-    score: Score | str
+def seen(case: Case, recording: Recording, methods: Sequence[DetectionMethod] = METHODS) -> Outcome:
+    """Scores of methods on a film, or the line of a method that refuses it."""
+    scores: dict[DetectionMethod, Score | str] = {}
     with _film(case, recording) as (frames, truths):
-        scene = FilmedScene(
-            design=recording.bench.finger,
-            workspace=recording.bench.workspace,
-            camera=recording.camera if case.fiducials else None,
-            markers_only=not case.fiducials,
-        )
-        try:
-            with frames() as film:
-                score = Score.of(track(film, scene), truths)
-        except UserError as error:
-            score = str(error)
+        with frames() as film:
+            first = next(iter(film)).image
+        for method in methods:
+            scene = FilmedScene(
+                design=recording.bench.finger,
+                workspace=recording.bench.workspace,
+                camera=recording.camera if case.fiducials else None,
+                colour=pick_colour(first, truths[0].pixels[0].tolist()) if case.picked else DARK,
+                method=method,
+                markers_only=not case.fiducials,
+            )
+            try:
+                with frames() as film:
+                    scores[method] = Score.of(track(film, scene), truths)
+            except UserError as error:
+                scores[method] = str(error)
     least = np.minimum(truths[0].seen, truths[-1].seen)
-    return Outcome(score, int((least < HIDDEN).sum()), len(least))
+    return Outcome(scores, int((least < HIDDEN).sum()), len(least))
 
 
 @contextmanager
@@ -245,14 +255,16 @@ def _outcome(fingers: Mapping[str, Finger], job: tuple[tuple[str, str], int]) ->
 
 
 def _row(outcomes: Sequence[Outcome]) -> list[str]:
-    error, worst, *others = _summary(outcomes)
-    return [error, worst, str(sum(outcome.hidden for outcome in outcomes)), *others]
+    precise, hough = (_summary(outcomes, method) for method in METHODS)
+    hidden = sum(outcome.hidden for outcome in outcomes)
+    return [*precise[:2], str(hidden), *precise[2:], hough[0], *hough[2:5]]
 
 
-def _summary(outcomes: Sequence[Outcome]) -> list[str]:
+def _summary(outcomes: Sequence[Outcome], method: DetectionMethod) -> list[str]:
     """Error, worst, missed, swapped, invented, deviation, coverage; in a refused film all are missed."""
-    known = [each.score for each in outcomes if isinstance(each.score, Score)]
-    refused = sum(each.count for each in outcomes if isinstance(each.score, str))
+    scores = [outcome.scores[method] for outcome in outcomes]
+    known = [score for score in scores if isinstance(score, Score)]
+    refused = sum(outcome.count for outcome in outcomes if isinstance(outcome.scores[method], str))
     if not known:
         return ["refused", "", str(refused), *5 * [""]]
     error, worst, *others = figures(known)

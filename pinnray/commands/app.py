@@ -15,7 +15,7 @@ COMMANDS = (
     *("finger.design", "finger.mesh", "finger.material", "finger.solve"),
     *("finger.export", "studies.sweep", "studies.predict", "studies.explore"),
     *("studies.optimise", "studies.crossval", "studies.benchmark", "comparison.solvers"),
-    *("camera.fiducials", "camera.calibrate", "camera.points", "camera.rig", "camera.track"),
+    *("camera.fiducials", "camera.calibrate", "camera.pick", "camera.points", "camera.rig", "camera.track"),
 )
 """Modules of this package with a function `command`; each is imported when its command is asked for."""
 

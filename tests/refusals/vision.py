@@ -20,6 +20,8 @@ from pinnray.vision.calibration.camera_file import load_camera, save_camera
 from pinnray.vision.calibration.charuco import parse_board
 from pinnray.vision.calibration.chessboard import Board
 from pinnray.vision.clicked_points import Clicks, clicked_points, read_clicks
+from pinnray.vision.discs.colour import read_colour
+from pinnray.vision.discs.colour_picker import pick_colour
 from pinnray.vision.discs.disc_fit import fit_discs
 from pinnray.vision.frames.decoder import PNG_HEADER
 from pinnray.vision.frames.formats import PNG

@@ -1,9 +1,9 @@
 """Circles that may be markers, by the paper's pipeline.
 
-Median blur of size 3, detection by lightness in CIELAB, Gaussian blur, Hough circles (Wang et al., PINN-Ray,
-on the experiment). Of OpenCV's two kinds of Hough circles it is the older one: it found all discs from 4
-pixels of radius on, of which `HOUGH_GRADIENT_ALT` missed a seventh. It also finds corners and gaps; they are
-dropped because they are not filled with the colour, or not surrounded by another.
+Median blur of size 3, colour detection in CIELAB, Gaussian blur, Hough circles (Wang et al., PINN-Ray, on the
+experiment). Of OpenCV's two kinds of Hough circles it is the older one: it found all discs from 4 pixels of
+radius on, of which `HOUGH_GRADIENT_ALT` missed a seventh. It also finds corners and gaps; they are dropped
+because they are not filled with the colour, or not surrounded by another.
 """
 
 from math import ceil
@@ -22,6 +22,8 @@ VOTES = (5.0, 8.0)
 """Limits of the gradients that must point at a centre: twice the least radius, a third of the edge."""
 EDGE = 100.0
 """Canny's higher threshold; the blurred mask's edges have 160 or more whatever the light."""
+LARGEST = 25.0
+"""Largest radius of a marker in the picture of a colour, pixels."""
 LEAST_FILL = 0.4
 """Share of the colour within a circle minus that around it: 1 for a whole marker, about 0 for a corner."""
 
@@ -66,6 +68,23 @@ def propose_circles(
     order = np.argsort(-fill, kind="stable")
     order = order[fill[order] >= LEAST_FILL]
     return found[order][_first_of_overlapping(found[order])] + (x0, y0, 0)
+
+
+def highlight_colour(image: Image, colour: Colour) -> tuple[Image, float]:
+    """Draw a picture to check a colour by eye.
+
+    Args:
+        image: Shape (h, w) or (h, w, 3).
+        colour: Drawn in magenta; the rest is pale.
+
+    Returns:
+        The picture, shape (h, w, 3), and the share of its pixels that have the colour.
+    """
+    mask = colour.mask(np.asarray(cv2.medianBlur(image, 3), dtype=np.uint8), LARGEST)
+    coloured = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
+    picture = cv2.addWeighted(coloured, 0.5, np.full_like(coloured, 255), 0.5, 0)
+    picture[mask > 0] = (200, 0, 200)
+    return np.asarray(picture, dtype=np.uint8), float(mask.mean()) / 255
 
 
 def _fill(mask: Image, circles: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
-"""Detection of discs in an image: circles of the paper's pipeline, refined by a fit of the edge."""
+"""Detection of discs in an image: circles of the paper's pipeline, refined by a fit of the edge or not."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import cv2
 import numpy as np
@@ -12,9 +12,16 @@ from pinnray.vision.discs.colour import Colour
 from pinnray.vision.discs.disc_fit import fit_discs
 from pinnray.vision.frames.frame import GreyImage, Image
 
-FLOOR = 0.0005
-"""Standard deviation of a coordinate's error that a mean over frames does not reduce, pixels: as on the
-virtual rig for discs that stay ellipses; beside the indenter the frames' scatter shows more."""
+DetectionMethod = Literal["precise", "hough"]
+METHODS: tuple[DetectionMethod, ...] = ("precise", "hough")
+
+FLOOR = {"precise": 0.0005, "hough": 0.45}
+"""Standard deviation of a coordinate's error that a mean over frames does not reduce, pixels. Fits: as on the
+virtual rig for discs that stay ellipses; beside the indenter it is more, which the frames' scatter shows.
+Hough circles sit on a lattice."""
+
+REACH = 0.8
+"""Largest distance of a circle from its guess, in radii."""
 
 
 class DiscDetections(NamedTuple):
@@ -24,7 +31,7 @@ class DiscDetections(NamedTuple):
         centres: Shape (n, 2), pixels.
         covariances: Of the centres, shape (n, 2, 2), pixels².
         radii: Shape (n,), pixels.
-        contrasts: How much darker than their surroundings, shape (n,), grey levels.
+        contrasts: How much darker than their surroundings, shape (n,), grey levels; nan for circles.
     """
 
     centres: FloatArray
@@ -52,6 +59,7 @@ def detect_discs(
     image: Image,
     colour: Colour,
     limits: tuple[float, float],
+    method: DetectionMethod,
     window: PixelBox | None = None,
     radii: Callable[[FloatArray], FloatArray] | None = None,
 ) -> DiscDetections:
@@ -61,12 +69,25 @@ def detect_discs(
     (n,), partly hidden discs are detected too.
     """
     circles = propose_circles(image, colour, radii=limits, window=window)
+    if method == "hough":
+        return _circles(circles)
     return _fitted(image, circles, radii(circles[:, :2]) if radii else None)
 
 
-def detect_discs_near(image: Image, guesses: FloatArray, radii: FloatArray) -> DiscDetections:
+def detect_discs_near(
+    image: Image, colour: Colour, guesses: FloatArray, radii: FloatArray, method: DetectionMethod
+) -> DiscDetections:
     """Detect discs with known radii, shape (n,), near guesses, shape (n, 2), pixels; there may be fewer."""
-    return _fitted(image, np.column_stack([guesses, radii]), radii)
+    if not len(guesses):
+        return _circles(np.empty((0, 3)))
+    if method == "precise":
+        return _fitted(image, np.column_stack([guesses, radii]), radii)
+    low = np.floor(guesses.min(axis=0) - 2.5 * radii.max()).astype(int)
+    high = np.ceil(guesses.max(axis=0) + 2.5 * radii.max()).astype(int) + 1
+    limits = (0.75 * radii.min(), 1.35 * radii.max())
+    found = propose_circles(image, colour, radii=limits, window=(low[0], low[1], high[0], high[1]))
+    away = np.linalg.norm(found[:, None, :2] - guesses, axis=2) / radii
+    return _circles(found[(away < REACH).any(axis=1)])
 
 
 def luma_of(image: Image) -> GreyImage:
@@ -82,3 +103,9 @@ def _fitted(image: Image, circles: FloatArray, radii: FloatArray | None) -> Disc
     for number in np.nonzero(kept)[0]:
         kept[number + 1 :] &= ~(apart[number, number + 1 :] < circles[number, 2])
     return DiscDetections(discs.centres, discs.covariances, discs.radii, discs.contrast).where(kept)
+
+
+def _circles(circles: FloatArray) -> DiscDetections:
+    """Detections from circles, with a fixed covariance: one frame does not show their error."""
+    covariances = np.repeat(FLOOR["hough"] ** 2 * np.eye(2)[None], len(circles), axis=0)
+    return DiscDetections(circles[:, :2], covariances, circles[:, 2], np.full(len(circles), np.nan))

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from pinnray.runtime.arrays import FloatArray, IntArray
-from pinnray.vision.discs.disc_detector import FLOOR, DiscDetections
+from pinnray.vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
 
 LEAST_SHARE = 0.2
 """Smallest share of the frames at rest in which a visible marker is detected."""
@@ -19,7 +19,9 @@ TRUST = 8
 """Prior degrees of freedom given to the fit's covariance, against the frames' scatter."""
 
 
-def mean_detections(frames: Sequence[DiscDetections], *, lossy: bool = False) -> DiscDetections:
+def mean_detections(
+    frames: Sequence[DiscDetections], method: DetectionMethod, *, lossy: bool = False
+) -> DiscDetections:
     """Every disc's weighted mean over frames; nan for those detected in too few.
 
     Weights are inverse covariances. The covariances of most discs are noise, which a mean over independent
@@ -50,7 +52,7 @@ def mean_detections(frames: Sequence[DiscDetections], *, lossy: bool = False) ->
     noise = np.minimum(USUAL * np.median(size) / size, 1.0)
     away = np.where(seen[:, known, None], centres[:, known] - mean[known], np.nan)
     share = _kept(away, weights[:, known], count[known], noise)
-    covariance[known] = share[:, None, None] * usual + (FLOOR**2 + lossy * LOSSY**2) * np.eye(2)
+    covariance[known] = share[:, None, None] * usual + (FLOOR[method] ** 2 + lossy * LOSSY**2) * np.eye(2)
     return DiscDetections(mean, covariance, radius, contrast)
 
 

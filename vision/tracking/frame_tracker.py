@@ -7,6 +7,7 @@ import numpy as np
 
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
+from pinnray.vision.discs.colour import DARK
 from pinnray.vision.discs.disc_detector import DiscDetections, detect_discs, detect_discs_near
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.tracking.data_association import (
@@ -107,7 +108,10 @@ class FrameTracker:
 
     def _detected_near(self, image: Image, places: FloatArray) -> DiscDetections:
         """Detect discs near places, shape (m, 2), mm."""
-        return detect_discs_near(image, self.plane.pixels(places), self._radii(places))
+        scene = self._scene
+        return detect_discs_near(
+            image, scene.colour, self.plane.pixels(places), self._radii(places), scene.method
+        )
 
     def _searched(
         self, detections: DiscDetections, names: IntArray, fields: FloatArray, image: Image
@@ -138,12 +142,12 @@ class FrameTracker:
         limits = (radii.min() / SAME_SIZE, radii.max() * SAME_SIZE)
         window = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
         known = (lambda pixels: self._radii(self.plane.points(pixels))) if sized else None
-        return detect_discs(image, self._scene.colour, limits, window, known)
+        return detect_discs(image, self._scene.colour, limits, self._scene.method, window, known)
 
     def _associated(self, detections: DiscDetections, fields: FloatArray) -> IntArray:
         """The number of its disc for every marker, shape (m,); -1 if it has none."""
         ratio = detections.contrasts / self._contrast
-        alike = np.flatnonzero(~((ratio < 1 / SAME_CONTRAST) | (ratio > SAME_CONTRAST)))
+        alike = np.nonzero(~((ratio < 1 / SAME_CONTRAST) | (ratio > SAME_CONTRAST)))[0]  # nan is not known
         names = associate_markers(self.plane.points(detections.centres[alike]), self._places, fields)
         return np.where(names >= 0, np.append(alike, -1)[names], -1)
 
@@ -168,7 +172,7 @@ class FrameTracker:
         old, known = self._fiducials, np.isfinite(self._fiducials.radii)
         discs = np.full(len(known), -1)
         old = old.where(known)
-        found = detect_discs_near(image, old.centres, old.radii)
+        found = detect_discs_near(image, DARK, old.centres, old.radii, self._scene.method)
         if len(found.radii):
             away = np.linalg.norm(old.centres[:, None] - found.centres, axis=2)
             discs[known] = np.where(away.min(axis=1) < old.radii, away.argmin(axis=1), -1)

@@ -9,7 +9,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera
 from pinnray.vision.discs.colour import DARK, Colour
-from pinnray.vision.discs.disc_detector import DiscDetections, detect_discs
+from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections, detect_discs
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.tracking.fiducial_matching import UnseenError, identify_fiducials
 from pinnray.vision.tracking.layout_matching import match_layout
@@ -18,6 +18,7 @@ from pinnray.vision.tracking.plane_fit import (
     camera_plane,
     homography_plane,
     plane_of_markers,
+    similarity_plane,
 )
 from pinnray.vision.tracking.workspace import Workspace
 
@@ -41,7 +42,9 @@ class FilmedScene:
         design: The finger.
         workspace: The fiducials around it.
         camera: The calibrated camera; None if it is not known.
-        colour: Of the markers, dark or light; the fiducials are dark.
+        colour: Of the markers; the fiducials are dark.
+        method: "precise", or "hough" for the paper's pipeline, whose map from pixels to mm is linear; a
+            camera then only accounts for the height of the markers above the fiducials.
         markers_only: Whether the markers alone may give the plane if the fiducials cannot be identified.
     """
 
@@ -49,6 +52,7 @@ class FilmedScene:
     workspace: Workspace
     camera: Camera | None = None
     colour: Colour = DARK
+    method: DetectionMethod = "precise"
     markers_only: bool = False
 
     def plane(self, fiducials: DiscDetections) -> MarkerPlane:
@@ -56,6 +60,11 @@ class FilmedScene:
         seen = np.isfinite(fiducials.radii)
         points, centres, covariances = self.workspace.points[seen], *fiducials.where(seen)[:2]
         height = self.workspace.marker_plane
+        if self.method == "hough":
+            if self.camera is not None and height:  # where the camera would see the fiducials at that height
+                raised = self._fiducial_plane(points, centres, covariances, height=height)
+                centres = raised.pixels(points)
+            return similarity_plane(points, centres, covariances)
         radius = self.workspace.fiducial_diameter / 2
         plane = self._fiducial_plane(points, centres, covariances)
         centres = centres - plane.beside(points, radius)
@@ -114,7 +123,7 @@ class FilmedScene:
     def _discs(self, image: Image, colour: Colour, extent: float, diameter: float) -> DiscDetections:
         """Discs of a diameter, of which some span an extent that fills most of the image; both in mm."""
         largest = float(np.linalg.norm(image.shape[:2])) / extent * diameter / 2
-        return detect_discs(image, colour, (max(SMALLEST_VIEW * largest, 3.0), largest))
+        return detect_discs(image, colour, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method)
 
     def _residuals(self, fiducials: DiscDetections) -> FloatArray:
         """Distances of the fiducials from their places, shape (f,), mm; nan where one was not detected."""

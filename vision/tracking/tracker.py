@@ -71,12 +71,14 @@ def track(
     markers = scene.design.markers
     rest = find_rest_intervals(
         tracker.plane.circles(pixels, scene.design.marker_radius),
-        noise=FLOOR / tracker.plane.scales(markers).mean(),
+        noise=FLOOR[scene.method] / tracker.plane.scales(markers).mean(),
     )
     still = [[detections[number] for number in end] for end in rest]
-    initial, final = (mean_detections([frame.markers for frame in end], lossy=frames.lossy) for end in still)
+    initial, final = (
+        mean_detections([frame.markers for frame in end], scene.method, lossy=frames.lossy) for end in still
+    )
     before, after, always = (
-        mean_detections(fiducials, lossy=frames.lossy)
+        mean_detections(fiducials, scene.method, lossy=frames.lossy)
         for fiducials in _fiducials_at_rest([frame.fiducials for frame in detections], rest)
     )
     motion = None
@@ -96,12 +98,14 @@ def track(
         rest=rest,
         initial=initial,
         final=final,
+        method=scene.method,
         simulated=frames.simulated or scene.workspace.simulated,
         final_plane=motion.planes[1] if motion and motion.planes else None,
     )
     if motion is None:
         return _oriented_by_motion(scene, replace(tracking, pressed=HAND_HELD))
-    tracking = tracking.aligned()
+    if scene.method == "precise":
+        tracking = tracking.aligned()
     warnings = [*_warnings(scene, tracking, after, motion)]
     if scene.workspace.simulated and not frames.simulated:
         warnings.append(
@@ -168,7 +172,7 @@ def _warnings(
 ) -> Iterator[str]:
     """Warnings for the user; `after` are the fiducials at the end."""
     residual = tracking.plane.residual
-    if scene.camera is None:
+    if scene.camera is None and scene.method == "precise":
         yield f"no camera: its lens is not undone; the fiducials are {residual:.3f} mm (rms) off their places"
         if scene.workspace.marker_plane:
             yield (

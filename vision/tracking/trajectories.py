@@ -9,7 +9,7 @@ from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import FIXED, Registration
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections
 from pinnray.vision.tracking.alignment import Alignment, align
 from pinnray.vision.tracking.marker_plane import MarkerPlane
 from pinnray.vision.tracking.rest_detection import RestIntervals
@@ -28,6 +28,7 @@ class Tracking:
         plane: From pixels to the finger's frame.
         rest: The frames before and after the motion.
         initial, final: Means of the markers over those frames.
+        method: How the markers were detected.
         warnings: For the user, one line each.
         simulated: True if the film or its workspace is of the virtual rig.
         final_plane: The plane at the end, if the camera has moved; None if it is `plane`.
@@ -44,6 +45,7 @@ class Tracking:
     rest: RestIntervals
     initial: DiscDetections
     final: DiscDetections
+    method: DetectionMethod
     warnings: tuple[str, ...] = ()
     simulated: bool = False
     final_plane: MarkerPlane | None = None
@@ -91,6 +93,8 @@ class Tracking:
     def observations(self, source: str) -> Observations:
         """The displacements, final minus initial; markers that are not visible are where the design has them.
 
+        So are all of the method "hough", whose linear map does not find places: the lens shifts them.
+
         Raises:
             UserError: If no marker is visible, or one lies outside the finger.
         """
@@ -100,7 +104,8 @@ class Tracking:
         points = self.expected.copy()
         displacements, deviations = np.zeros_like(points), np.zeros_like(points)
         initial, final = self.rest_positions
-        points[seen] = initial[seen]
+        if self.method != "hough":
+            points[seen] = initial[seen]
         displacements[seen] = (final - initial)[seen]
         deviations[seen] = np.sqrt(np.diag(self.displacement_covariance)).reshape(-1, 2)
         if (outside := ~self.design.section.contains(points)).any():

@@ -1,1 +1,1 @@
-"""Commands that read a camera's images: calibrate, fiducials, track; and rig, which renders them."""
+"""Commands that read a camera's images: calibrate, pick, fiducials, track; and rig, which renders them."""

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import cast, get_args
 
+from pinnray.commands.camera.pick import read_numbers
 from pinnray.options.shared import FingerOptions, OutputPath
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.exits import say
@@ -44,11 +45,8 @@ def command(
     if scale in get_args(LengthScale):
         chosen = cast(LengthScale, scale)
     else:
-        try:
-            given = [float(part) for part in scale.split(",")]
-        except ValueError:
-            given = []
-        if len(given) not in (1, 2) or not all(0 < each < 1e6 for each in given):
+        given = read_numbers("--scale", scale, counts=(1, 2))
+        if not all(0 < each < 1e6 for each in given):
             raise UserError(f"--scale {scale}: give same, lengths, or millimetres per unit such as 0.21,0.22")
         chosen = given[0], given[-1]
     found = clicked_points(

@@ -5,8 +5,8 @@ import pytest
 
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.arrays import FloatArray
-from pinnray.vision.discs.circle_proposals import propose_circles
-from pinnray.vision.discs.colour import DARK
+from pinnray.vision.discs.circle_proposals import highlight_colour, propose_circles
+from pinnray.vision.discs.colour import DARK, ColourRange
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure
 from pinnray.vision.rig.render import render
@@ -45,6 +45,14 @@ def test_every_disc_is_proposed(radius, other, grey):
     if radius > 5:
         error = np.abs(found[:, None, :2] - scene.discs[:, :2]).max(axis=2).min(axis=0)
         assert np.sqrt(np.mean(error**2)) < 0.8
+
+
+def test_coloured_discs_are_proposed_alone():
+    """Red ones by their colour: not the seven dark ones."""
+    scene = dots(7.6, colour=(40, 40, 200))
+    found = propose_circles(scene.image, ColourRange((20, 25, 5), (80, 90, 80)), radii=(5, 11))
+    assert missed(Dots(scene.image, scene.discs[:9]), found) == 0
+    assert len(found) == 9
 
 
 @pytest.mark.parametrize("paint", ["dark", "blue"])
@@ -102,3 +110,11 @@ def test_discs_that_touch_are_told_apart_and_none_is_proposed_twice():
     found = propose_circles(canvas.astype(np.uint8), DARK, radii=(6, 14))
     assert len(found) == 2
     assert np.abs(found[np.argsort(found[:, 0])] - discs).max() < 2
+
+
+def test_the_picture_to_check_by_eye_shows_what_has_the_colour():
+    scene = dots(7.6, noise=0.0, blur=0.5, shading=0.0, size=(640, 360))
+    picture, share = highlight_colour(scene.image, ColourRange((0, -128, -128), (40, 127, 127)))
+    magenta = (picture == (200, 0, 200)).all(axis=2)
+    assert magenta.mean() == pytest.approx(share)
+    assert share == pytest.approx(np.pi * (scene.discs[:, 2] ** 2).sum() / (640 * 360), rel=0.05)

@@ -81,7 +81,7 @@ def test_their_standard_deviations_are_those_of_the_errors(scores):
 def test_under_stress_markers_are_missed_rather_than_swapped_or_invented(case, error, missed):
     stress = replace(CASES[case], motion=JUMP)
     design = DESIGN.replaced(marker_layout=stress.layout)
-    score = seen(stress, filmed(stress, finger_of(design), 0)).score
+    score = seen(stress, filmed(stress, finger_of(design), 0), methods=("precise",)).scores["precise"]
     assert isinstance(score, Score)
     assert score.lengths.mean() < error
     assert (~score.seen).sum() == missed

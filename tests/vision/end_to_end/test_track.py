@@ -10,7 +10,7 @@ import pytest
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
-from pinnray.vision.discs.colour import DARK, LIGHT
+from pinnray.vision.discs.colour import DARK, ColourRange
 from pinnray.vision.frames.frame import CapturedImage, Frames, Image
 from pinnray.vision.rig.virtual_camera import viewing_pose
 from pinnray.vision.tracking.rest_detection import RestIntervals
@@ -20,7 +20,7 @@ from pinnray.vision.tracking.workspace import Workspace
 from tests.fingers import beam
 from tests.vision.tracking.listed_discs import NOISE, ListedDiscs, middles, seen
 
-FINGER = beam()
+FINGER, RED = beam(), ColourRange((20.0, 40.0, 20.0), (80.0, 90.0, 80.0))
 MARKERS = FINGER.markers
 SPACE = Workspace(
     fiducials=((-12.0, 12.0), (20.0, 14.0), (112.0, 13.0), (-10.0, -22.0), (45.0, -20.0), (108.0, -24.0))
@@ -28,7 +28,7 @@ SPACE = Workspace(
 CAMERA = Camera(1280, 720, 1100.0, 1100.0, 650.0, 350.0)
 POSE = viewing_pose(CAMERA, SPACE, tilt=5.0)
 NUDGED = Pose(POSE.rotation + np.array([3e-4, -2e-4, 5e-4]), POSE.translation + np.array([0.1, -0.1, 0.1]))
-SCENE = FilmedScene(FINGER, SPACE, CAMERA, LIGHT)
+SCENE = FilmedScene(FINGER, SPACE, CAMERA, RED)
 PRESSED = -4.0 * np.column_stack([0.2 * (MARKERS[:, 0] / 90) ** 2, (MARKERS[:, 0] / 90) ** 2])
 SHARES = (0.0, 0.0, 0.0, 0.3, 0.7, 1.0, 1.0, 1.0)
 """Of the displacement, in the frames of a film."""
@@ -46,7 +46,7 @@ def picture(
     markers, corners = np.delete(places, lost, axis=0), np.delete(SPACE.points, hidden, axis=0)
     scale, nearer = CAMERA.fx / POSE.translation[2], 1 / (1 - height / POSE.translation[2])
     return listed.picture(
-        (LIGHT, middles(markers, 0.8, CAMERA, pose, height), 0.8 * scale * nearer, 100.0),
+        (RED, middles(markers, 0.8, CAMERA, pose, height), 0.8 * scale * nearer, 100.0),
         (DARK, middles(corners, 2.0, CAMERA, pose), 2 * scale, 100.0),
     )
 
@@ -90,6 +90,7 @@ def test_displacements_are_differences_of_the_means_at_rest(listed: ListedDiscs)
     assert [time for time, _ in watched] == tracking.times.tolist()
     np.testing.assert_allclose([places for _, places in watched], tracking.positions, atol=0.05)
     assert tracking.final_plane is None
+    assert tracking.method == "precise"
     assert (tracking.design, tracking.simulated) == (FINGER, False)
     np.testing.assert_array_equal(tracking.expected, MARKERS)
     assert len(tracking.warnings) == 1
@@ -101,6 +102,13 @@ def test_markers_at_the_fiducials_height_are_told_from_those_nearer_by_their_sca
     known = replace(CAMERA, covariance=tuple(map(tuple, (1e-6 * np.eye(9)).tolist())))
     (said,) = track(film(pressed(listed)), replace(SCENE, camera=known, workspace=high)).warnings
     assert "0.40% smaller in the film than in the drawing" in said
+
+
+def test_hough_takes_the_sheet_with_a_camera(listed: ListedDiscs) -> None:
+    high = SPACE.model_copy(update={"marker_plane": 20.0})
+    pictures = [picture(listed, MARKERS + share * PRESSED, height=20.0) for share in SHARES]
+    tracking = track(film(pictures), replace(SCENE, workspace=high, method="hough"))
+    np.testing.assert_allclose(tracking.observations("a film").displacements, PRESSED, atol=0.15)
 
 
 def test_a_person_ends_a_camera_and_breaks_off_a_film(listed: ListedDiscs) -> None:

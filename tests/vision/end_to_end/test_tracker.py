@@ -48,6 +48,14 @@ def test_a_live_film_is_tracked_wherever_it_is_cut(tracking, rest, held):
     np.testing.assert_allclose(found, whole, rtol=0, atol=0.002)
 
 
+def test_the_papers_pipeline_is_an_order_of_magnitude_worse():
+    tracking = tracked(images(), method="hough")
+    observations = tracking.observations("rig")
+    assert 0.03 < error_of(observations) < 0.4
+    assert 0.05 < observations.standard_deviations.mean() < 0.2
+    np.testing.assert_array_equal(observations.points, MARKERS)
+
+
 def test_grey_images_do_as_well():
     observations = tracked([cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images()]).observations(
         "rig"

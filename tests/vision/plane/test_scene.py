@@ -10,7 +10,7 @@ from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera
-from pinnray.vision.discs.colour import DARK, LIGHT
+from pinnray.vision.discs.colour import DARK, ColourRange
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.rig.virtual_camera import viewing_pose
 from pinnray.vision.tracking.fiducial_matching import UnseenError
@@ -32,6 +32,7 @@ BENT = replace(PINHOLE, distortion=(-0.2, 0.05, 1e-3, -1e-3, 0.0))
 FISHY = replace(PINHOLE, distortion=(-0.8, 0.0, 0.0, 0.0, 0.0))
 """Too much to make out the fiducials where it is not undone."""
 POSE = viewing_pose(PINHOLE, SPACE, tilt=8.0)
+RED = ColourRange((20.0, 40.0, 20.0), (80.0, 90.0, 80.0))
 
 
 def scale_at(points: FloatArray) -> FloatArray:
@@ -66,11 +67,12 @@ def test_the_plane_is_that_of_the_markers_height_by_the_fiducials_that_are_seen(
     assert plane.projection.height == height
 
 
-def test_without_a_camera_the_plane_is_a_homography() -> None:
+def test_without_a_camera_the_plane_is_a_homography_and_by_hough_a_similarity() -> None:
     found = discs_at(middles(SPACE.points, 2.0, PINHOLE, POSE))
     plane = FilmedScene(FINGER, SPACE).plane(found)
     np.testing.assert_allclose(plane.pixels(FINGER.markers), seen(FINGER.markers, PINHOLE, POSE), atol=5e-3)
     assert len(plane.parameters) == 8
+    assert FilmedScene(FINGER, SPACE, PINHOLE, method="hough").plane(found).projection is SIMILARITY
 
 
 @pytest.mark.parametrize("camera", [None, PINHOLE, BENT, FISHY])
@@ -142,14 +144,14 @@ def test_without_fiducials_the_markers_may_give_the_plane(listed: ListedDiscs) -
     section = Section(Loop.polygon(corners, ("back", "tip", "front", "base")))
     uneven = replace(FINGER, section=section, markers=FINGER.markers * (1, -0.7) + np.array([0.0, -6.0]))
     pixels = SIMILARITY.pixels(uneven.markers, np.array([9.0, 1.0, 100.0, 300.0]))
-    image = listed.picture((LIGHT, pixels, 0.8 * np.hypot(9, 1), 100.0))
-    scene = FilmedScene(uneven, SPACE, colour=LIGHT, markers_only=True)
+    image = listed.picture((RED, pixels, 0.8 * np.hypot(9, 1), 100.0))
+    scene = FilmedScene(uneven, SPACE, colour=RED, markers_only=True)
     plane, fiducials = scene.first_plane(image)
     np.testing.assert_allclose(plane.parameters, [9, 1, 100, 300], rtol=1e-6)
     assert fiducials.centres.shape == (7, 2)
     assert np.isnan(fiducials.radii).all()
     request = listed.requests[-1]
-    assert request.colour is LIGHT
+    assert request.colour is RED
     assert request.limits is not None
     largest = np.hypot(1280, 720) / 100 * 0.8  # the finger's 100 mm fill the diagonal
     assert request.limits == pytest.approx((max(largest / 4, 3), largest), rel=1e-12)

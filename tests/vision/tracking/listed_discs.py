@@ -9,7 +9,7 @@ import numpy as np
 from pinnray.runtime.arrays import FloatArray
 from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.discs.colour import Colour
-from pinnray.vision.discs.disc_detector import DiscDetections
+from pinnray.vision.discs.disc_detector import DetectionMethod, DiscDetections
 from pinnray.vision.frames.frame import Image
 
 NOISE = 0.05
@@ -51,7 +51,7 @@ def discs_at(
 class Request(NamedTuple):
     """What was asked of the detector: all discs of a colour and size in a window, or those near guesses."""
 
-    colour: Colour | None
+    colour: Colour
     limits: tuple[float, float] | None
     window: tuple[int, int, int, int] | None
     guesses: FloatArray
@@ -76,9 +76,9 @@ class ListedDiscs:
         width, height = self.size
         return np.full((height, width), len(self.pictures) - 1, dtype=np.uint8)
 
-    def all_of(self, image: Image, colour: Colour | None = None) -> DiscDetections:
-        """The discs of a colour in an image, or all."""
-        found = [discs for own, discs in self.pictures[int(image.flat[0])] if colour in (None, own)]
+    def all_of(self, image: Image, colour: Colour) -> DiscDetections:
+        """The discs of a colour in an image."""
+        found = [discs for own, discs in self.pictures[int(image.flat[0])] if own is colour]
         empty = DiscDetections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
         return DiscDetections(*(np.concatenate(part) for part in zip(empty, *found, strict=True)))
 
@@ -87,6 +87,7 @@ class ListedDiscs:
         image: Image,
         colour: Colour,
         limits: tuple[float, float],
+        method: DetectionMethod,
         window: tuple[int, int, int, int] | None = None,
         radii: Callable[[FloatArray], FloatArray] | None = None,
     ) -> DiscDetections:
@@ -101,10 +102,12 @@ class ListedDiscs:
         self.requests.append(Request(colour, limits, window, np.empty((0, 2)), known))
         return found
 
-    def detect_near(self, image: Image, guesses: FloatArray, radii: FloatArray) -> DiscDetections:
+    def detect_near(
+        self, image: Image, colour: Colour, guesses: FloatArray, radii: FloatArray, method: DetectionMethod
+    ) -> DiscDetections:
         """In place of `detect_discs_near`: discs of about the radius, less than that away from a guess."""
-        self.requests.append(Request(None, None, None, guesses.copy(), radii.copy()))
-        discs = self.all_of(image)
+        self.requests.append(Request(colour, None, None, guesses.copy(), radii.copy()))
+        discs = self.all_of(image, colour)
         away = np.linalg.norm(discs.centres[:, None] - guesses, axis=2) / radii
         size = discs.radii[:, None] / radii
         return discs.where(((away < 0.8) & (size < 1.35) & (size > 0.75)).any(axis=1))

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.vision.discs.disc_detector import FLOOR, DiscDetections
+from pinnray.vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
 from pinnray.vision.tracking.frame_means import LOSSY, mean_detections
 
 DEVIATION = 0.01
@@ -31,11 +31,11 @@ def frames_of(
     ]
 
 
-def shares(frames: list[DiscDetections]) -> FloatArray:
+def shares(frames: list[DiscDetections], method: DetectionMethod = "precise") -> FloatArray:
     """Variances of the means less the floor over those of one frame, shape (n,)."""
-    found, covariance = mean_detections(frames).covariances, np.nanmean
+    found, covariance = mean_detections(frames, method).covariances, np.nanmean
     one = covariance([frame.covariances for frame in frames], axis=0)
-    kept = (found - FLOOR**2 * np.eye(2)) / one[:, :1, :1]
+    kept = (found - FLOOR[method] ** 2 * np.eye(2)) / one[:, :1, :1]
     np.testing.assert_allclose(kept[:, 0, 0], kept[:, 1, 1], rtol=1e-9)
     np.testing.assert_allclose(kept[:, 0, 1], 0, atol=1e-9)
     return np.asarray(kept[:, 0, 0])
@@ -60,7 +60,7 @@ def test_the_mean_is_weighted_by_the_inverse_covariances() -> None:
             ([11.0, 19.0], [[1.0, -0.5], [-0.5, 3.0]], 9.0, 120.0),
         )
     ]
-    found = mean_detections(frames)
+    found = mean_detections(frames, "precise")
     roots = np.concatenate([np.linalg.inv(np.linalg.cholesky(frame.covariances[0])) for frame in frames])
     rows = np.concatenate(
         [np.linalg.inv(np.linalg.cholesky(f.covariances[0])) @ f.centres[0] for f in frames]
@@ -77,22 +77,23 @@ def test_the_mean_is_weighted_by_the_inverse_covariances() -> None:
 def test_a_disc_is_known_from_a_fifth_of_the_frames_on(frames: int, shown: int, known: bool) -> None:
     errors = series([0.0] * frames, 3)
     errors[shown:, 1] = np.nan
-    mean = mean_detections(frames_of(errors))
+    mean = mean_detections(frames_of(errors), "precise")
     for part in mean:
         np.testing.assert_array_equal(np.isfinite(part.reshape(3, -1)).all(axis=1), [True, known, True])
 
 
 def test_discs_that_no_frame_shows_are_not_known() -> None:
-    mean = mean_detections(frames_of(np.full((4, 2, 2), np.nan)))
+    mean = mean_detections(frames_of(np.full((4, 2, 2), np.nan)), "precise")
     assert [part.shape for part in mean] == [(2, 2), (2, 2, 2), (2,), (2,)]
     assert all(np.isnan(part).all() for part in mean)
 
 
+@pytest.mark.parametrize("method", ["precise", "hough"])
 @pytest.mark.parametrize("count", [1, 2, 6])
-def test_one_frame_or_its_copies_keep_all_of_the_covariance_and_have_the_floor(count):
+def test_one_frame_or_its_copies_keep_all_of_the_covariance_and_have_the_floor(count, method):
     frames = frames_of(series([0.0] * count, 3), contrast=np.nan)
-    mean = mean_detections(frames)
-    expected = (DEVIATION**2 + 0.0005**2) * np.eye(2)
+    mean = mean_detections(frames, method)
+    expected = (DEVIATION**2 + {"precise": 0.0005, "hough": 0.45}[method] ** 2) * np.eye(2)
     np.testing.assert_allclose(mean.covariances, np.tile(expected, (3, 1, 1)), rtol=1e-12)
     assert np.isnan(mean.contrasts).all()  # of circles it is not known
 
@@ -130,7 +131,7 @@ def test_frames_that_follow_each_other_count_for_less(count: int) -> None:
 
 def test_a_lossy_film_adds_what_its_frames_share() -> None:
     frames = frames_of(np.random.default_rng(2).normal(size=(5, 3, 2)))
-    plain, lossy = (mean_detections(frames, lossy=each) for each in (False, True))
+    plain, lossy = (mean_detections(frames, "precise", lossy=each) for each in (False, True))
     np.testing.assert_array_equal(plain.centres, lossy.centres)
     added = np.broadcast_to(LOSSY**2 * np.eye(2), plain.covariances.shape)
     np.testing.assert_allclose(lossy.covariances - plain.covariances, added, atol=1e-12)
@@ -192,7 +193,7 @@ def test_means_are_as_far_from_the_truth_as_their_variances_say(errors, counts, 
     for count in counts:
         rng, squares = np.random.default_rng(5), []
         for _ in range(100):
-            mean = mean_detections(frames_of(errors(rng, count)))
+            mean = mean_detections(frames_of(errors(rng, count)), "precise")
             variances = np.diagonal(mean.covariances, axis1=1, axis2=2)
             squares.append(((mean.centres - 100) ** 2 / variances).mean())
         assert low < np.mean(squares) < high

@@ -7,13 +7,12 @@ import pytest
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.vision.discs.colour import LIGHT
 from pinnray.vision.tracking.marker_plane import SIMILARITY
 from pinnray.vision.tracking.rest_detection import RestIntervals
 from pinnray.vision.tracking.scene import FilmedScene
 from pinnray.vision.tracking.tracker import _fiducials_at_rest, track
 from pinnray.vision.tracking.trajectories import Tracking
-from tests.vision.end_to_end.test_track import FINGER, MARKERS, PRESSED, SHARES, SPACE, film
+from tests.vision.end_to_end.test_track import FINGER, MARKERS, PRESSED, RED, SHARES, SPACE, film
 from tests.vision.tracking.listed_discs import NOISE, ListedDiscs
 
 
@@ -21,13 +20,13 @@ def markers_only(
     listed: ListedDiscs, markers: FloatArray, moved: FloatArray, turn: float, mirrored: bool = False
 ) -> Tracking:
     """A film without fiducials, turned in the image by an angle, degrees, counter-clockwise."""
-    scene = FilmedScene(replace(FINGER, markers=markers), SPACE, colour=LIGHT, markers_only=True)
+    scene = FilmedScene(replace(FINGER, markers=markers), SPACE, colour=RED, markers_only=True)
     cos, sin = 9 * np.cos(np.radians(turn)), 9 * np.sin(np.radians(turn))
     pictures = []
     for share in SHARES:
         pixels = SIMILARITY.pixels(markers + share * moved, np.array([cos, -sin, 640.0, 360.0]))
         pixels = (pixels - (640, 360)) * (1, -1 if mirrored else 1) + (640, 360)
-        pictures.append(listed.picture((LIGHT, pixels, 0.8 * 9, 100.0)))
+        pictures.append(listed.picture((RED, pixels, 0.8 * 9, 100.0)))
         listed.pictures[-1][0][1].covariances[:] *= np.arange(1, 8)[:, None, None]
     return track(film(pictures), scene)
 

@@ -39,6 +39,7 @@ def tracking(**changes: Any) -> Tracking:
         **{"pixels": np.stack([initial.centres, final.centres]), "plane": PLANE},
         **{"covariances": np.stack([initial.covariances, final.covariances])},
         **{"rest": RestIntervals(range(1), range(1, 2)), "initial": initial, "final": final},
+        **{"method": "precise"},
     }
     return Tracking(**values | changes)
 
@@ -75,3 +76,9 @@ def test_displacements_and_their_deviations() -> None:
     assert found.final_plane is None
     assert found.warnings == ()
     assert tracking(simulated=True).observations("a film").simulated
+
+
+def test_the_papers_linear_map_does_not_find_places() -> None:
+    observed = tracking(method="hough").observations("a film")
+    np.testing.assert_array_equal(observed.points, MARKERS)
+    np.testing.assert_allclose(observed.displacements[SEEN], MOVED[SEEN], atol=1e-12)
