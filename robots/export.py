@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,14 +11,14 @@ from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.export_settings import ExportSettings, Kind
-from pinnray.robots.mjcf import CLEARANCE, Damping, chain_mjcf, flex_mjcf, gripper_mjcf, with_header
+from pinnray.robots.mjcf import Damping, chain_mjcf, flex_mjcf, with_header
 from pinnray.robots.presses import PressedFinger, press
 from pinnray.robots.score import ModelScore, scored
 from pinnray.robots.simulation import Model, chain_front, check_mujoco, flex_front
-from pinnray.robots.solid_files import write_material, write_solid
+from pinnray.robots.solid_files import write_solid
 from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.robots.springs import fitted_springs
-from pinnray.runtime.atomic import write_json, write_text
+from pinnray.runtime.atomic import write_text
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import write_csv
@@ -56,8 +55,8 @@ def export_finger(
     """Write a finger's models for a simulator.
 
     Args:
-        kind: `mujoco`: a chain of hinges and a flexible body, both fitted; `mesh`: tetrahedra, their surface
-            and the material.
+        kind: `mujoco`: a chain of hinges and a flexible body, both fitted; `mesh`: tetrahedra and their
+            surface.
         problem: The finger with its material and, for `mujoco`, the cylinder with its largest travel.
         out: Output folder.
         settings: How.
@@ -80,9 +79,7 @@ def export_finger(
         body = SolidMesh.of(finger_mesh(finger, settings=coarse, across=settings.across), settings.layers)
     if kind == "mujoco":
         return _mujoco(problem, finger, density, body, out, settings, stages)
-    files = *write_solid(out, body), out / "material.json"
-    write_material(files[-1], material, density, settings.loss_factor)
-    return Exported(files)
+    return Exported(write_solid(out, body))
 
 
 def _mujoco(
@@ -124,28 +121,10 @@ def _mujoco(
         said = f"Score: {scores[number].sentence}." if scores else "Not scored: export with the option score."
         files.append(out / f"{model.name}.xml")
         write_text(files[-1], with_header(model.text, [*_header(pressed, fit, settings), said]))
-    files.append(out / "gripper.xml")
-    write_text(files[-1], _gripper(pressed, models[0].name))
     if scores:
-        files += [out / "score.json", out / "score.csv"]
-        write_json(files[-2], _document(pressed, factor, density, settings, scores))
+        files.append(out / "score.csv")
         write_csv(files[-1], [{"model": s.model, **each.row()} for s in scores for each in s.presses])
     return Exported(tuple(files), tuple(scores), pressed.lost)
-
-
-def _gripper(pressed: PressedFinger, model: str) -> str:
-    """A scene of two chains around the load's cylinder; their bases do not meet."""
-    mesh, stroke = pressed.problem.mesh, -float(pressed.problem.load.values[1])
-    place = np.array([mesh.points[mesh.contact_node, 0], pressed.front[:, 1].max()])
-    closed = min(stroke, 0.9 * pressed.radius)
-    said = [
-        f"Two fingers of {model}.xml around a free cylinder as dense as water, with MuJoCo's friction of 1.",
-        f"Controls left and right close them: from 0 to {MM * (closed + CLEARANCE):g}, {closed:g} mm beyond "
-        "the first touch.",
-        "The time step is 0.5 ms: of 1 ms, a held object may be unstable.",
-    ]
-    scene = gripper_mjcf("gripper", f"{model}.xml", place, pressed.radius, mesh.depth, closed)
-    return with_header(scene, said)
 
 
 def _header(pressed: PressedFinger, fit: str, settings: ExportSettings) -> Sequence[str]:
@@ -163,25 +142,3 @@ def _header(pressed: PressedFinger, fit: str, settings: ExportSettings) -> Seque
         "Attached to another model, whose time step holds, give that one at most 1 ms: MuJoCo's 2 ms make it "
         "unstable.",
     ]
-
-
-def _document(
-    pressed: PressedFinger,
-    factor: float,
-    density: float,
-    settings: ExportSettings,
-    scores: Sequence[ModelScore],
-) -> dict[str, Any]:
-    problem = pressed.problem
-    return {
-        "schema": 1,
-        "finger": problem.finger and problem.finger.definition(),
-        "material": problem.material.model_dump(),
-        "density_kg_per_m3": density,
-        "load": problem.load.model_dump(),
-        "loss_factor": settings.loss_factor,
-        "flex_young_factor": factor,
-        "fitted_loads": len(pressed.fitted),
-        "lost_loads": list(pressed.lost),
-        "models": {each.model: each.document() for each in scores},
-    }

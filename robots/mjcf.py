@@ -1,4 +1,4 @@
-"""MJCF files of a finger for MuJoCo: a chain of hinges, two of it as a gripper, and a flexible body."""
+"""MJCF files of a finger for MuJoCo: a chain of hinges, and a flexible body."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,12 +20,6 @@ HARD = {"solref": "0.002 1", "solimp": "0.99 0.999 0.0001"}
 """Contact that gives way by hundredths of a millimetre, with a time constant of two steps."""
 HARDER = {"solref": "0.002 1", "solimp": "0.999 0.9999 0.0001"}
 """Likewise, for the light nodes of the flexible body."""
-CLEARANCE = 0.5
-"""Of an open gripper from its object, mm."""
-DRIVE = {"kp": "100000", "dampratio": "1"}
-"""Position control of a finger's carriage, N/m."""
-CARRIAGE = "0.2"
-"""Mass of a carriage, kg."""
 BODY_COLOUR = "0.9 0.6 0.3 1"
 
 
@@ -97,36 +91,6 @@ def chain_mjcf(name: str, chain: Chain, springs: Springs, wall: float, depth: fl
     return _written(root)
 
 
-def gripper_mjcf(name: str, chain: str, place: FloatArray, radius: float, depth: float, stroke: float) -> str:
-    """The MJCF file of two fingers on either side of a cylinder, which is free.
-
-    Args:
-        name: Of the model.
-        chain: Name of the finger's file beside it.
-        place: Abscissa of the cylinder's axis, and the highest ordinate of the front face, shape (2,), mm.
-        radius: Of the cylinder, mm.
-        depth: Of the finger, mm.
-        stroke: How far each carriage moves beyond the first touch, mm.
-    """
-    root = _model(name, "implicitfast", STEP / 2)  # a held object shakes loose in whole ones
-    ET.SubElement(ET.SubElement(root, "asset"), "model", name="finger", file=chain)
-    world, drives = ET.SubElement(root, "worldbody"), ET.SubElement(root, "actuator")
-    for side, sign, turn in (("left", -1, 0.0), ("right", 1, np.pi)):
-        away = sign * (radius + place[1] + CLEARANCE)
-        body = ET.SubElement(
-            world, "body", name=side, pos=_text([0, MM * away, 0]), euler=_text([turn, 0, 0])
-        )
-        ET.SubElement(body, "joint", name=side, type="slide", axis="0 1 0", armature=CARRIAGE)
-        ET.SubElement(body, "attach", model="finger", body="finger", prefix=f"{side}-")
-        reach = _text([0, MM * (stroke + CLEARANCE)])
-        ET.SubElement(drives, "position", DRIVE, name=side, joint=side, ctrlrange=reach)
-    body = ET.SubElement(world, "body", name="object", pos=_text([MM * place[0], 0, 0]))
-    ET.SubElement(body, "freejoint")
-    size = _text([MM * radius, MM * depth / 2])
-    ET.SubElement(body, "geom", HARD, name="object", type="cylinder", size=size, density="1000")
-    return _written(root)
-
-
 def flex_mjcf(name: str, body: SolidMesh, material: Material, density: float, damping: Damping) -> str:
     """The MJCF file of a flexible body, of Saint Venant and Kirchhoff's law on linear tetrahedra.
 
@@ -170,10 +134,10 @@ def with_header(text: str, lines: Sequence[str]) -> str:
     return f"<!--\n{said}\n-->\n{text}"
 
 
-def _model(name: str, integrator: str, step: float = STEP) -> ET.Element:
+def _model(name: str, integrator: str) -> ET.Element:
     root = ET.Element("mujoco", model=name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-    ET.SubElement(root, "option", timestep=_text(step), integrator=integrator, gravity="0 0 0")
+    ET.SubElement(root, "option", timestep=_text(STEP), integrator=integrator, gravity="0 0 0")
     return root
 
 

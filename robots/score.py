@@ -1,8 +1,7 @@
 """Score of a robot model: its shapes and forces against finite elements, at loads that no fit has seen."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -87,10 +86,6 @@ class ModelScore:
             f"{of['largest_shape_error_mm']:.2g} mm), force by {of['force_error_percent']:.2g} % (largest "
             f"{of['largest_force_error_percent']:.2g} %); {of['computing_s_per_s']:.2g} CPU s a second"
         )
-
-    def document(self) -> Mapping[str, Any]:
-        """Everything, for JSON."""
-        return {**self.values(), "steady": self.steady, "loads": [each.row() for each in self.presses]}
 
 
 def scored(model: Model, finger: PressedFinger, loads: Sequence[Press]) -> ModelScore:

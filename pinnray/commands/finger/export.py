@@ -21,8 +21,7 @@ def command(
     """Write a finger for MuJoCo or any program that reads tetrahedra, in SI units.
 
     mujoco: a chain of hinges and a flexible body, both fitted to fem-nonlinear under a cylinder at several
-    places, up to --stroke, and a gripper of two chains around it; the default --mesh-size is 1. mesh:
-    tetrahedra, their surface, and the material.
+    places, up to --stroke; the default --mesh-size is 1. mesh: tetrahedra and their surface.
 
     Args:
         kind: Program: mujoco, or mesh for others.
