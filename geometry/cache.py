@@ -41,10 +41,8 @@ def finger_mesh(
     Raises:
         UserError: If meshing fails or takes too long.
     """
-    if isinstance(finger, DrawnFinger):
-        if finger.mesh is not None and settings is None:
-            return replace(finger.mesh, depth=finger.depth)
-        finger.check_materials()
+    if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings is None:
+        return replace(finger.mesh, depth=finger.depth)
     settings = settings or MeshSettings()
     sizes = settings.model_dump()
     task = ChildCall(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))

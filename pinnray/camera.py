@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from pinnray.arguments import MATERIAL, mesh_settings, read_finger, read_job, read_solver, taken
+from pinnray.arguments import MATERIAL, learned_of, mesh_settings, read_finger, read_job, read_solver, taken
 from pinnray.film.film import FilmSettings
 from pinnray.film.rig_settings import RigSettings
 from pinnray.geometry.finger.finger import Finger
@@ -148,7 +148,8 @@ def film_forces(
         with stages.stage("mesh"):
             mesh = finger_mesh(finger, settings=mesh_sizes(finger, usual=MESH))
         with stages.stage("force") as report:
-            tracker = force_tracker(mesh, finger, elastic, seen.points, plane=seen.plane)
+            known = learned_of(design)
+            tracker = force_tracker(mesh, finger, elastic, seen.points, plane=seen.plane, learned=known)
             forces = forces_of(tracking, tracker, elastic.loss, report)
     if not elastic.loss and (remark := loss_remark(forces, 0.0)):
         warnings.warn(remark, stacklevel=2)

@@ -308,7 +308,7 @@ def crossval(
     """
     from pinnray.runtime.stages import shown_stages
     from pinnray.studies.crossval.cross_validation import cross_validate
-    from pinnray.studies.crossval.study import CrossvalStudy, solver_variants
+    from pinnray.studies.crossval.study import CrossvalStudy
 
     own = [each.name for each in fields(CrossvalStudy)]
     words = {name: study.pop(name) for name in list(study) if name not in own}
@@ -317,7 +317,7 @@ def crossval(
         study[name] = (study[name],) if isinstance(study[name], str) else study[name]
     job = CrossvalStudy(
         design=finger,
-        variants=solver_variants(read_solvers(solvers), elastic),
+        solvers=read_solvers(solvers),
         out=as_path(out, "out"),
         mesh=mesh_settings(size),
         material=elastic,

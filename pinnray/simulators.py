@@ -45,7 +45,7 @@ def export(
             `loss_factor`, `across`, `layers`, `places`, `score`; parameters of finger, material and load.
 
     Raises:
-        UserError: If MuJoCo is missing, a load is not possible, or the finger is of several materials.
+        UserError: If MuJoCo is missing, or a load is not possible.
     """
     from pinnray.geometry.cache import finger_mesh, mesh_sizes
     from pinnray.robots.export import SIZES, export_finger

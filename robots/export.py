@@ -63,15 +63,15 @@ def export_finger(
         stages: Shows the progress.
 
     Raises:
-        UserError: If MuJoCo is missing, a load is not possible, or the finger is of several materials.
+        UserError: If MuJoCo is missing, or a load is not possible.
     """
     if out.is_file():
         raise UserError(f"{out} is a file; name a folder")
     if kind == "mujoco":
         check_mujoco()
     finger, material = problem.finger, problem.material
-    if finger is None or problem.mesh.moduli is not None:
-        raise UserError("a robot model is of a finger of one material")
+    if finger is None:
+        raise UserError("a robot model is of a finger; give a problem that has one")
     density = 1000 * (material.substance.density if material.substance else DENSITY)
     with stages.stage("tetrahedra"):
         length = float(np.ptp(finger.section.bounds[:, 0]))

@@ -89,7 +89,7 @@ class CylinderContact:
             travel=load.values,
             radius=float(load.radius or 0),
             # More would need fewer updates of the multipliers but more Newton iterations.
-            stiffness=10.0 * problem.stiffest,
+            stiffness=10.0 * problem.material.young,
             coefficient=load.friction,
             edges=order[np.searchsorted(nodes[order], np.concatenate(columns, axis=1))],
             shares=space.shares,
@@ -259,7 +259,6 @@ class ContactRegion:
     end: float  # Abscissa of the other end, mm
     parts: int  # Number of separate intervals between them
     width: float  # Deformed length of front face in contact, mm
-    spacing: float  # Deformed length between neighbouring nodes there, mm: the resolution of the width
     pressure: float  # Largest Cauchy pressure, MPa
     penetration: float  # Largest depth of a node within the cylinder, mm
     friction: float  # Sum of friction along the cylinder, counterclockwise around it, N/mm
@@ -276,7 +275,6 @@ class ContactRegion:
             "contact_end_mm": self.end,
             "contact_parts": self.parts,
             "contact_width_mm": self.width,
-            "contact_spacing_mm": self.spacing,
             "contact_pressure_MPa": self.pressure,
             "penetration_mm": self.penetration,
             **(rubbed if self.points.friction.any() else {}),
@@ -319,7 +317,6 @@ class ContactRegion:
             end=float(between[last + 1]),
             parts=int(np.count_nonzero(np.diff(touching) > 1)) + 1,
             width=float(shares[touching].sum()),
-            spacing=float(shares[touching].max()),
             pressure=float(points.pressure.max()),
             penetration=float(max(0.0, -gap.min())),
             friction=float(friction.sum()),

@@ -107,7 +107,7 @@ def stress_of(law: LawName, gradient: FloatArray, lame: Lame) -> tuple[FloatArra
     volume = lame.λ * trace
     across = lame.λ_out * trace
     if law == "linear" or law == "st-venant-kirchhoff":
-        stress = volume[:, None, None] * unit + 2 * np.reshape(lame.μ, (-1, 1, 1)) * strain
+        stress = volume[:, None, None] * unit + 2 * lame.μ * strain
         if law == "st-venant-kirchhoff":
             jacobian = deformation_jacobian(gradient)
             stress = (unit + gradient) @ stress @ (unit + transposed) / jacobian[:, None, None]

@@ -23,7 +23,7 @@ def energy_and_force(problem: Problem, field: DisplacementField, degree: int = 2
     """
     rule = body_quadrature(problem.mesh, degree)
     gradient = field.gradient(rule.location)
-    state = State.from_gradient(gradient, problem, rule.location.cells)
+    state = State.from_gradient(gradient, problem)
     energy = float((rule.weights * state.energy_density).sum())
     stress = piola_stress(problem.material.law, gradient, state.stress)
     traction = np.einsum("nij,nj->ni", stress, section_slope(problem, rule.location))

@@ -2,7 +2,6 @@
 
 import reprlib
 from dataclasses import dataclass
-from typing import Any, cast
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -17,7 +16,6 @@ from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import brief
-from pinnray.solvers.elasticity import Lame, lame_constants
 from pinnray.solvers.load import LEAST_TRAVEL as LEAST_TRAVEL
 from pinnray.solvers.load import RADIUS as RADIUS
 from pinnray.solvers.load import ROUGHEST as ROUGHEST
@@ -86,30 +84,6 @@ class Problem:
         if (gap := _gap_in_front(self.mesh, left, right)) is not None:
             advice = "move the contact or make it narrower"
             raise UserError(f"{said} all on the front face, which has a gap at x = {gap:.6g} mm; {advice}")
-
-    def lame(self, cells: IntArray | None = None, *, solid: bool = False) -> Lame:
-        """Lamé's constants, MPa: numbers, or in a body of several materials those of triangles, shape (n,).
-
-        Args:
-            cells: The triangles, shape (n,); needed in a body of several materials.
-            solid: Whether in three dimensions, not of the plane law.
-        """
-        material = self.material
-        if self.mesh.moduli is None:
-            return material.solid_lame if solid else material.lame
-        if cells is None:
-            raise ValueError("in a body of several materials stress needs the triangles")
-        own, whole = self.mesh.moduli[cells], (material.young, material.poisson)
-        young, poisson = cast(Any, np.where(own[:, :1] > 0, own, whole).T)
-        return lame_constants(young, poisson, "strain" if solid else material.plane)
-
-    @property
-    def stiffest(self) -> float:
-        """The largest Young's modulus of the body, MPa."""
-        moduli = self.mesh.moduli
-        if moduli is None:
-            return self.material.young
-        return float(np.where(moduli[:, 0] > 0, moduli[:, 0], self.material.young).max())
 
     @property
     def digest(self) -> str:

@@ -38,7 +38,6 @@ BUILT_IN = {
     "fem-id": "pinnray.solvers.fem.identification:FemIdSolver",
     "fem-asm": "pinnray.solvers.fem.assimilating:FemAsmSolver",
     "gp": "pinnray.solvers.statistics.gaussian_process:GaussianProcessSolver",
-    "statfem": "pinnray.solvers.statistics.statistical_fem:StatFemSolver",
     "pinn-std": PRESETS["pinn-std"]["fast"],
     "pinn-asm": PRESETS["pinn-asm"]["fast"],
     "pinn-id": "pinnray.solvers.pinn.identification.solver:PinnIdSolver",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.picture_frame import Pictures
-from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.notebook import brief, fact_table
 from pinnray.solvers.elasticity import energy_density_of, strain_of, stress_of, von_mises
 from pinnray.solvers.problem import Load, Problem
@@ -270,7 +270,7 @@ class Solution:
         """Strain, stress and energy density at points of shape (n, 2), or at one of shape (2,), mm."""
         location, alone = self._locate(points)
         gradient = self.field.solid_gradient if isinstance(self.field, SolidField) else self.field.gradient
-        state = State.from_gradient(gradient(location), self.problem, location.cells)
+        state = State.from_gradient(gradient(location), self.problem)
         return State(**{name: values[0] for name, values in vars(state).items()}) if alone else state
 
     def _repr_html_(self) -> str:
@@ -321,12 +321,10 @@ class State:
     __repr__ = brief
 
     @classmethod
-    def from_gradient(cls, gradient: FloatArray, problem: Problem, cells: IntArray | None = None) -> "State":
-        """The state of the problem's material at displacement gradients, shape (n, 2, 2) or (n, 3, 3).
-
-        In a body of several materials the triangles of the n points are needed.
-        """
-        law, lame = problem.material.law, problem.lame(cells, solid=gradient.shape[-1] == 3)
+    def from_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":
+        """The state of the problem's material at displacement gradients, shape (n, 2, 2) or (n, 3, 3)."""
+        material, solid = problem.material, gradient.shape[-1] == 3
+        law, lame = material.law, material.solid_lame if solid else material.lame
         stress, stress_zz = stress_of(law, gradient, lame)
         strain: FloatArray = np.moveaxis(np.array(strain_of(law, gradient)), -1, 0)
         return cls(

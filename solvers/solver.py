@@ -147,7 +147,6 @@ class Traits:
     family: Family | None = None  #: Kind of method; None if unknown
     twin: str | None = None  #: Solver by finite elements that fits the markers in the same way, if any
     friction: bool = False  #: Whether its load `cylinder` may have friction
-    parts: bool = False  #: Whether parts of the body may have materials of their own
     cost: Cost = Cost()  #: Time that it takes
 
     @classmethod
@@ -175,11 +174,6 @@ def check_problem(solver: Solver, problem: Problem) -> None:
     if problem.material.law not in solver.laws:
         raise UnsupportedProblemError(
             f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}"
-        )
-    if problem.mesh.moduli is not None and not Traits.of(solver).parts:
-        raise UnsupportedProblemError(
-            f"{solver.name} takes a body of one material, and parts of this one have their own; take fem or "
-            "fem-nonlinear"
         )
     check_load(solver, problem.load)
 
@@ -249,50 +243,29 @@ def _checked(solver: Solver, solve: Callable[[], Solution], problem: Problem) ->
         raise SolverFailedError(solver, error) from error
     for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):
         if not isinstance(value, kind):
-            said = f"{_named(value)} as its {kind.__name__}"
-            raise UnsoundSolutionError(f"solver {solver.name} returned {said}; see docs/own-solver.md")
+            said = f"{kind.__name__.lower()} is {type(value).__name__}, not a {kind.__name__}"
+            raise UnsoundSolutionError(f"solver {solver.name}: its {said}; see docs/own-solver.md")
     try:
         fault = _fault(solution, problem)
     except Exception as error:  # of the field's own methods
         raise SolverFailedError(solver, error) from error
     if fault:
-        article = "an" if fault.startswith("energy") else "a"
-        raise UnsoundSolutionError(f"solver {solver.name} returned {article} {fault}; see docs/own-solver.md")
+        raise UnsoundSolutionError(f"solver {solver.name}: its {fault}; see docs/own-solver.md")
     # A solver that passes on another one's solution would be a second row of that name.
     return solution if solution.solver == solver.name else replace(solution, solver=solver.name)
 
 
-def _other_kind(values: Any, *, of_field: bool) -> str | None:
-    """A phrase for values that are no array of real numbers; None for an array of them."""
-    if (of_field and not isinstance(values, np.ndarray)) or isinstance(values, np.ma.MaskedArray):
-        return _named(values)
-    try:
-        kind = np.asarray(values).dtype
-    except (TypeError, ValueError, RuntimeError):
-        return _named(values)
-    return None if kind.kind in "fiu" else f"of type {kind}"
-
-
-def _named(value: object) -> str:
-    return "None" if value is None else f"a {type(value).__name__}"
-
-
 def _fault(solution: Solution, problem: Problem) -> str | None:
-    """A phrase for a number or array of a solution that cannot be right; None if all can."""
-    if not isinstance(solution.problem, Problem):
-        return f"Solution of {_named(solution.problem)}; it must have the problem that it was given"
+    """A clause on a number or array of a solution that cannot be right; None if all can."""
     if solution.problem.mesh.digest != problem.mesh.digest:
-        return "Solution on another mesh; it must be of the problem that it was given"
-    for part, columns in (("stats that are", solution.stats), ("history that is", solution.history)):
+        return "solution is on another mesh than the problem that it was given"
+    for part, columns in (("stats", solution.stats), ("history", solution.history)):
         if not isinstance(columns, Mapping):
-            return f"{part} {_named(columns)}, not a dictionary"
-    for method in ("displacement", "gradient"):
-        if not callable(getattr(solution.field, method, None)):
-            return f"field that is {_named(solution.field)}, without a method {method}"
+            return f"{part} is {type(columns).__name__}, not a dictionary"
     lengths = {name: len(column) for name, column in solution.history.items()}
     if len(set(lengths.values())) > 1:
-        return f"history whose columns differ in length: {lengths}"
-    mesh, markers = problem.mesh, len(problem.observations.points) if problem.observations else 0
+        return f"history has columns of different lengths: {lengths}"
+    mesh, seen = problem.mesh, problem.observations
     checks: list[tuple[str, ArrayLike | None, tuple[int, ...]]] = [
         ("energy", solution.energy, ()),
         ("reaction", solution.reaction, (2,)),
@@ -300,18 +273,17 @@ def _fault(solution: Solution, problem: Problem) -> str | None:
         ("gradient", solution.field.gradient(mesh.at_centroids()), (len(mesh.triangles), 2, 2)),
     ]
     if solution.left_out is not None:
-        checks.append(("left_out", solution.left_out, (markers, 2)))
+        checks.append(("left_out", solution.left_out, (len(seen.points) if seen else 0, 2)))
     for what, given, shape in checks:
-        if given is not None and (kind := _other_kind(given, of_field=what in ("displacement", "gradient"))):
-            return f"{what} that is {kind}, not floats"
-        values = np.asarray(given, dtype=np.float64)
-        if values.shape != shape or given is None:
-            found = "that is None" if given is None else f"of shape {values.shape}"
-            return f"{what} {found}; it must have the shape {shape}"
-        if what == "left_out" and problem.observations is not None:
-            values = values[problem.observations.visible]
+        values = np.asarray(given)
+        other = what in ("displacement", "gradient") and type(given) is not np.ndarray
+        if other or values.dtype.kind not in "fiu" or values.shape != shape:
+            found = type(given).__name__ if other else f"{values.dtype} of shape {values.shape}"
+            return f"{what} is {found}, not floats of shape {shape}"
+        if what == "left_out" and seen is not None:
+            values = values[seen.visible]
         if not np.isfinite(values).all():
-            return f"{what} that is not finite everywhere"
+            return f"{what} is not finite everywhere"
     return None
 
 

@@ -9,13 +9,11 @@ import time
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
 import torch
 
-from pinnray.geometry.mesh.quadrature import body_quadrature
-from pinnray.solvers.elasticity import energy_density_of
+from benchmarks.entries.network_problem import NetworkField, NetworkProblem, displacement_gradients
 from pinnray.solvers.energy_and_force import energy_and_force
-from pinnray.solvers.problem import Problem, contact_functional
+from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import Progress, check_problem, silent
 
@@ -66,36 +64,31 @@ class DeepEnergySolver:
         check_problem(self, problem)
         started = time.perf_counter()
         torch.manual_seed(self.seed)
-        network = Network(self, problem)
-        energies = self._train(network, problem, progress)
-        energy, reaction = energy_and_force(problem, network)
+        given = NetworkProblem(problem, self.quadrature)
+        network = Network(self, given)
+        energies = self._train(network, given, 100 * problem.material.young, progress)
+        field = NetworkField(network)
+        energy, reaction = energy_and_force(problem, field)
         change = abs(energies[-1] / energies[-len(energies) // 10] - 1)
         message = f"the energy changed by {change:.1e} in the last tenth of {len(energies)} steps"
         stats = {"seconds": time.perf_counter() - started, "steps": len(energies)}
         return Solution(
-            self.name, problem, network, energy, reaction, Status(bool(change < STEADY), message), stats
+            self.name, problem, field, energy, reaction, Status(bool(change < STEADY), message), stats
         )
 
-    def _train(self, network: "Network", problem: Problem, progress: Progress) -> list[float]:
+    def _train(
+        self, network: "Network", given: NetworkProblem, penalty: float, progress: Progress
+    ) -> list[float]:
         """Minimise the energy; returns it at every step."""
-        rule, lame, law = (
-            body_quadrature(problem.mesh, self.quadrature),
-            problem.material.lame,
-            problem.material.law,
-        )
-        points, weights = torch.tensor(rule.location.points), torch.tensor(rule.weights)
-        contact = problem.mesh.points[np.unique(problem.mesh.boundary("contact"))]
-        held = torch.tensor(contact) if problem.load.kind == "patch" else None
-        energies: list[float] = []
+        points, energies = given.points.requires_grad_(), list[float]()
 
         def loss() -> torch.Tensor:
             optimiser.zero_grad()
-            gradient = network.gradients(points.requires_grad_(), create=True)
-            value = (weights * energy_density_of(law, gradient, lame, torch.log)).sum()
+            gradient = displacement_gradients(network(points), points)
+            value = (given.areas * given.density(gradient)).sum()
             energies.append(value.item())
-            if held is not None:  # the mean is met exactly, the rest by a penalty
-                missed = network(held) - torch.tensor(problem.load.values)
-                value = value + 100 * problem.material.young * (missed**2).sum(dim=1).mean()
+            if given.shares is None:  # the mean is met exactly, the rest by a penalty
+                value = value + penalty * (given.missed(network(given.contact)) ** 2).sum(dim=1).mean()
             value.backward()
             return value
 
@@ -114,19 +107,15 @@ class DeepEnergySolver:
 class Network(torch.nn.Module):
     """The displacement: w + (t - mean of w) d / mean of d, where w = d N and d is zero at the base."""
 
-    def __init__(self, solver: DeepEnergySolver, problem: Problem) -> None:
+    def __init__(self, solver: DeepEnergySolver, given: NetworkProblem) -> None:
         super().__init__()
-        mesh = problem.mesh
-        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-        self._middle, self._length = torch.tensor((low + high) / 2), float((high - low).max() / 2)
-        base = mesh.points[mesh.boundary("base").ravel()]
-        first, last = base[base[:, 1].argmin()], base[base[:, 1].argmax()]
-        normal = np.array([last[1] - first[1], first[0] - last[0]]) / np.linalg.norm(last - first)
-        self._origin, self._normal = torch.tensor(first), torch.tensor(normal)
-        points, weights = contact_functional(problem)
-        self._pressed, self._weights = torch.tensor(points), torch.tensor(weights)[:, None]
-        self._stroke = torch.tensor(problem.load.values)
-        self._frequencies = 2 * torch.pi * solver.scale * torch.randn(2, solver.features, dtype=torch.float64)
+        self._given = given
+        self._first, last = given.base[given.base[:, 1].argmin()], given.base[given.base[:, 1].argmax()]
+        along = (last - self._first) / (last - self._first).norm()
+        self._normal = torch.stack([along[1], -along[0]])
+        alike = torch.full((len(given.contact), 1), 1 / len(given.contact), dtype=torch.float64)
+        self._weights = alike if given.shares is None else given.shares
+        self._frequencies = torch.pi * solver.scale * torch.randn(2, solver.features, dtype=torch.float64)
         widths = [2 * solver.features or 2, *[solver.width] * solver.layers, 2]
         layers: list[torch.nn.Module] = []
         for inputs, outputs in pairwise(widths):
@@ -136,29 +125,14 @@ class Network(torch.nn.Module):
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:
         """Displacement, mm."""
-        both = torch.cat([points, self._pressed])
-        places = (both - self._middle) / self._length
+        both, stroke = torch.cat([points, self._given.contact]), self._given.stroke
+        places = self._given.scaled(both)
         if self._frequencies.shape[1]:
-            phases = places @ self._frequencies / 2
+            phases = places @ self._frequencies
             places = torch.cat([phases.sin(), phases.cos()], dim=1)
-        away = ((both - self._origin) @ self._normal / self._length).abs()[:, None]
-        own = self._stroke.abs().max() * away * self._layers(places)
+        away = self._given.scaled(both) @ self._normal - self._given.scaled(self._first) @ self._normal
+        away = away.abs()[:, None]
+        own = stroke.abs().max() * away * self._layers(places)
         count = len(points)
         means = [(self._weights * each[count:]).sum(dim=0) for each in (own, away)]
-        return own[:count] + (self._stroke - means[0]) * away[:count] / means[1]
-
-    def gradients(self, points: torch.Tensor, *, create: bool) -> torch.Tensor:
-        """Displacement gradient at points that require gradients, shape (n, 2, 2)."""
-        moved = self(points)
-        rows = [torch.autograd.grad(part.sum(), points, create_graph=True)[0] for part in moved.T]
-        stacked = torch.stack(rows, dim=1)
-        return stacked if create else stacked.detach()
-
-    def displacement(self, location) -> np.ndarray:
-        """Displacement of the field, shape (n, 2), mm."""
-        with torch.no_grad():
-            return self(torch.tensor(location.points)).numpy()
-
-    def gradient(self, location) -> np.ndarray:
-        """Its gradient, shape (n, 2, 2)."""
-        return self.gradients(torch.tensor(location.points, requires_grad=True), create=False).numpy()
+        return own[:count] + (stroke - means[0]) * away[:count] / means[1]

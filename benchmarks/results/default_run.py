@@ -28,7 +28,6 @@ MEANINGS = {
     "fem-id": "finite elements; contact, force, walls and law found from the markers",
     "pinn-id": "neural network; contact, force, walls and law found from the markers",
     "gp": "interpolation of the markers, no mechanics",
-    "statfem": "finite elements, corrected by interpolated markers",
 }
 SHORT = ("fem", "pinn-std", "pinn-asm", "fem-id", "pinn-id")
 """Solvers of the table in the README."""

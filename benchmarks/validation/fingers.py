@@ -19,7 +19,7 @@ from pinnray.vision.clicked_points import clicked_points, read_clicks
 
 SIZE = 1.0
 """Of the elements, mm."""
-SOLVERS = ("gp", "statfem", "pinn-id", "fem-id")
+SOLVERS = ("gp", "pinn-id", "fem-id")
 
 
 @dataclass(frozen=True)

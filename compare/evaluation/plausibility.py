@@ -1,4 +1,4 @@
-"""Checks a finger's walls, and measured marker displacements against finger, indenter's stroke and `fem`.
+"""Checks units, and measured marker displacements against finger, indenter's stroke and `fem`.
 
 What is impossible is refused, what is unlikely warned of, with what was read and what was expected.
 """
@@ -7,7 +7,6 @@ import numpy as np
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.section.thickness import wall_thickness
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import OutsideBodyError, UserError
 from pinnray.solvers.problem import Problem
@@ -16,8 +15,6 @@ from pinnray.solvers.solver import NONE_SEEN
 from pinnray.vision.measurements import SMALLEST_DISTANCE
 from pinnray.vision.point_order import SURE, likeliest_order, likelihoods, order_text
 
-UNITS = (1000.0, 25.4, 10.0)
-"""Millimetres in a metre, an inch and a centimetre."""
 LOOKS_LIKE = "this looks like"
 """Words before the unit that a number is taken to have."""
 CONVENTION = "u and v are final minus initial position, in mm, u towards the tip and v out of the front"
@@ -35,7 +32,7 @@ SMALL = 0.1
 def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
     """Raise a `UserError` if no marker was seen, or they cannot be markers of the body.
 
-    They cannot if one is not on the body, two are at one place, or all lie where their discs have no room.
+    They cannot if one is not on the body, or two are at one place.
     """
     points = observations.points
     if not observations.known:
@@ -51,19 +48,10 @@ def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
     if len(apart) and float(apart.min()) < SMALLEST_DISTANCE:
         first, second = (int(ends[apart.argmin()]) + 1 for ends in np.triu_indices(len(points), 1))
         raise UserError(f"the markers {first} and {second} are at one place; keep one")
-    crowded = bool(len(apart)) and float(apart.min()) < 2 * observations.marker_radius
-    for factor in UNITS:  # so near the origin they may lie on the body by chance
-        if (crowded or factor == UNITS[0]) and _inside(mesh, points * factor):
-            extent = float(np.abs(points).max())
-            raise UserError(
-                f"the measurements are not of this finger: all markers lie within {extent:.3g} mm of its "
-                f"frame's origin, and would be on it {factor:g} times as far; give positions and "
-                "displacements in mm"
-            )
 
 
 def problem_remarks(problem: Problem) -> list[str]:
-    """Remarks on a load or a material that looks like another unit, and on a thin wall, a line each."""
+    """Remarks on a load or a material that looks like another unit, a line each."""
     load, young, length = problem.load, problem.material.young, _length(problem)
     remarks = [
         f"the {name} of {size:g} mm is {size / length:.1g} of the finger's length; {LOOKS_LIKE} metres, "
@@ -76,7 +64,7 @@ def problem_remarks(problem: Problem) -> list[str]:
         remarks.append(
             f"Young's modulus of {young:g} MPa is no rubber's or plastic's; {LOOKS_LIKE} {unit}, give MPa"
         )
-    return [*remarks, *wall_remarks(problem)]
+    return remarks
 
 
 def displacement_remarks(observations: Observations, problem: Problem) -> list[str]:
@@ -200,46 +188,3 @@ def _cosine(one: FloatArray, other: FloatArray) -> float:
     """Cosine of the angle between two arrays as vectors; 0 if one vanishes."""
     sizes = float(np.linalg.norm(one) * np.linalg.norm(other))
     return float((one * other).sum()) / sizes if sizes else 0.0
-
-
-def _inside(mesh: TriangleMesh, points: FloatArray) -> bool:
-    try:
-        mesh.locate(points)
-    except OutsideBodyError:
-        return False
-    return True
-
-
-LEAST_ACROSS = 1.5
-"""Elements across a wall below which its bending is told to be unresolved: less than two."""
-NECK = 0.2
-"""Thickness of a wall over the median wall's below which it is told: such a neck is a hinge. The walls of
-finger rays, printed or drawn, have 0.24 or more."""
-
-
-def wall_remarks(problem: Problem) -> list[str]:
-    """A remark on the thinnest wall of a problem's finger, if it is a neck or has too few elements across."""
-    if problem.finger is None:
-        return []
-    section, mesh = problem.finger.section, problem.mesh
-    extent = float(np.ptp(section.bounds, axis=0).max())
-    points, thickness = wall_thickness(section, extent / 400)
-    if not len(points):
-        return []
-    least, usual = float(thickness.min()), float(np.median(thickness))
-    where = points[thickness.argmin()]
-    corners = mesh.points[mesh.triangles]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    away = np.linalg.norm(corners.mean(axis=1) - where, axis=1)
-    height = float(np.median((2 * mesh.areas / longest)[away <= max(least, away.min())]))
-    across = least / height
-    if across >= LEAST_ACROSS and least >= NECK * usual:
-        return []
-    count = max(round(across), 1)
-    said = f"wall of {least:.2g} mm at ({where[0]:.4g}, {where[1]:.4g}) mm"
-    if least < NECK * usual:
-        said += f", {least / usual:.1g} of the median wall's {usual:.3g} mm"
-    said += f": {count} element{'s' if count > 1 else ''} of {height:.2g} mm across it"
-    if across < LEAST_ACROSS:
-        return [f"{said}, too few for the stress of its bending; take a mesh with at least two there"]
-    return [f"{said}; a neck bends as a hinge, its stiffness with its thickness cubed: see that it is meant"]

@@ -22,7 +22,6 @@ LOOKS = {
     "fem-id": Look("#000000", "p"),
     "pinn-id": Look("#94c979", "h"),
     "gp": Look("#946bf2", "P"),
-    "statfem": Look("#1b00f2", "X"),
 }
 """Each colour differs from the others, and from that of measurements, for readers of any colour vision.
 

@@ -3,7 +3,7 @@
 A question that they cannot answer is not asked.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import hypot, isfinite, nan
 from typing import NamedTuple
@@ -244,7 +244,9 @@ def _markers(scores: Scores) -> RunAnswer | None:
     table = TextTable(
         "", heads, rows, "Held out: mean |Δu| + |Δv| at each marker, predicted from the others."
     )
-    return RunAnswer("Did the markers help?", _nearer(plain, given, measures, scores), sentences, table)
+    return RunAnswer(
+        "Did the markers help?", _nearer(plain, given, measures, scores.reference), sentences, table
+    )
 
 
 TRUTH_MEASURES: Mapping[str, Callable[[SolverScores], float]] = {
@@ -258,31 +260,17 @@ def _nearer(
     plain: SolverScores,
     given: Mapping[str, SolverScores],
     measures: Mapping[str, Callable[[SolverScores], float]],
-    scores: Scores,
+    reference: str,
 ) -> str:
-    """The solvers that are nearer than the reference, in which of the measures."""
-    found: dict[tuple[str, ...], list[str]] = {}
+    """The solvers that were given markers and are nearer than the reference, by each measure."""
+    said = []
     for words, measure in measures.items():
         known = {name: measure(own) for name, own in given.items() if isfinite(measure(own))}
         if known and isfinite(measure(plain)):
-            better = tuple(name for name, value in known.items() if value < measure(plain))
-            found.setdefault(better, []).append(words)
-    if not found:
-        return "This run does not tell."
-    said = [f"{_who(better, given)} nearer {_listed(fields)}" for better, fields in found.items()]
-    text = "; ".join(said).replace(" nearer ", f" nearer than {scores.reference} ", 1)
-    return f"{text[0].upper() if len(given) > 1 else text[0]}{text[1:]}."
-
-
-def _who(better: Sequence[str], given: Collection[str]) -> str:
-    """Subject and verb of a sentence on those solvers that are better, of all that were given markers."""
-    if len(given) == 1:
-        return f"{next(iter(given))} is{'' if better else ' not'}"
-    if not better:
-        return "no solver that was given markers is"
-    if len(better) == len(given):
-        return f"{_all(len(given))} solvers that were given markers are"
-    return f"only {_listed(better)} {'is' if len(better) == 1 else 'are'}"
+            better = [name for name, value in known.items() if value < measure(plain)]
+            every = len(better) == len(given) > 1
+            said.append(f"{words} {_all(len(given)) if every else _listed(better) if better else 'none'}")
+    return f"Nearer than {reference}: {'; '.join(said)}." if said else "This run does not tell."
 
 
 def _held_out(own: SolverScores) -> float:

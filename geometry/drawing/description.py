@@ -25,13 +25,6 @@ EXPECTED = {
 """Values of the description that may be of several types."""
 
 
-class PartMaterial(CheckedModel):
-    """Elastic constants of a part; the law and the plane state are those of the whole body."""
-
-    young: float = bounded(..., 1e-6, 1e7, "MPa", "E", "Young's modulus")
-    poisson: float = bounded(..., -0.99, 0.4999, "", "nu", "Poisson's ratio")
-
-
 class Description(CheckedModel):
     """Clamp, contact and markers of a drawing, in the file's coordinates; what is missing is proposed.
 
@@ -71,10 +64,6 @@ class Description(CheckedModel):
         None, 1e-6, 2000, "", "", "How deep a marker is inlaid, in the file's unit"
     )
     depth: float | None = bounded(None, 1e-6, 2000, "", "", "Depth of the extrusion, in the file's unit")
-    materials: dict[str, PartMaterial] | None = Field(
-        default=None,
-        description="Young's modulus, MPa, and Poisson's ratio of parts: of a Gmsh mesh's physical surfaces",
-    )
 
     @field_validator("clamp", mode="before")
     @classmethod

@@ -49,7 +49,6 @@ class DrawnFinger:
         unit: Length of one unit of the file's coordinates, mm.
         reading: `units`, `plane` and `tolerance` of the description, where they were given.
         mesh: The file's own triangle mesh, in the finger's frame, or None.
-        materials: Young's modulus, MPa, and Poisson's ratio of the mesh's parts that have their own, by name.
 
     Raises:
         UserError: If the contact is not on the front face or a marker is not in the body.
@@ -71,7 +70,6 @@ class DrawnFinger:
     unit: float = 1.0
     reading: Mapping[str, str | float] = field(default_factory=dict)
     mesh: TriangleMesh | None = None
-    materials: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     __repr__ = brief
 
@@ -80,7 +78,6 @@ class DrawnFinger:
         object.__setattr__(self, "markers", markers)
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
         object.__setattr__(self, "reading", MappingProxyType(dict(self.reading)))
-        object.__setattr__(self, "materials", MappingProxyType(dict(self.materials)))
         for x in self.contact_ends:
             self.section.front_place(x)
 
@@ -125,17 +122,8 @@ class DrawnFinger:
         """
         if position == self.contact_abscissa:
             return self
-        self.check_materials()
         sources = {**self.sources, "contact": "given"}
         return replace(self, contact_abscissa=float(position), sources=sources, mesh=None)
-
-    def check_materials(self) -> None:
-        """Raise a `UserError` if parts have materials: they are on the file's mesh, and on no other."""
-        if self.materials:
-            raise UserError(
-                f"{self.file}: materials of parts are on the file's own mesh; leave the element size and the "
-                "place of the contact as they are there"
-            )
 
     def definition(self) -> dict[str, Any]:
         """Everything that defines the finger, for JSON; of the file's own mesh only the digest."""
@@ -151,11 +139,6 @@ class DrawnFinger:
             "sources": dict(self.sources),
             "reading": dict(self.reading),
             "mesh": self.mesh.digest if self.mesh else None,
-            **(
-                {"materials": {name: dict(part) for name, part in self.materials.items()}}
-                if self.materials
-                else {}
-            ),
         }
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -200,8 +183,6 @@ class DrawnFinger:
             "Markers": f"{len(self.markers)}{self._source('markers')}",
             "Marker diameter": f"{self.marker_diameter:.4g} mm{self._source('marker_diameter')}",
         }
-        for name, part in self.materials.items():
-            rows[f"Material of {name}"] = f"E = {part['young']:g} MPa, Poisson's ratio {part['poisson']:g}"
         if self.mesh:
             rows["Mesh"] = f"{len(self.mesh.triangles)} triangles of the file, as they are"
         return [(meaning, "", value) for meaning, value in rows.items()]
@@ -249,8 +230,6 @@ def description_lines(finger: Finger) -> str:
     for key, value in where.items():
         source = sources.get(key)
         lines.append(f"{key} = {json.dumps(value)}" + (f"  # {source}" if source else ""))
-    for name, part in (drawn.materials if drawn else {}).items():
-        lines += ["", f"[materials.{json.dumps(name)}]", *(f"{key} = {part[key]!r}" for key in part)]
     return "\n".join([*lines, ""])
 
 

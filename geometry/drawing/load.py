@@ -128,15 +128,7 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
     height, height_source = _first(given=given, drawn=drawing.marker_height, proposed=0.6)
     markers = placement(points)
     markers = markers[np.lexsort((-markers[:, 1], markers[:, 0]))]
-    materials = description.materials or {}
-    if materials and drawing.mesh is None:
-        raise UserError(
-            "materials belong to the physical surfaces of a plane Gmsh mesh of triangles whose curves have "
-            "groups base and contact; mesh the section with them and give that .msh"
-        )
-    mesh = None
-    if drawing.mesh:
-        mesh = ready_mesh(drawing.mesh, placement, section, markers, (x, width), materials)
+    mesh = ready_mesh(drawing.mesh, placement, section, markers, (x, width)) if drawing.mesh else None
     return DrawnFinger(
         name=description.name or _name(drawing.file),
         section=section,
@@ -163,7 +155,6 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
             key: value for key in ("units", "plane", "tolerance") if (value := getattr(description, key))
         },
         mesh=mesh,
-        materials={name: part.model_dump() for name, part in materials.items()},
     )
 
 

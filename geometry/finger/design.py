@@ -63,8 +63,8 @@ class Design(Parameters):
         return self.model_dump()
 
     def lines(self) -> str:
-        """Every parameter that differs from its default, as the lines of a design file."""
-        own = self.model_dump(exclude_defaults=True, exclude_none=True) | {"name": self.name}
+        """Every parameter that differs from its default, as the lines of a design file, whose name it has."""
+        own = self.model_dump(exclude_defaults=True, exclude_none=True, exclude={"name"})
         return "".join(f"{name} = {json.dumps(value)}\n" for name, value in own.items())
 
     def facts(self) -> list[tuple[str, str, str]]:

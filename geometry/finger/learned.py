@@ -15,8 +15,8 @@ from pinnray.runtime.text_files import read_toml
 
 TABLE = "learned"
 """Name of the table in the file of a design, or of a drawing's description."""
-ROUNDING = 1e-9
-"""Least eigenvalue of a correlation: that of unknowns which are known together is zero but for rounding."""
+DIGITS, ROUNDING = 9, 1e-8
+"""Digits of the numbers in a file, and the least eigenvalue of a correlation that rounding leaves."""
 
 
 class Learned(CheckedModel):
@@ -84,7 +84,10 @@ def read_learned(path: Path | None) -> Learned | None:
 
 def write_learned(path: Path, learned: Learned, lines: str) -> None:
     """Write what was learned of a finger after the lines of its design or description, atomically."""
-    own = {name: json.dumps(value) for name, value in learned.model_dump(mode="json").items()}
-    table = "\n".join(f"{name} = {value}" for name, value in own.items())
+    own = {name: np.array(value) for name, value in learned.model_dump().items()}
+    rounded = {
+        name: np.round(value, DIGITS) if value.dtype.kind == "f" else value for name, value in own.items()
+    }
+    table = "\n".join(f"{name} = {json.dumps(value.tolist())}" for name, value in rounded.items())
     with atomic_path(path) as partial:
         partial.write_text(f"{lines}\n[{TABLE}]\n{table}\n", encoding="utf-8")

@@ -14,7 +14,6 @@ import numpy as np
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
-from pinnray.runtime.errors import UserError
 
 
 def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = None) -> TriangleMesh:
@@ -27,8 +26,6 @@ def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = Non
         marked: Mask of shape (t,).
         section: The section onto whose arcs new boundary nodes are moved; None leaves them on the chord.
     """
-    if mesh.moduli is not None:
-        raise UserError("a mesh whose parts have materials of their own is not refined; give a finer one")
     count, lengths = len(mesh.points), np.linalg.norm(np.diff(mesh.points[mesh.edges], axis=1)[:, 0], axis=1)
     rank = np.empty(len(lengths), dtype=np.int64)
     rank[np.lexsort((np.arange(len(lengths)), lengths))] = np.arange(len(lengths))

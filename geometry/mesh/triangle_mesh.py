@@ -36,8 +36,6 @@ class TriangleMesh:
         marker_nodes: The node of every marker, shape (m,), ordered from base to tip.
         contact_node: The node in the middle of `contact`, where a point load acts.
         depth: Depth of the extruded body, out of the plane, mm; plane solvers need none.
-        moduli: Young's modulus, MPa, and Poisson's ratio of every triangle of a body of several materials,
-            shape (t, 2); zeros where the problem's material holds. None for a body of one material.
 
     Raises:
         ShapeError: If an array has the wrong shape.
@@ -50,7 +48,6 @@ class TriangleMesh:
     marker_nodes: IntArray
     contact_node: int
     depth: float = 20.0
-    moduli: FloatArray | None = None
 
     def __repr__(self) -> str:
         nodes, triangles, markers = len(self.points), len(self.triangles), len(self.marker_nodes)
@@ -70,9 +67,6 @@ class TriangleMesh:
             "boundaries": MappingProxyType(edges),
             "contact_node": int(self.contact_node),
             "depth": float(self.depth),
-            "moduli": None
-            if self.moduli is None
-            else frozen_array(self.moduli, dtype=np.float64, shape=(len(self.triangles), 2), name="moduli"),
         }.items():
             object.__setattr__(self, name, values)
         if not 0 < self.depth < np.inf:
@@ -150,14 +144,18 @@ class TriangleMesh:
         """Locates points of this mesh on another mesh of one body.
 
         Both meshes replace arcs by chords, so that a point may lie beyond the other's boundary: up to a tenth
-        of this mesh's longest boundary edge it counts to the nearest triangle.
+        of the longest boundary edge of either it counts to the nearest triangle.
 
         Raises:
             OutsideBodyError: If a point lies farther outside.
         """
+        return other._locator.locate(points, 0.1 * max(self._longest_edge, other._longest_edge))
+
+    @cached_property
+    def _longest_edge(self) -> float:
+        """Of the boundary, mm."""
         ends = self.points[np.concatenate(list(self.boundaries.values()))]
-        longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
-        return other._locator.locate(points, 0.1 * longest)
+        return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
 
     @cached_property
     def _locator(self) -> Locator:
@@ -188,7 +186,7 @@ class TriangleMesh:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the arrays only, not the derived values."""
-        numbers = self.marker_nodes, self.contact_node, self.depth, self.moduli
+        numbers = self.marker_nodes, self.contact_node, self.depth
         return TriangleMesh, (self.points, self.triangles, dict(self.boundaries), *numbers)
 
     def plot(self, width: float | None = None) -> "Figure":
@@ -247,14 +245,12 @@ class TriangleMesh:
 
     def arrays(self) -> dict[str, FloatArray | IntArray]:
         """Every array by name, for a file; `from_arrays` makes the mesh of them."""
-        moduli = {} if self.moduli is None else {"moduli": self.moduli}
         return {
             "points": self.points,
             "triangles": self.triangles,
             "marker_nodes": self.marker_nodes,
             "contact_node": np.asarray(self.contact_node),
             "depth": np.asarray(self.depth),
-            **moduli,
         } | {BOUNDARY_PREFIX + name: nodes for name, nodes in sorted(self.boundaries.items())}
 
 

@@ -10,7 +10,7 @@ class JobDefaults(NamedTuple):
 
     mesh: MeshSettings | None = None
     load: Literal["mean", "point", "patch"] = "mean"
-    solvers: str = "fem,fem-nonlinear,pinn-std,pinn-asm,fem-asm,fem-id,pinn-id,gp,statfem"
+    solvers: str = "fem,fem-nonlinear,pinn-std,pinn-asm,fem-asm,fem-id,pinn-id,gp"
 
 
 JOBS = {"paper": JobDefaults(MeshSettings(size=0.0823, coarsening=1), "point", "fem,pinn-std,pinn-asm")}

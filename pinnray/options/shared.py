@@ -195,7 +195,9 @@ class MaterialOptions(Material):
     @property
     def _usual(self) -> dict[str, Any]:
         """The constants of the material that goes by a name."""
-        return {name: getattr(self.made(), name) for name in ("young", "poisson", "loss") if self.material}
+        from pinnray.solvers.materials.presets import USUAL
+
+        return {name: getattr(self.made(), name) for name in USUAL if self.material}
 
 
 @Parameter(name="*", group=PHYSICS, negative="")

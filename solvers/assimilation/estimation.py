@@ -202,9 +202,8 @@ class Estimate:
 
     @property
     def resolution(self) -> FloatArray:
-        """Resolution of each parameter, shape (p,): 0 where only the prior determines it, up to 1."""
-        before = (self.prior.spread**2).sum(axis=1)
-        return np.asarray(1 - np.diagonal(self.covariance) / before)
+        """Resolution of each parameter, shape (p,): 0 where nothing was ever observed of it, up to 1."""
+        return np.asarray(1 - np.diagonal(self.covariance))
 
     def residuals_without(self, rows: IntArray) -> FloatArray:
         """Residuals over φ σ of observations left out together, shape (k,): (I - H)^-1 r to first order.

@@ -136,7 +136,12 @@ def leave_one_out_displacements(problem: Problem, residuals: FloatArray) -> Floa
 
 def radius_within(mesh: TriangleMesh, points: FloatArray, radius: float) -> float:
     """The radius, mm, or the least distance of points (m, 2), mm, from the boundary if that is less."""
+    return min(radius, float(boundary_distances(mesh, points).min()))
+
+
+def boundary_distances(mesh: TriangleMesh, points: FloatArray) -> FloatArray:
+    """Distances of points (m, 2) from the boundary, shape (m,), mm."""
     start, end = mesh.points[mesh.boundary_edges].transpose(1, 0, 2)
     along, offset = end - start, points[:, None] - start
     share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
-    return min(radius, float(np.linalg.norm(offset - share[..., None] * along, axis=2).min()))
+    return np.asarray(np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1))

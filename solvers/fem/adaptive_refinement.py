@@ -89,8 +89,6 @@ def adapted(
     solution. A `UserError` refuses what `check_adaptable` does.
     """
     check_adaptable(tolerance, problem.load)
-    if problem.mesh.moduli is not None:
-        raise UserError("a mesh whose parts have materials of their own is not adapted; give a finer one")
     rounds: list[RefinementRound] = []
     while True:
         found, shares = _solve(problem, degree, tolerance)

@@ -67,12 +67,6 @@ def _vector_space(mesh: Any, degree: int) -> Any:
     return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
-def _scalar_space(mesh: Any) -> Any:
-    """Functions that are constant in every cell."""
-    make = getattr(dolfinx.fem, "functionspace", None) or dolfinx.fem.FunctionSpace  # until 0.6
-    return make(mesh, ("DG", 0))
-
-
 def _nodes_of_dofs(space: NodalSpace, domain: Any, dolfinx_space: Any) -> IntArray:
     """The node of the `NodalSpace` at every blocked degree of freedom.
 
@@ -153,22 +147,9 @@ class DolfinxSpace(Generic[SpaceT]):
         self.domain.geometry.x[:, : self.dimension] = points[where]
 
     def moduli(self, lame: Lame) -> Lame:
-        """Lamé's constants λ and μ as numbers that can change without compiling a form again.
-
-        Arrays of one at every triangle become functions that are constant in each.
-        """
-        if np.ndim(lame.λ):
-            return Lame(self._in_cells(lame.λ), self._in_cells(lame.μ), lame.λ_out)
+        """Lamé's constants λ and μ as numbers that can change without compiling a form again."""
         λ, μ = (dolfinx.fem.Constant(self.domain, PETSc.ScalarType(value)) for value in lame[:2])
         return Lame(λ, μ, lame.λ_out)
-
-    def _in_cells(self, values: Any) -> Any:
-        """A function that is constant in every triangle, from values of shape (t,)."""
-        space = _compiled(lambda: _scalar_space(self.domain))
-        function = dolfinx.fem.Function(space)
-        of_cell = _rows(space.dofmap.list, 1)[:, 0]
-        function.x.array[of_cell] = values[np.asarray(self.domain.topology.original_cell_index)]
-        return function
 
     def form(self, expression: Any) -> Any:
         """Compile a UFL form."""

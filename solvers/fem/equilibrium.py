@@ -61,8 +61,7 @@ class DiscreteEquilibrium:
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         material, gradient = problem.material, ufl.grad(self.elements.function)
-        cells = None if problem.mesh.moduli is None else np.arange(len(problem.mesh.triangles))
-        lame = problem.lame(cells, solid=self.elements.dimension == 3)
+        lame = material.solid_lame if self.elements.dimension == 3 else material.lame
         moduli = self.elements.moduli(lame)
         density = energy_density_of(material.law, gradient, moduli, ufl.ln)
         measure = ufl.dx if self.linear else ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
@@ -233,17 +232,6 @@ class DiscreteEquilibrium:
             return self._pressed_at_one_node(self.contact, fraction)
         nodal, forces = self.minimiser(self.prescribed, self.constraints.targets)
         return LoadState(fraction, fraction * nodal, np.zeros(0), fraction * forces)
-
-    @property
-    def stiffness_to_cylinder(self) -> float:
-        """Force of a cylinder over its way into the finger as it begins to press, N/mm per mm.
-
-        The tangent at rest must be factorised. Infinite for a cylinder that moves away.
-        """
-        assert self.contact is not None
-        pressed = self.linear_guess(1e-3)
-        way = -float(self.contact.gaps(replace(self.rest, fraction=1e-3))[0].min())
-        return float(pressed.contact.sum()) / way if way > 0 else np.inf
 
     def _pressed_at_one_node(self, contact: CylinderContact, fraction: float) -> LoadState:
         rest = replace(self.rest, fraction=fraction)

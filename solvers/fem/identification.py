@@ -27,11 +27,10 @@ from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.thick_body import ThickBody
 from pinnray.solvers.identification.body import Body, Linearised
-from pinnray.solvers.identification.contacts import Contacts
 from pinnray.solvers.identification.cylinder_model import CylinderModel
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
-from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch
+from pinnray.solvers.identification.nested_search import ROUGHLY, Contacts, NestedSearch
 from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.identification.settings import IdentifyingSolver
 from pinnray.solvers.identification.unknowns import Unknowns

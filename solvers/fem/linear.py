@@ -26,7 +26,6 @@ class FemSolver(ElementSettings):
     family = "finite elements"
     laws = ("linear",)
     loads = ("mean", "point", "patch")
-    parts = True
     cost = Cost(per_triangle=55)
 
     def prepare(self, problem: Problem) -> "FactorisedProblem":
@@ -68,8 +67,7 @@ class FactorisedProblem:
         residual = equilibrium.internal_force(nodal)
         solved = time.perf_counter()
         error = None
-        smooth = load.kind != "point" and problem.mesh.moduli is None  # and the gradient does not jump
-        if self._solver.estimate and smooth and load.values.any():
+        if self._solver.estimate and load.kind != "point" and load.values.any():
             error = self._estimator.estimate(nodal, equilibrium.response)
         sentence = [
             "solved directly",

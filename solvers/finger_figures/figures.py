@@ -14,10 +14,10 @@ from pinnray.solvers.finger_figures.measures import (
     contact_arc,
     force_curve,
     front_ends,
-    gradients,
     largest_away_from_corners,
     largest_strain,
     narrowest_gap,
+    nodal_gradient,
     thinnest_wall,
     wrap_angle,
 )
@@ -214,8 +214,9 @@ def figures_of(solution: Solution, rest: Mapping[str, float] | None = None) -> F
         for name, share in FRACTIONS.items()
     }
     tip_u, tip_v = solution.displacement(front_ends(problem)[1:])[0]
-    at = gradients(solution)
-    (stress, strain), (peak, radius) = largest_away_from_corners(solution, at), largest_strain(solution, at)
+    gradient = nodal_gradient(solution)
+    stress, strain = largest_away_from_corners(solution, gradient)
+    peak, radius = largest_strain(solution, gradient)
     angle, touching = contact_arc(solution)
     return FingerFigures(
         force=force,

@@ -10,7 +10,7 @@ from pinnray.geometry.mesh.boundary import mean_thickness, re_entrant_points, si
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.section.section import Section
 from pinnray.geometry.section.thickness import cavity_widths, wall_thickness
-from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.elasticity import strain_of
 from pinnray.solvers.problem import Problem, contact_ends, contact_nodes, front_points
 from pinnray.solvers.solution import SmoothField, SolidField, Solution, State, stroke_axes
@@ -21,10 +21,6 @@ RAY_SPACING = 0.5
 
 AT_CORNER = 0.25
 """Distance of a node from a corner over the mean wall thickness up to which it is said to be at it."""
-
-
-Gradients = tuple[FloatArray, FloatArray, IntArray | None]
-"""Places, displacement gradients there and, in a body of several materials, triangles; see `gradients`."""
 
 
 class Extreme(NamedTuple):
@@ -64,43 +60,39 @@ def wrap_angle(solution: Solution) -> float:
     return turn(after) - turn(before)
 
 
-def largest_away_from_corners(solution: Solution, at: Gradients) -> tuple[Extreme, Extreme]:
+def largest_away_from_corners(solution: Solution, gradient: FloatArray) -> tuple[Extreme, Extreme]:
     """The largest von Mises stress, MPa, and principal strain at nodes away from singular points.
 
     At sharp corners both grow without bound as elements shrink. Nodes nearer than the body's mean wall
     thickness to a re-entrant corner, an end of the base or the contact do not count. The displacement
-    gradient at a node is the mean over its triangles, weighted by their areas, so that the numbers depend
-    little on where the mesher puts its nodes. In a body of several materials, between which it jumps, it is
-    that in the middles of the triangles.
+    gradient is that of `nodal_gradient`.
     """
     problem = solution.problem
     mesh = problem.mesh
     singular = np.concatenate([singular_points(mesh), mesh.points[contact_nodes(problem)]])
-    places, gradient, cells = at
-    far = cKDTree(singular).query(places)[0] > mean_thickness(mesh)
+    far = cKDTree(singular).query(mesh.points)[0] > mean_thickness(mesh)
     if not far.any():
         nowhere = Extreme(np.nan, np.full(2, np.nan))
         return nowhere, nowhere
-    state = State.from_gradient(gradient[far], problem, None if cells is None else cells[far])
+    state = State.from_gradient(gradient[far], problem)
     stress, strain = (
-        Extreme(float(values.max()), places[far][values.argmax()])
+        Extreme(float(values.max()), mesh.points[far][values.argmax()])
         for values in (state.von_mises, _principal(state.strain))
     )
     return stress, strain
 
 
-def largest_strain(solution: Solution, at: Gradients) -> tuple[Extreme, float]:
+def largest_strain(solution: Solution, gradient: FloatArray) -> tuple[Extreme, float]:
     """The largest principal strain of all nodes, and the radius of the corner there, mm.
 
     The radius is zero at a sharp corner, an end of the clamp and a contact that is no cylinder's, where the
-    strain has no limit as elements shrink, and NaN away from corners. Gradients at nodes are those of
-    `largest_away_from_corners`.
+    strain has no limit as elements shrink, and NaN away from corners. The displacement gradient is that of
+    `nodal_gradient`.
     """
     problem, mesh = solution.problem, solution.problem.mesh
-    places, gradient, _ = at
     strain: FloatArray = np.moveaxis(np.array(strain_of(problem.material.law, gradient)), -1, 0)
     principal = _principal(strain[:, :2, :2])
-    peak = Extreme(float(principal.max()), places[principal.argmax()])
+    peak = Extreme(float(principal.max()), mesh.points[principal.argmax()])
     sharp, arcs, radii = re_entrant_points(mesh)
     edges = contact_nodes(problem)[: 0 if problem.load.kind == "cylinder" else None]
     corners = np.concatenate([sharp, mesh.points[edges], arcs])
@@ -155,25 +147,17 @@ def turn(points: FloatArray) -> float:
     return float(np.degrees(np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)))
 
 
-def gradients(solution: Solution) -> Gradients:
-    """Nodes, shape (n, 2), mm, and displacement gradients there.
-
-    In a body of several materials the middles of triangles, and these, shape (n,).
-    """
-    mesh = solution.problem.mesh
-    if mesh.moduli is None:
-        return mesh.points, _nodal_gradient(solution), None
-    middles = mesh.at_centroids()
-    return middles.points, solution.field.gradient(middles), middles.cells
-
-
 def _principal(strain: FloatArray) -> FloatArray:
     """Largest principal values of strains in the plane, (n, 2, 2): shape (n,)."""
     return np.asarray(np.linalg.eigvalsh(strain)[:, -1])
 
 
-def _nodal_gradient(solution: Solution) -> FloatArray:
-    """The displacement gradient at the mesh's nodes, mean over their triangles, (n, 2, 2) or (n, 3, 3)."""
+def nodal_gradient(solution: Solution) -> FloatArray:
+    """The displacement gradient at the mesh's nodes, shape (n, 2, 2) or (n, 3, 3).
+
+    It is the mean over the node's triangles, weighted by their areas, so that numbers depend little on where
+    the mesher puts its nodes.
+    """
     mesh: TriangleMesh = solution.problem.mesh
     field = solution.field
     if isinstance(field, SmoothField):

@@ -24,7 +24,6 @@ from pinnray.solvers.identification.unknowns import (
     CONTACT,
     CONTACT_ODDS,
     CYLINDER,
-    FINGER,
     INDENTATION,
     LAW_ODDS,
     SHARE,
@@ -34,20 +33,17 @@ from pinnray.solvers.identification.unknowns import (
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
 SOURCES = {
-    "third dimension": "the third dimension, which plane strain leaves out: take fem-id with a finger that "
-    "has a depth, or weigh one press, and multiply the forces of others by the ratio of weighed to found",
-    "markers": "the errors of the markers: film nearer or sharper, or use more markers",
+    "third dimension": "the third dimension",
+    "markers": "the errors of the markers",
     "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
-    "contact": "place, width and pressure of the contact: put markers nearer to it",
-    "corners": "the roundings of the cavities' corners, which the drawing leaves out: draw them "
-    "(fillet_radius)",
-    "modulus": "Young's modulus: weigh one press, or test a printed strip",
-    "finger": "walls, clamp and Poisson's ratio: measure the walls, and leave those that are as drawn out of "
-    "the parameters",
-    "frames": "the frames of the pictures: show fiducials, and fix the camera",
-    "law": "the choice between the laws: give the law, or press farther",
+    "contact": "place, width and pressure of the contact",
+    "corners": "the roundings of the cavities' corners, which the drawing leaves out",
+    "modulus": "Young's modulus",
+    "finger": "walls, clamp and Poisson's ratio",
+    "frames": "the frames of the pictures",
+    "law": "the choice between the laws",
 }
-"""What the variance of a force comes from, and what would narrow its interval."""
+"""What the variance of a force comes from, in words."""
 
 
 SIDE_ODDS = 150.0
@@ -175,25 +171,9 @@ class Fit(NamedTuple):
     @property
     def learned(self) -> Learned | None:
         """What the markers, and those of earlier pictures, say of the finger; None if it has no unknowns."""
-        found, problem = self.estimate, self.model.unknowns.problem
-        before, seen = problem.learned, problem.observations
-        rows = [row for row, name in enumerate(self.model.unknowns.names) if name in FINGER]
-        if not rows:
-            return before
-        own = [found.parameters[row] for row in rows]
-        covariance = found.covariance[np.ix_(rows, rows)] * (found.quantile / NORMAL) ** 2
-        deviation = np.sqrt(np.diagonal(covariance))
-        middle, scale = np.array([(each.middle, each.scale) for each in own]).T
-        return Learned(
-            pictures=1 + (before.pictures if before else 0),
-            weighed=int(bool(seen and seen.weighed)) + (before.weighed if before else 0),
-            unknowns=tuple(each.name for each in own),
-            mean=(middle + scale * found.z[rows]).tolist(),
-            deviation=(scale * deviation).tolist(),
-            drawn_mean=middle.tolist(),
-            drawn_deviation=scale.tolist(),
-            correlation=(covariance / np.outer(deviation, deviation)).tolist(),
-        )
+        found = self.estimate
+        wider = (found.quantile / NORMAL) ** 2
+        return self.model.unknowns.learned(found.parameters, found.z, wider * found.covariance)
 
 
 def component_of(

@@ -1,4 +1,4 @@
-"""The unknowns sought by a coarse discretisation of the finger and carried to others."""
+"""The unknowns sought by a coarse discretisation and carried to others, under each contact."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,7 +9,7 @@ from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.result import CONTRADICTED, Identified
 from pinnray.solvers.identification.search import Identifier
-from pinnray.solvers.solver import Progress, silent
+from pinnray.solvers.solver import NoSolutionError, Progress, silent
 
 IMPROBABLE = 8.0
 """Logarithm of the ratio of probabilities from which on a fit is not carried to a finer discretisation: that
@@ -71,3 +71,32 @@ class NestedSearch:
     def updated(self, found: Identified, observations: Observations) -> Identified:
         """The unknowns for observations near those of fits, to first order; see `Identifier`."""
         return self._coarse.updated(found, observations)
+
+
+class Contacts:
+    """Finds the unknowns under each contact that a load may make.
+
+    Args:
+        searches: One for each contact.
+    """
+
+    def __init__(self, searches: Sequence[NestedSearch]) -> None:
+        self._searches = searches
+
+    def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
+        """The unknowns under every contact and law.
+
+        Raises:
+            UserError: If no contact has a solution.
+        """
+        found: list[Identified] = []
+        for search in self._searches:
+            try:
+                least = max((each.best.log_posterior for each in found), default=-np.inf)
+                found.append(search.identify(observations, progress, least))
+            except NoSolutionError as error:
+                reason = error
+        if not found:
+            raise reason
+        best = max(found, key=lambda each: each.best.log_posterior)
+        return Identified.ranked([fit for each in found for fit in each.fits], best.lost)

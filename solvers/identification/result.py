@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.field import STEP, IdentifiedField, IdentifiedSideFace, Member, Snapshot
 from pinnray.solvers.identification.fit import NORMAL, SOURCES, Fit
+from pinnray.solvers.identification.narrowing import narrowing_phrase
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import (
     Estimated,
@@ -57,6 +59,7 @@ class Identified:
         """The fit of the most probable law."""
         return self.fits[0]
 
+    @cached_property
     def force(self) -> IdentifiedForce:
         """The force and its place: the mean over the laws, with an interval that holds their scatter."""
         places = [place for fit in self.fits if (place := fit.place)]
@@ -68,12 +71,13 @@ class Identified:
         whole = sum(parts.values()) or 1.0
         shares = {name: parts[name] / whole for name in sorted(parts, key=parts.__getitem__, reverse=True)}
         first, share = next(iter(shares.items()))
+        narrower = narrowing_phrase(self.best, stroke, parts["law"])
         return IdentifiedForce(
             force,
             self._mean([fit.component(across) for fit in self.fits]),
             self._mean(places) if places else None,
             shares,
-            f"{100 * share:.0f} % of the variance of the force comes from {SOURCES[first]}.",
+            f"{100 * share:.0f} % of the variance of the force comes from {SOURCES[first]}. {narrower}",
             self.best.contact,
             self.best.learned,
         )
@@ -132,7 +136,7 @@ class Identified:
             uncertainty=Uncertainty(
                 field.standard_deviation, field.von_mises_deviation, field.shown_deviation if loose else None
             ),
-            identified=self.force(),
+            identified=self.force,
             pictures=hypothesis.pictures if loose else None,
         )
 
@@ -206,7 +210,7 @@ class Identified:
             numbers |= {name: value} | {
                 f"{name}_{column}": each for column, each in zip(columns, rest, strict=True)
             }
-        force, low, high = self.force().force
+        force, low, high = self.force.force
         numbers |= {"law": self.best.law, "force": force, "force_low": low, "force_high": high}
         for name, probability in self._laws().items():
             numbers[f"probability {name}"] = probability
@@ -231,7 +235,7 @@ class Identified:
                 "the equilibrium was not found to the last digit, or not by the finest discretisation: the "
                 "field is that of the search; take another mesh or fewer parameters"
             )
-        force, low, high = self.force().force
+        force, low, high = self.force.force
         parts.append(f"force {force:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
         parts.append(
             ", ".join(

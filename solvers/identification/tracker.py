@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from pinnray.geometry.finger.learned import Learned
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Prior, inflation_of, quantile_of, values_of
@@ -113,6 +114,12 @@ class ForceTracker:
         started, self._evaluations = time.perf_counter(), 0
         reading = self._updated(displacements, deviations, visible)
         return replace(reading, evaluations=self._evaluations, seconds=time.perf_counter() - started)
+
+    @property
+    def learned(self) -> Learned | None:
+        """What the frames with the largest motion say of the finger."""
+        covariance = np.linalg.inv(self._known.precision)
+        return self._unknowns.learned(self._parameters, self._known.mean, covariance)
 
     def _updated(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
         if (seen := int(visible.sum())) < FEWEST:

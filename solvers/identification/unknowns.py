@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.wall_motion import WallMotion
 from pinnray.geometry.picture_frame import PARTS, Pictures
 from pinnray.runtime.arrays import FloatArray
@@ -246,6 +247,34 @@ class Unknowns:
         precision[np.ix_(rows, rows)] += gained * np.outer(scale, scale)
         pulled[rows] = scale * (pull - gained @ middle)
         return Prior(np.linalg.solve(precision, pulled), precision)
+
+    def learned(
+        self, parameters: Sequence[Parameter], z: FloatArray, covariance: FloatArray
+    ) -> Learned | None:
+        """What is known of the finger after another picture; None if nothing of it is unknown.
+
+        Args:
+            parameters: The unknowns.
+            z: Their standardised values, shape (p,).
+            covariance: Of those, shape (p, p).
+        """
+        before, seen = self.problem.learned, self.problem.observations
+        rows = [row for row, name in enumerate(self.names) if name in FINGER]
+        if not rows:
+            return before
+        own = covariance[np.ix_(rows, rows)]
+        deviation = np.sqrt(np.diagonal(own))
+        middle, scale = np.array([(parameters[row].middle, parameters[row].scale) for row in rows]).T
+        return Learned(
+            pictures=1 + (before.pictures if before else 0),
+            weighed=int(bool(seen and seen.weighed)) + (before.weighed if before else 0),
+            unknowns=tuple(self.names[row] for row in rows),
+            mean=(middle + scale * z[rows]).tolist(),
+            deviation=(scale * deviation).tolist(),
+            drawn_mean=middle.tolist(),
+            drawn_deviation=scale.tolist(),
+            correlation=(own / np.outer(deviation, deviation)).tolist(),
+        )
 
     def hypothesis(self, values: FloatArray, normal: float = 0.0) -> Hypothesis:
         """The finger and the contact of values, shape (p,), and of a normal force that is none of them."""

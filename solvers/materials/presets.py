@@ -37,6 +37,15 @@ lower by a share of itself has a loss of 9 % then, one that is lower by a consta
 such number was found.
 """
 
+TPU_SPREAD, SYLGARD_SPREAD = 0.2, 0.26
+"""Standard deviations of Young's moduli over them.
+
+Printed TPU has 100 to 146 MPa by the direction of its lines alone (Eng. Proc. 113 (2025) 19), and sources of one
+filament differ by a factor of two: of logarithms that are all as likely within it, the deviation is ln 2 / 12^½.
+That of Sylgard 184 is of the range that its source gives. Of the other silicones no spread was found: their
+moduli count as exact.
+"""
+
 SMOOTH_ON = "Smooth-On, technical bulletin, 100 % modulus (ASTM D412)"
 _SHEETS = (
     ("tpu-85a", 12.0, 0.45, 1.19, 6.6, "NinjaTek, NinjaFlex 85A, technical specifications (ASTM D638)"),
@@ -54,11 +63,17 @@ _SHEETS = (
 )
 """Name, Young's modulus, MPa, Poisson's ratio, density, g/cm^3, nominal strain at break, and source."""
 
+SPREADS = {"tpu-85a": TPU_SPREAD, "tpu-95a": TPU_SPREAD, "sylgard-184": SYLGARD_SPREAD}
+LOSSES = {"tpu-85a": TPU_LOSS, "tpu-95a": TPU_LOSS}
+
 MATERIALS: Mapping[str, MaterialPreset] = {
     name: MaterialPreset(
-        Material(young=young, poisson=poisson, loss=TPU_LOSS if name.startswith("tpu") else 0.0).made_of(
-            Substance(name, density, strain)
-        ),
+        Material(
+            young=young,
+            young_deviation=round(young * SPREADS.get(name, 0.0), 4),
+            poisson=poisson,
+            loss=LOSSES.get(name, 0.0),
+        ).made_of(Substance(name, density, strain)),
         density,
         strain,
         source,
@@ -66,6 +81,10 @@ MATERIALS: Mapping[str, MaterialPreset] = {
     for name, young, poisson, density, strain, source in _SHEETS
 }
 """The presets by name; Poisson's ratios are assumed, 0.45 of filaments and 0.49 of silicones."""
+
+
+USUAL = ("young", "young_deviation", "poisson", "loss")
+"""Constants that a preset has."""
 
 
 def preset(name: str) -> MaterialPreset:
@@ -87,5 +106,7 @@ def of_preset(name: str, **given: Any) -> Material:
         UserError: If there is no such preset, or a constant is not admissible.
     """
     known = preset(name).material
-    usual = {"young": known.young, "poisson": known.poisson, "loss": known.loss}
+    usual = {name: getattr(known, name) for name in USUAL}
+    if "young" in given:  # of which the deviation is not the preset's
+        del usual["young_deviation"]
     return Material(**usual | given).made_of(known.substance)

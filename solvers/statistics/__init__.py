@@ -1,1 +1,1 @@
-"""Gaussian processes: `gp` and `statfem`; imports `solvers.assimilation` and `solvers.fem`."""
+"""Gaussian processes: `gp`; imports `solvers.assimilation`."""

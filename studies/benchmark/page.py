@@ -4,10 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+
 from pinnray.runtime.atomic import write_text
 from pinnray.runtime.tables import NONE, TextTable, number, percent
 from pinnray.studies.benchmark.benchmark import ENTRIES, Benchmark
-from pinnray.studies.benchmark.entry import Entry, EntryRow
+from pinnray.studies.benchmark.entry import Entry
 from pinnray.studies.benchmark.picture import draw_front
 from pinnray.studies.benchmark.problems import BenchmarkProblem
 from pinnray.studies.benchmark.references import Reference
@@ -27,8 +30,11 @@ COLUMNS: Mapping[str, tuple[str, Callable[[float], str]]] = {
 MEANINGS = (
     "Displacement and von Mises stress: relative L2 errors over the body; away: a wall's thickness away "
     "from corners and contact. Force and energy: relative, with sign. Time: processor time over that of fem "
-    "for the linear problem of the same finger, in the same run. Memory: of the process."
+    "for the linear problem of the same finger, in the same run. Memory: of the process. ≈: from the best of "
+    "the column by less than the reference's error, which does not tell them apart."
 )
+BOUND, ALIKE = "reference ≤", "≈"
+"""The row of the bounds of the reference's error, and the mark of what is no farther from the best."""
 LAWS = {True: "linear", False: "finite strain"}
 
 
@@ -77,13 +83,19 @@ def broken_table(found: Benchmark) -> TextTable:
 
 
 def summary_table(found: Benchmark) -> TextTable:
-    """Medians of each entry over the problems of a law that it solved."""
-    rows, numbers = [], [each.label for each in found.entries]
-    for (entry, linear), each in found.medians().iterrows():
-        count = sum(problem.linear == linear for problem in found.problems.problems)
-        figures = [shown(float(each[figure])) for figure, shown in COLUMNS.values()]
-        said = (str(numbers.index(entry) + 1), entry, LAWS[linear], f"{each['solved']:.0f}/{count}")
-        rows.append((*said, *figures, f"{each['broken']:.0f}"))
+    """Medians of each entry over the problems of a law that it solved, below those of the references."""
+    rows, numbers, medians = [], [each.label for each in found.entries], found.medians()
+    laws = medians.index.get_level_values("linear")
+    for linear, law in LAWS.items():
+        problems = [each for each in found.problems.problems if each.linear == linear]
+        bounds = pd.DataFrame([Reference.load(each).bounds for each in problems]).median().to_dict()
+        own = medians[laws == linear].reset_index()
+        texts = figure_texts(own.to_dict("records"), bounds)
+        rows.append(("", BOUND, law, "", *texts[0], ""))
+        for (_, each), figures in zip(own.iterrows(), texts[1:], strict=True):
+            number, entry = str(numbers.index(each["entry"]) + 1), each["entry"]
+            solved = f"{each['solved']:.0f}/{len(problems)}"
+            rows.append((number, entry, law, solved, *figures, f"{each['broken']:.0f}"))
     headings = ("no.", "entry", "law", "solved", *COLUMNS, "broken\nclaims")
     title = "Medians over the problems of each law that an entry solved"
     return TextTable(title, headings, rows, f"{MEANINGS} {_notes(found.entries)}", left=("entry", "law"))
@@ -95,27 +107,37 @@ def problem_tables(found: Benchmark) -> list[TextTable]:
 
 
 def _problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextTable:
-    bounds = Reference.load(problem).bounds
-    known = [(figure, shown) for figure, shown in COLUMNS.values()]
-    limits = [shown(bounds[figure]).replace("+", "") if figure in bounds else NONE for figure, shown in known]
-    rows, reasons = [("reference ≤", *limits, "")], []
-    for entry in entries:
-        row = next(each for each in entry.rows if each.problem == problem.name)
-        if row.solved:
-            rows.append((entry.label, *(_shown(row, *each) for each in known), row.state))
-        elif row.state != "refused":
-            rows.append((entry.label, *[NONE] * len(known), row.state))
-            reasons.append(f"{entry.label}: {row.message}")
+    rows = [(each.label, next(row for row in each.rows if row.problem == problem.name)) for each in entries]
+    shown = [(label, row) for label, row in rows if row.state != "refused"]
+    texts = figure_texts([vars(row) for _, row in shown], Reference.load(problem).bounds)
+    cells = [(label, *figures, row.state) for (label, row), figures in zip(shown, texts[1:], strict=True)]
+    reasons = [f"{label}: {row.message}" for label, row in shown if not row.solved]
     headings = ("entry", *COLUMNS, "ended")
     return TextTable(
-        f"{problem.name}: {problem.words}", headings, rows, " ".join(reasons), left=("entry", "ended")
+        f"{problem.name}: {problem.words}",
+        headings,
+        [(BOUND, *texts[0], ""), *cells],
+        " ".join(reasons),
+        left=("entry", "ended"),
     )
 
 
-def _shown(row: EntryRow, figure: str, shown: Callable[[float], str]) -> str:
-    """A figure of a row; a dash where there is none."""
-    value = getattr(row, figure)
-    return NONE if value is None else shown(value)
+def figure_texts(rows: Sequence[Mapping[str, Any]], bounds: Mapping[str, float]) -> list[list[str]]:
+    """The bounds and the figures of rows as texts; a dash where there is none.
+
+    Those that are no farther from the best one than the bound get its mark.
+    """
+    columns = []
+    for figure, shown in COLUMNS.values():
+        values = [row[figure] for row in rows]
+        sizes = [np.inf if value is None else abs(value) for value in values]
+        near = np.array(sizes) <= min(sizes, default=0.0) + bounds.get(figure, -1.0)
+        near &= np.isfinite(sizes)
+        texts = [NONE if value is None else shown(value) for value in values]
+        marked = [f"{text} {ALIKE}" if alike else text for text, alike in zip(texts, near, strict=True)]
+        bound = shown(bounds[figure]).replace("+", "") if figure in bounds else NONE
+        columns.append([bound, *(marked if near.sum() > 1 else texts)])
+    return [list(row) for row in zip(*columns, strict=True)]
 
 
 def _notes(entries: Sequence[Entry]) -> str:

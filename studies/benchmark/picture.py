@@ -1,10 +1,15 @@
 """The picture of the benchmark: accuracy over cost, with the front."""
 
+from itertools import cycle
+
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from pinnray.comparison.figures.layout import HALO, LEGEND_LINE, write_heading
-from pinnray.comparison.figures.solver_colours import solver_look
+from pinnray.comparison.figures.solver_colours import LOOKS, Look
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.figure import MUTED, WIDTH, Figure, figure
 from pinnray.runtime.tables import significant
 from pinnray.studies.benchmark.benchmark import Benchmark
@@ -13,6 +18,10 @@ from pinnray.studies.optimum.front import unbeaten
 SHOWN = {"displacement": "displacement error, %", "von_mises_away": "stress error away\nfrom corners, %"}
 COLUMNS = 3
 """Of the legend."""
+MARKS = "s*dH8PX<"
+"""Of solvers without a colour of their own."""
+BESIDE = 12.0
+"""Distance of points below which they have one label, pt."""
 
 
 def draw_front(found: Benchmark, page: float = WIDTH) -> Figure:
@@ -21,7 +30,8 @@ def draw_front(found: Benchmark, page: float = WIDTH) -> Figure:
     foot = 0.6 + LEGEND_LINE * -(-len(labels) // COLUMNS)
     height = 0.75 + 2.1 * len(SHOWN) + foot
     room = {"left": 0.75 / page, "right": 1 - 0.1 / page, "top": 1 - 0.7 / height, "bottom": foot / height}
-    looks = {label: solver_look(label.split()[0]) for label in labels}
+    marks = cycle(MARKS)
+    looks = {label: LOOKS.get(label.split()[0]) or Look(MUTED, next(marks)) for label in labels}
     with figure(height, page) as drawn:
         write_heading(drawn, "Accuracy over cost", f"{len(found.problems.problems)} problems")
         spaces = {**room, "hspace": 0.12, "wspace": 0.06}
@@ -43,8 +53,11 @@ def draw_front(found: Benchmark, page: float = WIDTH) -> Figure:
                 for (label, _), point, filled in zip(known.index, costs, whole, strict=True):
                     colour, mark = looks[label]
                     axes.plot(*point, mark, color=colour, mfc=colour if filled else "white", ms=5)
-                    number = str(labels.index(label) + 1)
-                    axes.annotate(number, point, (4, 3), textcoords="offset points", path_effects=HALO)
+        for (name, _), row in zip(SHOWN.items(), grid, strict=True):  # at the last limits of the axes
+            for axes, linear in zip(row, (True, False), strict=True):
+                known = medians[medians.index.get_level_values("linear") == linear].dropna()
+                numbers = [labels.index(label) + 1 for label, _ in known.index]
+                _write_numbers(axes, numbers, known[["times_fem", name]].to_numpy() * [1.0, 100.0])
         for top, bottom, law in zip(grid[0], grid[-1], ("linear", "finite strain"), strict=True):
             top.set_title(law)
             bottom.set_xlabel("time, multiples of fem's")
@@ -54,3 +67,26 @@ def draw_front(found: Benchmark, page: float = WIDTH) -> Figure:
         ]
         drawn.legend(handles=handles, loc="lower left", ncols=COLUMNS, handletextpad=0.3)
     return drawn
+
+
+def _write_numbers(axes: Axes, numbers: list[int], points: FloatArray) -> None:
+    """Write a number beside each point (n, 2); points side by side have one label, above them."""
+    places = axes.transData.transform(points) * 72 / axes.figure.dpi
+    left = list(np.argsort(places[:, 0])) if len(points) else []
+    while left:
+        group = [left.pop(0)]
+        for other in list(left):
+            if np.abs(places[other] - places[group[-1]]).max() < BESIDE:
+                group.append(other)
+                left.remove(other)
+        text = ",".join(str(numbers[each]) for each in group)
+        first, lowest = group[0], group[int(places[group, 1].argmin())]
+        shift = (places[group, 0].mean() - places[first, 0], 4 + np.ptp(places[group, 1]))
+        axes.annotate(
+            text,
+            (points[first, 0], points[lowest, 1]),
+            xytext=shift if len(group) > 1 else (4, 3),
+            textcoords="offset points",
+            ha="center" if len(group) > 1 else "left",
+            path_effects=HALO,
+        )

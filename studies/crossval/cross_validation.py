@@ -23,13 +23,13 @@ from pinnray.runtime.processes.child import ProcessFailed
 from pinnray.runtime.processes.pool import Pool, known_to_children
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.solver import Traits
+from pinnray.solvers.solver import Solver, Traits
 from pinnray.studies.crossval.fold_runner import SolverTask, run_folds
 from pinnray.studies.crossval.folds import LOAD, Fold, LoadCase, folds_of, load_cases_of
 from pinnray.studies.crossval.report import write_results
 from pinnray.studies.crossval.result import CrossvalResult
 from pinnray.studies.crossval.scores import Sample, left_out_table
-from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant, visible_markers
+from pinnray.studies.crossval.study import CrossvalStudy, of_draw, visible_markers
 from pinnray.studies.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from pinnray.studies.sweep.measurement import Measurement
 from pinnray.studies.sweep.store import resumed
@@ -59,8 +59,6 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
     definition = study.definition(given)
     with stages.stage("mesh"):
         mesh = finger_mesh(study.design, settings=study.mesh)
-        if mesh.moduli is not None:
-            raise UserError("crossval takes a body of one material, and parts of this one have their own")
         if given:
             check_positions(given, mesh)
         problem = Problem(mesh, study.material, study.load)
@@ -68,7 +66,7 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
         for remark in [*problem_remarks(problem), *remarks]:
             warnings.warn(remark, stacklevel=2)
     load_cases = load_cases_of(problem, others=LOAD in study.schemes and given is None)
-    threads = max(1, cores() // min(study.processes, len(study.variants)))
+    threads = max(1, cores() // min(study.processes, len(study.solvers)))
     with (
         resumed(study.out / DEFINITION, definition, job="cross-validation") as (journal, _),
         Pool(study.processes, threads=threads) as pool,
@@ -81,7 +79,7 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
             observations = _noisy(study, truths, problem)
         wanted = dict(_samples(study, observations, load_cases))
         journal.forget("failed")
-        known, variants = journal.numbers(), {variant.label: variant for variant in study.variants}
+        known, solvers = journal.numbers(), {solver.name: solver for solver in study.solvers}
         missing: dict[tuple[str, str, str], dict[int, dict[str, Fold]]] = {}
         for name, sample in wanted.items():
             if name not in known:
@@ -90,7 +88,7 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
             SolverTask(
                 f"{label}, {truth}, {layout}",
                 replace(problem, finger=study.design),
-                variants[label],
+                solvers[label],
                 load_cases,
                 truths[truth][layout] if truths else [],
                 observations[truth, layout],
@@ -102,7 +100,7 @@ def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> Crossv
         with stages.stage("samples") as progress:
             run = partial(run_tasks, run_folds, samples=wanted, journal=journal, progress=progress, deaths=1)
             # Slow solvers are usually named last: started first, they leave no processor idle at the end.
-            pooled = [task for task in reversed(tasks) if known_to_children(task.variant.solver)]
+            pooled = [task for task in reversed(tasks) if known_to_children(task.solver)]
             run({task.name: task for task in pooled}, pool=pool)
             run({task.name: task for task in tasks if task not in pooled}, pool=None)
         found = _result(study, wanted, journal.measurements(), observations, truths)
@@ -117,7 +115,7 @@ def _true_fields(
     study: CrossvalStudy, mesh: TriangleMesh, load_cases: Sequence[LoadCase], pool: Pool, stages: Stages
 ) -> dict[str, dict[str, list[TrueField]]]:
     """The true fields at every load by truth and layout, each simulated in a process."""
-    own = replace(study, variants=())  # other processes may not know the classes of all solvers
+    own = replace(study, solvers=())  # other processes may not know the classes of all solvers
     tasks = {
         (truth.name, case.name): TruthTask(own, truth, case, mesh)
         for truth in study.chosen_truths.values()
@@ -178,7 +176,7 @@ def _samples(
     load_cases: Sequence[LoadCase],
 ) -> Iterator[tuple[str, Sample]]:
     """Every sample by its name in the journal, which tells all that its result depends on."""
-    digests = {variant.label: _digests(variant, study.seeds) for variant in study.variants}
+    digests = {solver.name: _digests(solver, study.seeds) for solver in study.solvers}
     for (truth, layout), seeds in observations.items():
         folds = folds_of(study.schemes, len(seeds[0][0].points), load_cases)
         for solver, each in digests.items():
@@ -187,12 +185,12 @@ def _samples(
                 yield name, Sample(truth, layout, solver, seed, fold)
 
 
-def _digests(variant: SolverVariant, seeds: int) -> list[str]:
+def _digests(solver: Solver, seeds: int) -> list[str]:
     """Digests of a solver's class, source and settings; other ones each time if the class has no source."""
-    kind = type(variant.solver)
+    kind = type(solver)
     source = sources_digest(kind.__module__) if has_source(kind.__module__) else token_hex()
     own = [kind.__module__, kind.__qualname__, source]
-    return [content_hash([*own, variant.make(seed).settings()]) for seed in range(seeds)]
+    return [content_hash([*own, of_draw(solver, seed).settings()]) for seed in range(seeds)]
 
 
 def _result(
@@ -209,7 +207,7 @@ def _result(
     """
     failed = {each.number: each.message for each in measurements if each.state == "failed"}
     found = {each.number: each for each in measurements}
-    takes = {variant.label: Traits.of(variant.solver).assimilates for variant in study.variants}
+    takes = {solver.name: Traits.of(solver).assimilates for solver in study.solvers}
     rows = [
         (sample, takes[sample.solver], found[name])
         for name, sample in wanted.items()

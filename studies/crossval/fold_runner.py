@@ -25,7 +25,7 @@ from pinnray.solvers.solver import (
 )
 from pinnray.studies.crossval.folds import ALL, Fold, LoadCase, hide_markers
 from pinnray.studies.crossval.scores import LEVEL
-from pinnray.studies.crossval.study import SolverVariant
+from pinnray.studies.crossval.study import of_draw
 from pinnray.studies.crossval.true_fields import FieldSampler, SampledField, TrueField
 from pinnray.studies.sweep.measurement import Measurement
 
@@ -37,7 +37,7 @@ class SolverTask:
     Attributes:
         name: What its failure is called.
         problem: Finger, mesh, material and the full load, without markers.
-        variant: The solver.
+        solver: The solver.
         load_cases: The loads, the full one first.
         truths: The true fields at each load; empty with measurements.
         observations: For each seed, the markers at every load.
@@ -47,7 +47,7 @@ class SolverTask:
 
     name: str
     problem: Problem
-    variant: SolverVariant
+    solver: Solver
     load_cases: Sequence[LoadCase]
     truths: Sequence[TrueField]
     observations: Sequence[Sequence[Observations]]
@@ -68,7 +68,7 @@ def run_folds(task: SolverTask, report: Callable[..., None]) -> list[Measurement
     runner = None
     try:
         for seed, folds in task.folds.items():
-            solver = task.variant.make(seed)
+            solver = of_draw(task.solver, seed)
             if runner is None or "seed" in solver.settings():
                 runner = FoldRunner(task, solver)
             runner.forget_fit()

@@ -19,7 +19,7 @@ STATED = ("von_mises_within_stated", "force_within_stated", "position_within_sta
 HELD_OUT = "held_out_mae_sum_mm"
 COMPARED = (HELD_OUT, *FIELDS[:3], "force_error")
 """Scores of which differences from the baselines are computed."""
-BASELINES = ("fem", "gp", "statfem", "fem-asm")
+BASELINES = ("fem", "gp", "fem-asm")
 """Solvers that the others are compared with."""
 
 CASE, SCORED = ["truth", "layout"], ["truth", "layout", "solver", "scheme"]

@@ -18,7 +18,6 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.content_hash import sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores, package_versions
-from pinnray.solvers.assimilation.misfit import MarkerSettings
 from pinnray.solvers.problem import Load, Material
 from pinnray.solvers.solver import Solver, check_law, check_load, check_name, with_law
 from pinnray.studies.crossval.folds import ALL, SCHEMES
@@ -29,55 +28,24 @@ FEWEST_MARKERS = 3
 """Some to hold out and some to give."""
 
 
-@dataclass(frozen=True)
-class SolverVariant:
-    """A solver with a name that tells it from others of its own name, as tables have it."""
-
-    label: str
-    solver: Solver
-
-    def make(self, seed: int) -> Solver:
-        """The solver; `seed` is added to its own seed, if it draws random numbers."""
-        first = self.solver.settings().get("seed")
-        return changed(self.solver, seed=first + seed) if seed and isinstance(first, int) else self.solver
-
-
-def changed(solver: Solver, **changes: object) -> Solver:
-    """A solver, of any class, with other settings.
+def of_draw(solver: Solver, seed: int) -> Solver:
+    """A solver, of any class, for a draw, whose `seed` is added to its own if it draws random numbers.
 
     Raises:
-        UserError: If its class cannot be made with them.
+        UserError: If its class cannot be made with another seed.
     """
+    settings = solver.settings()
+    first = settings.get("seed")
+    if not seed or not isinstance(first, int):
+        return solver
     try:
         if is_dataclass(solver):
-            return cast(Solver, replace(cast(Any, solver), **changes))
-        return type(solver)(**{**solver.settings(), **changes})
+            return cast(Solver, replace(cast(Any, solver), seed=first + seed))
+        return type(solver)(**{**settings, "seed": first + seed})
     except UserError:
         raise
     except Exception as error:  # the constructor of another package may raise anything
-        raise UserError(f"solver {solver.name} cannot be made with {changes}: {error}") from error
-
-
-def solver_variants(
-    solvers: Sequence[Solver], material: Material, *, fixed: Sequence[str] = ()
-) -> list[SolverVariant]:
-    """A variant for each solver, and one more for one that can choose the weight of the markers in a fold.
-
-    That one chooses it by the leave-one-out errors of the markers that are given.
-
-    Args:
-        solvers: The solvers.
-        material: The elastic constants; the weight can be chosen under a linear law only.
-        fixed: Names of the solvers whose weight the user has set: one variant only.
-    """
-    variants = []
-    for solver in solvers:
-        variants.append(SolverVariant(solver.name, solver))
-        chooses = isinstance(solver, MarkerSettings)
-        if chooses and solver.name not in fixed and with_law(material, solver).law == "linear":
-            chosen = changed(solver, weights="precision", choose="left-out")
-            variants.append(SolverVariant(f"{solver.name} left-out", chosen))
-    return variants
+        raise UserError(f"solver {solver.name} cannot be made with seed {first + seed}: {error}") from error
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -86,7 +54,7 @@ class CrossvalStudy:
 
     Attributes:
         design: The finger.
-        variants: The solvers, as `solver_variants` gives them.
+        solvers: The solvers.
         out: Output folder; folds that an earlier study with equal settings finished there are reused.
         mesh: Element sizes of the mesh that solvers share; None means the mesh of the finger's file if it
             has one, else `SIZES`.
@@ -104,7 +72,7 @@ class CrossvalStudy:
     """
 
     design: Finger
-    variants: Sequence[SolverVariant]
+    solvers: Sequence[Solver]
     out: Path
     mesh: MeshSettings | None = None
     material: Material = field(default_factory=Material)
@@ -176,9 +144,9 @@ class CrossvalStudy:
                     f"cross-validation needs {FEWEST_MARKERS} markers, not the {len(points)} of the layout "
                     f"{layout!r}"
                 )
-        if not self.variants:
+        if not self.solvers:
             raise UserError("no solver was asked for; name at least one")
-        _check_distinct("a solver", [variant.label for variant in self.variants])
+        _check_distinct("a solver", [solver.name for solver in self.solvers])
         known = [scheme for scheme in SCHEMES if scheme != ALL]
         if unknown := [scheme for scheme in self.schemes if scheme not in known]:
             raise UserError(f"schemes: there is no scheme {unknown[0]!r}; there are {', '.join(known)}")
@@ -191,9 +159,8 @@ class CrossvalStudy:
             raise UserError(
                 f"noise {self.noise:g}: give a standard deviation of zero or more, at most 100 mm"
             )
-        check_law([variant.solver for variant in self.variants], self.material)
-        for variant in self.variants:
-            solver = variant.solver
+        check_law(self.solvers, self.material)
+        for solver in self.solvers:
             check_name(solver.name)
             check_load(solver, self.load)
             with_law(self.material, solver)

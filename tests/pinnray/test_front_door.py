@@ -105,7 +105,7 @@ class Lost(FemSolver):
 
 
 def test_a_solution_without_numbers_takes_no_other_ones_away():
-    with pytest.warns(UserWarning, match="solver lost returned an energy that is not finite"):
+    with pytest.warns(UserWarning, match="solver lost: its energy is not finite"):
         compared = pr.compare("default", ["fem", Lost()], size=2.0)
     assert compared.table().loc["fem", "converged"]
     assert compared.table().loc["lost", "status"] == compared.failed["lost"]

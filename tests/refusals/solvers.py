@@ -67,11 +67,6 @@ def seen(problem: Problem, *markers: int) -> Problem:
     return replace(problem, observations=observed_at(points, np.zeros_like(points), 0.01, visible))
 
 
-def of_two_materials() -> Problem:
-    """The short finger whose triangles have moduli of their own."""
-    return Problem(replace(mesh(), moduli=np.ones((len(mesh().triangles), 2))))
-
-
 def torn() -> Problem:
     """Two fingers, of which one is not clamped."""
     one = mesh()

@@ -10,7 +10,7 @@ from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.problem import Load, Material
 from pinnray.studies.crossval.folds import load_cases_of
-from pinnray.studies.crossval.study import CrossvalStudy, solver_variants
+from pinnray.studies.crossval.study import CrossvalStudy
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.emulator.store import emulator_of
 from pinnray.studies.optimum.question import Question
@@ -43,9 +43,7 @@ def varied(text: str, head: str = "samples = 4\n") -> Study:
 
 
 def crossval(**changes: Any) -> None:
-    CrossvalStudy(
-        design=Design(), variants=solver_variants([FemSolver()], Material()), out=Path("out"), **changes
-    ).check()
+    CrossvalStudy(design=Design(), solvers=[FemSolver()], out=Path("out"), **changes).check()
 
 
 def task(asked: Study) -> object:

@@ -37,7 +37,7 @@ def test_stages_of_other_processes_overlap_and_end_when_they_say_so():
     log = console(terminal=False)
     with Stages(log) as stages, stages.stage("fem"):
         stages.told("gp", 0.0, "")
-        stages.told("statfem", 0.5, "half")
+        stages.told("gp", 0.5, "half")
         stages.told("gp", 0.9, "nearly")
         stages.told("gp")
     assert shown(log) == "gp: 0.0 s, nearly\nfem: 0.0 s\n"

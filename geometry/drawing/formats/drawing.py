@@ -1,7 +1,6 @@
 """A drawing as read: closed curves with labels, marker circles and the file that they come from."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -41,11 +40,10 @@ class Mark(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MeshInFile:
-    """A plane triangle mesh of a file: nodes (n, 2), mm, triangles (t, 3), and its physical surfaces."""
+    """A plane triangle mesh of a file: nodes (n, 2), mm, and triangles (t, 3)."""
 
     points: FloatArray
     triangles: IntArray
-    parts: Mapping[str, IntArray] = field(default_factory=dict)  # numbers of each surface group's triangles
 
 
 @dataclass(frozen=True, eq=False)

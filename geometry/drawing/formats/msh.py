@@ -42,7 +42,6 @@ class RawMesh(NamedTuple):
     cells: IntArray  # tetrahedra (k, 4), or triangles (k, 3) of a file without them
     edges: Mapping[str, IntArray]  # of the physical curves by name, (k, 2) each
     nodes: Mapping[str, IntArray]  # of the physical points by name
-    parts: Mapping[str, IntArray]  # of the physical surfaces by name, rows of the triangles
 
 
 def read_msh(path: Path, units: str | None = None, tolerance: float | None = None) -> Drawing:
@@ -78,7 +77,7 @@ def _plane_mesh(raw: RawMesh, close: Close, unit: float) -> Drawing:
     contact = raw.nodes.get("contact")
     ready = None
     if {"base", "contact"} <= set(raw.edges):
-        ready = MeshInFile(points[used], triangles, raw.parts)
+        ready = MeshInFile(points[used], triangles)
     return Drawing(
         loops=tuple(straightened(loop, FLAT) for loop in loops),
         unit=unit,
@@ -132,23 +131,15 @@ def _raw(path: Path, unit: float) -> RawMesh:
         tags, coordinates, _ = mesh.getNodes()
         number = np.full(int(tags.max(initial=0)) + 1, -1)
         number[tags.astype(np.int64)] = np.arange(len(tags))
-        tetrahedra, (triangle_tags, triangles) = (
-            mesh.getElementsByType(kind) for kind in (TETRAHEDRON, TRIANGLE)
-        )
-        order = np.argsort(triangle_tags)
-        cells = tetrahedra[1].reshape(-1, 4) if len(tetrahedra[1]) else triangles.reshape(-1, 3)
+        tetrahedra, triangles = (mesh.getElementsByType(kind)[1] for kind in (TETRAHEDRON, TRIANGLE))
+        cells = tetrahedra.reshape(-1, 4) if len(tetrahedra) else triangles.reshape(-1, 3)
         if not len(cells):
             raise UserError("it holds neither triangles nor tetrahedra")
         return RawMesh(
             points=unit * coordinates.reshape(-1, 3),
             cells=_numbers(number, cells),
-            edges={name: _numbers(number, nodes) for name, (_, nodes) in _groups(1, 1)},
-            nodes={name: _numbers(number, nodes.ravel()) for name, (_, nodes) in _groups(0, 15)},
-            parts={
-                name: order[np.searchsorted(triangle_tags, own, sorter=order)]
-                for name, (own, _) in _groups(2, TRIANGLE)
-                if name
-            },
+            edges={name: _numbers(number, nodes) for name, nodes in _groups(1, 1)},
+            nodes={name: _numbers(number, nodes.ravel()) for name, nodes in _groups(0, 15)},
         )
 
 
@@ -160,17 +151,16 @@ def _numbers(number: IntArray, tags: IntArray) -> IntArray:
     return np.asarray(number[tags])
 
 
-def _groups(dimension: int, kind: int) -> Iterator[tuple[str, tuple[IntArray, IntArray]]]:
-    """Physical groups: name, tags of the elements of a type, and those of their nodes (k, corners)."""
-    found: dict[str, list[tuple[IntArray, IntArray]]] = {}
+def _groups(dimension: int, kind: int) -> Iterator[tuple[str, IntArray]]:
+    """Physical groups: name, and tags of the nodes of the elements of a type, (k, corners)."""
+    found: dict[str, list[IntArray]] = {}
     for _, group in gmsh.model.getPhysicalGroups(dimension):
         label = label_of(gmsh.model.getPhysicalName(dimension, group))
-        label = label if dimension == 2 else LABELS.get(label, label)
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
-            own, nodes = gmsh.model.mesh.getElementsByType(kind, int(entity))
-            found.setdefault(label, []).append((own, nodes.reshape(-1, CORNERS[kind])))
-    for name, parts in found.items():
-        yield name, tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+            _, nodes = gmsh.model.mesh.getElementsByType(kind, int(entity))
+            found.setdefault(LABELS.get(label, label), []).append(nodes.reshape(-1, CORNERS[kind]))
+    for name, arrays in found.items():
+        yield name, np.concatenate(arrays)
 
 
 @contextmanager

@@ -30,6 +30,7 @@ def command(
     options: FilmOptions = FilmSettings(),
     force: Annotated[bool, Parameter(group=FORCE, negative="")] = False,
     elastic: Annotated[MaterialOptions, Parameter(name="*", group=FORCE)] = MaterialOptions(),
+    learn: Annotated[Path | None, Parameter(group=FORCE, show_default=False)] = None,
     live: Flag = False,
     publish: Flag = False,
     without_video: OutputFlag = False,
@@ -51,6 +52,8 @@ def command(
             is in proportion to Young's modulus; the markers correct Poisson's ratio. The law is the
             neo-Hookean one unless --law gives one of finite strain. On the way back, and after a hold, its
             interval is wider by --loss.
+        learn: Design file to write, .toml, with what the frames with the largest motion say of walls, clamp
+            and modulus; --design takes it.
         live: Show the newest force or, without --force, the displacements of every frame as it comes.
         publish: As --live, and write a line of JSON for every frame, with the newest force if --force, to the
             standard output; tables then go to standard error.
@@ -69,14 +72,16 @@ def command(
     from pinnray.film.live_force import LiveForce, frame_lines
     from pinnray.film.track_film import track_film, track_table
     from pinnray.geometry.cache import finger_mesh
+    from pinnray.geometry.drawing.drawn_finger import finger_lines
+    from pinnray.geometry.finger.learned import write_learned
     from pinnray.runtime.machine import machine, package_versions
     from pinnray.runtime.output_folder import check_output, check_same_job, replaced_folder, write_run
     from pinnray.runtime.stages import Stages
     from pinnray.solvers.registry import make_solver
 
-    if elastic.model_fields_set and not force:
-        raise UserError(f"--{min(elastic.model_fields_set)} is for --force")
-    design, settings = finger.read(usual=MESH)
+    if (elastic.model_fields_set or learn) and not force:
+        raise UserError(f"--{min(elastic.model_fields_set, default='learn')} is for --force")
+    (design, settings), learned = finger.read(usual=MESH), finger.learned()
     film, material = options.of(source), elastic.made() if force else None
     if material:
         finger.check_cost(design, settings, [make_solver("fem-id")])
@@ -96,7 +101,9 @@ def command(
                 with stages.stage("mesh"):
                     mesh = finger_mesh(design, settings=settings)
             if mesh is not None and material and live:
-                tracker = force_tracker(mesh, design, material, design.markers, plane=film.simulated)
+                tracker = force_tracker(
+                    mesh, design, material, design.markers, plane=film.simulated, learned=learned
+                )
                 following = LiveForce(tracker, design.depth, material.loss)
             watch = frame_lines(following, publish=publish) if live else None
             with stages.stage("track") as report:
@@ -108,7 +115,7 @@ def command(
             elif mesh is not None and material:
                 with stages.stage("force") as report:
                     points, plane = observations.points, observations.plane
-                    tracker = force_tracker(mesh, design, material, points, plane=plane)
+                    tracker = force_tracker(mesh, design, material, points, plane=plane, learned=learned)
                     forces = forces_of(tracking, tracker, material.loss, report)
         made = {"versions": package_versions(), "machine": machine()}
         provenance = {"options": given, "design": design.definition(), **made}
@@ -116,10 +123,13 @@ def command(
             write_forces(partial, forces, design.depth)
             provenance["force"] = {
                 "material": material.model_dump() | {"law": tracker.law},
+                "learned": learned and learned.model_dump(),
                 "mesh": settings and settings.model_dump(),
                 "frames": len(forces),
                 "passed_over": passed_over,
             }
+            if learn is not None and tracker.learned is not None:
+                write_learned(learn, tracker.learned, finger_lines(design))
         write_run(partial, provenance | {"seconds": stages.seconds})
     for warning in tracking.warnings:
         say(f"warning: {warning}")

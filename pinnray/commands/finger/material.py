@@ -35,7 +35,8 @@ def command(
         width = max(map(len, MATERIALS))
         for name, known in MATERIALS.items():
             young, ratio = number(known.material.young, 3), known.material.poisson
-            elastic = f"E = {young} MPa, ν = {ratio:g}"
+            spread = number(known.material.young_deviation, 2) if known.material.young_deviation else ""
+            elastic = f"E = {young}{spread and f' ± {spread}'} MPa, ν = {ratio:g}"
             facts = f"{known.density:g} g/cm3, breaks at {known.strain_at_break:.0%}"
             loss = f", a cycle loses {known.material.loss:.0%}" if known.material.loss else ""
             print(f"{name:<{width}}  {elastic}, {facts}{loss}; {known.source}")
@@ -63,7 +64,8 @@ def command(
         finite = [fit for fit in fits if fit.material.law != "linear"][:1]
         chosen = dict(zip(("small strain: ", "finite strain: "), [fits[0], *finite], strict=False))
     for strains, fit in chosen.items():
-        print(f"{strains}--young {fit.material.young:.5g} --poisson {poisson:g} --law {fit.material.law}")
+        young = f"{fit.material.young:.5g}±{fit.material.young_deviation:.2g}"
+        print(f"{strains}--young {young} --poisson {poisson:g} --law {fit.material.law}")
     if out is not None:
         from pinnray.comparison.figures.tensile_test import draw_tensile_test
 

@@ -1,7 +1,6 @@
 """Score solvers on held-out markers, loads and fields."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.text import Text
@@ -18,10 +17,6 @@ from pinnray.options.shared import (
 from pinnray.runtime.exits import NOT_CONVERGED, say
 from pinnray.runtime.machine import process_count
 
-if TYPE_CHECKING:
-    from pinnray.solvers.material import Material
-    from pinnray.studies.crossval.study import SolverVariant
-
 TEXTS = ("solver", "held out")
 """Headings of columns of words."""
 
@@ -31,7 +26,7 @@ def command(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
-    solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
+    solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp",
     schemes: str = "one-out,tip-out,random,load-out",
     truth: str = "sliding",
     layouts: str | None = None,
@@ -49,8 +44,7 @@ def command(
     was stopped.
 
     Args:
-        solvers: Names of solvers, separated by commas. One that can choose the weight of the markers runs in
-            three variants (linear law).
+        solvers: Names of solvers, separated by commas.
         schemes: Hold-out schemes, separated by commas.
         truth: Truths, separated by commas, such as sliding,cylinder,3d, or all; docs/how-to/own-truth.md has
             them.
@@ -81,7 +75,7 @@ def command(
         mesh=mesh,
         material=material,
         load=load,
-        variants=read_variants(options, solvers, material),
+        solvers=options.read(solvers),
         schemes=comma_list(schemes),
         truths=comma_list(truth),
         layouts=comma_list(layouts) if layouts else (),
@@ -92,8 +86,7 @@ def command(
         out=out or Path("out") / f"crossval-{design.name}",
         processes=process_count(processes, "--processes"),
     )
-    made = [variant.solver for variant in study.variants]
-    finger.check_cost(design, mesh, made, simulated=True)
+    finger.check_cost(design, mesh, study.solvers, simulated=True)
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")
     with going_on_from(study.out), Stages() as stages:
@@ -107,12 +100,3 @@ def command(
     for name, message in result.failed.items():
         say(f"error: {name} failed, and is tried again by the same command: {message}")
     return 0 if result.samples["converged"].all() and not result.failed else NOT_CONVERGED
-
-
-def read_variants(options: SolverOptions, names: str, material: "Material") -> "list[SolverVariant]":
-    """The solvers and their variants; a single one where --solver-set chooses the weight of the markers."""
-    from pinnray.studies.crossval.study import solver_variants
-
-    keys = [text.partition("=")[0].split(".") for text in options.solver_set]
-    fixed = [key[0] for key in keys if key[1:] in (["choose"], ["weights"])]
-    return solver_variants(options.read(names), material, fixed=fixed)

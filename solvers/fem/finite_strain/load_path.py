@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.cylinder_contact import ContactRegion, CylinderContact
+from pinnray.solvers.cylinder_contact import ContactRegion
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
@@ -34,11 +34,9 @@ ALIKE = 2.0
 LET_GO, LEAP = 0.05, 3.0
 """Force over the largest one on the way below which a finger is leaving a cylinder where its path ends, and
 motion in a step, per load, over the median above which it is at a limit point."""
-SLENDER, SOFTEST, HARDER = 1e5, 300.0, 10.0
-"""A finger whose contact is so many times stiffer than itself takes a step first with a contact that is only
-SOFTEST times as stiff, which is hardened by factors of at most HARDER. For a node leaves the contact within
-Newton's method where the cylinder recedes by its force over that stiffness: of a strip of steel by some
-nanometres, so that nodes would come and go for ever. A finger whose walls bend as solids has 10^3 to 10^4."""
+HARDER = 10.0
+"""Stiffness of a contact that starts from coarser elements, over its own: from so near, multipliers that
+settle sooner cost no more iterations each time."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,6 @@ class LoadPath:
         self._rough = rough  # For equilibria that need be near only
         contact = self.equilibrium.contact
         self._max_step = steps.max_step if contact is None else min(steps.max_step, contact.longest_step)
-        self._softer: list[float] | None = [] if contact is None else None  # Until it is needed
         self.points = [self.equilibrium.rest]
         self.left = 0  # Number of unstable equilibria that were left for a stable one
         self._halved = self._iterations = 0  # Failed steps; Newton iterations of all steps
@@ -152,11 +149,9 @@ class LoadPath:
             forces=last.forces,
             contact=self._carried_contact(way, last),
         )
-        self._softer = way._softer  # A finger is as slender on any elements
         newton, self._newton = self._newton, self._begin(max_iterations=CARRIED)
         own = self.equilibrium.contact
-        # From so near, multipliers that settle sooner cost no more iterations each time.
-        harder = [replace(own, stiffness=HARDER * own.stiffness)] if own and not self._softer else []
+        harder = [replace(own, stiffness=HARDER * own.stiffness)] if own else []
         for self.equilibrium.contact in (*harder, own):
             found, _ = self._found(guess)
             if found is not None:
@@ -232,38 +227,24 @@ class LoadPath:
 
     def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
         """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""
-        hardest, final, newton, apart = 0, self.equilibrium.contact, self._newton, PENETRATION
-        rubs = final is not None and final.coefficient > 0  # friction depends on the way
+        contact, newton, apart, hardest = self.equilibrium.contact, self._newton, PENETRATION, 0
+        rubs = contact is not None and contact.coefficient > 0  # friction depends on the way
         if self._rough is not None and guess.fraction < self._exact_from and not rubs:
             newton, apart = self._rough, ROUGH
-        if self._softer is None and final is not None:
-            self._softer = self._ever_harder(final)
-        softer = [replace(final, stiffness=each) for each in self._softer or ()] if final is not None else []
-        for contact in (*softer, final):
-            self.equilibrium.contact = contact
-            for _ in range(30 if contact is final else 1):
-                result = newton.solve(guess)
-                self._iterations += result.iterations
-                hardest, self._tangent = max(hardest, result.iterations), result.tangent
-                if not result.converged:
-                    self._reason, self.equilibrium.contact = f"SNES: {result.reason}", final
-                    return None, hardest
-                if contact is None:
-                    return result.state, hardest
-                guess, off = contact.settled(result.state)
-                if contact is final and off <= apart:
-                    return guess, hardest
+        for _ in range(30):
+            result = newton.solve(guess)
+            self._iterations += result.iterations
+            hardest, self._tangent = max(hardest, result.iterations), result.tangent
+            if not result.converged:
+                self._reason = f"SNES: {result.reason}"
+                return None, hardest
+            if contact is None:
+                return result.state, hardest
+            guess, off = contact.settled(result.state)
+            if off <= apart:
+                return guess, hardest
         self._reason = "the contact does not settle"
         return None, hardest
-
-    def _ever_harder(self, contact: CylinderContact) -> list[float]:
-        """Stiffnesses of the contact, N/mm per mm, with which a step of a slender finger begins."""
-        own = self.equilibrium.stiffness_to_cylinder
-        if contact.stiffness <= SLENDER * own:
-            return []
-        count = math.ceil(math.log(contact.stiffness / (SOFTEST * own), HARDER)) + 1
-        softer: list[float] = np.geomspace(SOFTEST * own, contact.stiffness, count)[:-1].tolist()
-        return softer
 
     def _guess(self, fraction: float) -> LoadState:
         """The state at a fraction of the load by extrapolation of the last ones."""

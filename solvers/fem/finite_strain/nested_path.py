@@ -23,8 +23,6 @@ def coarser(problem: Problem, most: float = 0.5) -> Problem | None:
 
     None where these are more than a share `most` of its own, or its mesh is of another body.
     """
-    if problem.mesh.moduli is not None:  # which the coarse mesh would lack
-        return None
     if problem.finger is None or len(problem.mesh.triangles) < FINE:
         return None
     edge = np.sqrt(4 / np.sqrt(3) * np.median(problem.mesh.areas))

@@ -38,7 +38,7 @@ class ConstrainedNewton:
 
     def __init__(self, equilibrium: DiscreteEquilibrium, tolerance: float, max_iterations: int) -> None:
         self._equilibrium, self._tolerance = equilibrium, tolerance
-        self._scale, self._state = equilibrium.problem.stiffest, equilibrium.rest
+        self._scale, self._state = equilibrium.problem.material.young, equilibrium.rest
         self._size = self._off = 0.0
         self._torn = self._near = self._kept = self._tangent = False
         self._part = equilibrium.matrix.createVecRight()

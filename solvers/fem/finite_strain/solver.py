@@ -34,7 +34,6 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
     laws = ("neo-hookean", "st-venant-kirchhoff", "gent")
     loads = ("mean", "point", "patch", "cylinder")
     friction = True
-    parts = True
     cost = Cost(per_triangle=140)
 
     def __post_init__(self) -> None:
@@ -116,14 +115,11 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
 def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
     """The discretisation error at the full load; None where it was not reached, has no limit or no force.
 
-    Nor is it known in a body of several materials, between which the gradient jumps.
-
     The tangent there must be factorised.
     """
     last = path.points[-1]
     untouched = path.equilibrium.contact is not None and not last.contact.any()
-    jumps = problem.mesh.moduli is not None
-    if last.fraction < 1 or problem.load.kind == "point" or untouched or jumps:
+    if last.fraction < 1 or problem.load.kind == "point" or untouched:
         return None
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 

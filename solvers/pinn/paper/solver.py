@@ -14,7 +14,6 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.misfit import Weighting
 from pinnray.solvers.pinn.network_solver import NetworkSolver
 from pinnray.solvers.pinn.paper.checkpoint import CheckpointStore
-from pinnray.solvers.pinn.paper.collocation import Collocation, collocation_points
 from pinnray.solvers.pinn.paper.loss import DisplacementTerm, EnergyTerm, Loss, LossTerm, stiffness_matrix
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
 from pinnray.solvers.pinn.paper.trained_field import MlpField, assess_training
@@ -41,8 +40,6 @@ class PaperPinnSolver(NetworkSolver):
         width: Neurons in a layer.
         layers: Gated layers of each network.
         base_points: Evenly spaced points of the base where the displacement should vanish.
-        collocation: Where the energy is evaluated: "nodes" of the shared mesh with equal weights, as in the
-            paper, or "elements", by quadrature in its triangles.
         device: "cpu" or "cuda".
         precision: "single" or "double".
         checkpoint_every: Epochs between checkpoints.
@@ -55,7 +52,6 @@ class PaperPinnSolver(NetworkSolver):
     width: int = 64
     layers: int = 4
     base_points: int = 1000
-    collocation: Collocation = "nodes"
     device: Literal["cpu", "cuda"] = "cpu"
     precision: Literal["single", "double"] = "single"
     checkpoint_every: int = 1000
@@ -140,7 +136,8 @@ class PaperPinnSolver(NetworkSolver):
         def tensor(array: FloatArray) -> torch.Tensor:
             return torch.tensor(np.asarray(array), dtype=PRECISIONS[self.precision], device=self.device)
 
-        body, shares = collocation_points(problem.mesh, self.collocation)
+        body = problem.mesh.points  # the paper's: all alike, though some parts of the mesh are denser
+        shares = np.full(len(body), 1 / len(body))
         base = evenly_spaced_points(problem.mesh, "base", self.base_points)
         contact, functional = contact_functional(problem)
         targets = np.array([[value or 0.0] for value in problem.load.displacement])

@@ -76,8 +76,8 @@ def assess_training(
     if hidden:
         message += (
             f"but the energy is {seen:.4g} N mm/mm at the collocation points and {energy:.4g} in the "
-            "elements: the displacement jumps between the points, where the loss does not see it; take "
-            "collocation=elements"
+            "elements: the displacement jumps between the points, where the loss does not see it; take the "
+            "preset fast or trained, whose energy is an integral"
         )
         return energy, reaction, Status(False, message)
     message += (

@@ -27,7 +27,7 @@ FULL = LoadCase("full", Load(), 1.0, 35.0)
 @pytest.fixture
 def study(tmp_path, coarse_mesh, monkeypatch) -> CrossvalStudy:
     monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
-    study = CrossvalStudy(design=Design(), variants=[], out=tmp_path, mesh=MeshSettings(size=1.0))
+    study = CrossvalStudy(design=Design(), solvers=[], out=tmp_path, mesh=MeshSettings(size=1.0))
     return study
 
 

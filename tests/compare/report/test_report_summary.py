@@ -58,24 +58,21 @@ def test_the_error_of_the_model_is_not_laid_on_the_network(compared, fem, evalua
 def test_markers_help_by_what_was_held_out_never_by_what_was_given(compared, fem, given):
     """The reference is 0.7 mm off; the other one meets its markers, and counts with its 0.1 mm."""
     answer = asked(compared(fem, given))[MARKERS]
-    assert answer.verdict == "fem-asm is nearer than fem at held-out markers."
+    assert answer.verdict == "Nearer than fem: at held-out markers fem-asm."
     assert [row[:2] for row in answer.table.rows] == [["fem", "0.700"], ["fem-asm", "0.100"]]
     worse = replace(given, left_out=given.left_out + np.array([5.0, 0.0]))
-    assert (
-        asked(compared(fem, worse))[MARKERS].verdict == "fem-asm is not nearer than fem at held-out markers."
-    )
+    assert asked(compared(fem, worse))[MARKERS].verdict == "Nearer than fem: at held-out markers none."
 
 
 def test_stress_and_force_are_answered_where_they_are_known(compared, fem, given, evaluate):
     """The truth is half as much again: 1.02 of the reference is nearer in everything but its force."""
     stronger = replace(given, reaction=10 * fem.reaction)
     answer = asked(compared(fem, stronger, truth=evaluate("fem-nonlinear", 1.5)))[MARKERS]
-    nearer = "fem-asm is nearer than fem at held-out markers, in displacement and in von Mises stress"
-    assert answer.verdict == f"{nearer}; fem-asm is not nearer in force."
+    measures = "at held-out markers {0}; in displacement {0}; in von Mises stress {0}; in force {1}."
+    assert answer.verdict == f"Nearer than fem: {measures.format('fem-asm', 'none')}"
     other = replace(given, solver="fem-x", reaction=1.4 * fem.reaction)
     answer = asked(compared(fem, stronger, other, truth=evaluate("fem-nonlinear", 1.5)))[MARKERS]
-    both = "Both solvers that were given markers are nearer than fem at held-out markers, in displacement and"
-    assert answer.verdict == f"{both} in von Mises stress; only fem-x is nearer in force."
+    assert answer.verdict == f"Nearer than fem: {measures.format('both', 'fem-x')}"
 
 
 def test_the_first_answer_is_by_the_solver_nearest_to_the_truth_of_those_that_found_the_load(

@@ -14,15 +14,15 @@ from pinnray.solvers.solution import Estimated, IdentifiedForce
 from tests.compare.report.test_report import Page
 
 MOST_WORDS = 1400
-"""Of a report of nine solvers without pictures and provenance."""
+"""Of a report of eight solvers without pictures and provenance."""
 
 
 @pytest.fixture(scope="module")
-def nine(estimated, evaluate, compared, observations) -> Results:
-    """Nine solvers with a truth, odd scales, figures, and two of them with a force that they found."""
+def eight(estimated, evaluate, compared, observations) -> Results:
+    """Eight solvers with a truth, odd scales, figures, and two of them with a force that they found."""
     made = [estimated, evaluate("fem-nonlinear", 1.2371), evaluate("pinn-std", 1.0043)]
     off = np.array([0.1234, -0.0567])
-    for number, name in enumerate(("pinn-asm", "fem-asm", "fem-id", "pinn-id", "gp", "statfem")):
+    for number, name in enumerate(("pinn-asm", "fem-asm", "fem-id", "pinn-id", "gp")):
         given = evaluate(name, 1.0321 + 0.0173 * number)
         left_out = observations.displacements + (1 + 0.31 * number) * off
         made.append(replace(given, in_sample=True, left_out=left_out))
@@ -47,12 +47,12 @@ def nine(estimated, evaluate, compared, observations) -> Results:
 
 
 @pytest.fixture(scope="module")
-def text(nine) -> str:
-    page = Page(report_html(nine, [], {})).text.replace("\N{NO-BREAK SPACE}", " ")
+def text(eight) -> str:
+    page = Page(report_html(eight, [], {})).text.replace("\N{NO-BREAK SPACE}", " ")
     return page.replace("\N{MINUS SIGN}", "-")
 
 
-def test_a_report_of_nine_solvers_is_short(text):
+def test_a_report_of_eight_solvers_is_short(text):
     assert len(text.split()) < MOST_WORDS
 
 
@@ -77,11 +77,11 @@ def roundings(value: float, said: set[str], least: int) -> set[str]:
     }
 
 
-def test_no_number_stands_in_two_roundings(nine, text):
+def test_no_number_stands_in_two_roundings(eight, text):
     shares = set(re.findall(r"(?<![\d.])(\d+(?:\.\d+)?) %", text))
     others = set(re.findall(r"(?<![\d.])(\d+\.\d+)(?![\d.]| %)", text))
     assert len(shares) > 15
     assert len(others) > 40
-    for value in numbers(nine.scores.content()["solvers"]):
+    for value in numbers(eight.scores.content()["solvers"]):
         for factor, said, least in ((100.0, shares, 2), (1.0, others, 3)):
             assert len(roundings(factor * value, said, least)) <= 1, value

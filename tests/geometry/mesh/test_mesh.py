@@ -102,13 +102,15 @@ def test_location_at_nodes_and_barycentric_points_agrees_with_search(default_mes
 def test_points_of_another_mesh_of_a_round_body_are_located() -> None:
     """Chords of two meshes cut an arc differently: points between them count to the nearest triangle."""
     design = Design(fillet_radius=1.0, tip_radius=1.5)
-    coarse, fine = (build_mesh(design, MeshSettings(size=size)) for size in (1.0, 0.3))
-    points = LagrangeSpace(coarse, 2).nodes
-    with pytest.raises(OutsideBodyError):
-        fine.locate(points)
-    found = coarse.locate_on(fine, points)
-    corners = fine.points[fine.triangles[found.cells]]
-    np.testing.assert_allclose(np.einsum("nc,ncx->nx", found.barycentric, corners), points, atol=1e-12)
-    assert found.barycentric.min() > -0.5
-    with pytest.raises(OutsideBodyError, match="1 of 1 points"):
-        coarse.locate_on(fine, [[45.0, 0.5]])
+    coarse = build_mesh(design, MeshSettings(size=1.0), across=1)
+    fine = build_mesh(design, MeshSettings(size=0.35))
+    for here, there in ((coarse, fine), (fine, coarse)):
+        points = LagrangeSpace(here, 2).nodes
+        with pytest.raises(OutsideBodyError):
+            there.locate(points)
+        found = here.locate_on(there, points)
+        corners = there.points[there.triangles[found.cells]]
+        np.testing.assert_allclose(np.einsum("nc,ncx->nx", found.barycentric, corners), points, atol=1e-12)
+        assert found.barycentric.min() > -0.5
+        with pytest.raises(OutsideBodyError, match="1 of 1 points"):
+            here.locate_on(there, [[45.0, 0.5]])

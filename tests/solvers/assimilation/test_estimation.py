@@ -157,6 +157,7 @@ def as_found(sensitivities: FloatArray, inflation: float = 1.0, z: float = 0.0) 
     places = np.full(len(parameters), z)
     return Estimate(
         parameters,
+        Prior.independent(len(parameters)),
         places,
         sensitivities,
         np.zeros(count),
@@ -271,3 +272,21 @@ def test_noise_a_hundred_times_smaller_is_fitted_no_further_than_the_noise() -> 
 
     estimate(curved, one, one, [replace(ONE, scale=100.0)])
     assert len(calls) <= 3
+
+
+def test_what_was_learned_before_is_worth_as_much_as_the_observations_themselves(slopes):
+    """Of a linear model: the posterior of six observations is the prior of six more, or all are fitted."""
+    rng = np.random.default_rng(3)
+    observed = slopes @ (START + SCALE * rng.normal(size=3)) + rng.normal(size=COUNT)
+
+    def fitted(rows: slice, prior: Prior | None = None) -> Estimate:
+        def model(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+            return slopes[rows] @ values, slopes[rows]
+
+        return estimate(model, observed[rows], np.ones(COUNT)[rows], PARAMETERS, prior=prior, rounds=1)
+
+    first, whole = fitted(slice(0, 6)), fitted(slice(0, COUNT))
+    then = fitted(slice(6, COUNT), Prior(first.z, np.linalg.inv(first.covariance)))
+    np.testing.assert_allclose(then.covariance, whole.covariance, rtol=1e-9)
+    # A fit ends where its cost changes by 1e-4 of itself.
+    np.testing.assert_allclose(then.z, whole.z, atol=1e-3)

@@ -9,8 +9,10 @@ from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Pictures, R
 from pinnray.solvers.assimilation.picture_frames import FreePictures
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.registry import make_solver
+from pinnray.solvers.statistics.posterior import Posterior
 from tests.solvers.conftest import hiding, observed_at
 from tests.solvers.contract.test_contract import QUICK
+from tests.solvers.statistics.kernels import matern
 
 KNOWN = Registration(turn=3.0, shift=0.3, scale=0.01, tilt=0.01)
 OFF = np.array([2.5, 0.3, -0.2, -0.012, 0.01, -0.005])  # degrees, mm, shares
@@ -54,32 +56,28 @@ def test_observations_are_linear_in_the_frames(problem):
 
 
 def test_frames_are_those_of_the_joint_normal_distribution(problem):
-    """Of `statfem`: mean and covariance of z given the observations, from the covariance of both together."""
+    """Of `gp`: mean and covariance of z given the observations, from the covariance of both together."""
     observed, _ = pictured(problem, OFF)
-    solution = make_solver("statfem").solve(replace(problem, observations=observed))
-    posterior = solution.field.posterior  # type: ignore[attr-defined]
-    data, (factor, amplitudes, lengths) = posterior.data, posterior.constants
-    count, shapes = 2 * len(data.points), data.shapes.reshape(len(data.load), -1)
-    by_load = (factor * data.load_deviation) ** 2 * shapes.T @ shapes
-    distance = np.linalg.norm(data.points[:, None] - data.points, axis=2) * np.sqrt(5) / lengths[0]
-    kernel = (1 + distance + distance**2 / 3) * np.exp(-distance)
-    process = np.einsum("mn,cd->mcnd", kernel, np.diag(amplitudes**2)).reshape(count, count)
+    posterior = make_solver("gp", clamp=True).solve(replace(problem, observations=observed)).field
+    assert isinstance(posterior, Posterior)
+    data, count = posterior.data, 2 * len(posterior.data.points)
+    assert count == 28
+    process = np.zeros((count, count))
+    for axis, length in enumerate(posterior.lengths):
+        process[axis::2, axis::2] = posterior.variances[axis] * matern(data.points, data.points, length)
     frames = data.frames.reshape(6, count)
-    whole = by_load + process + 0.01**2 * np.eye(count) + frames.T @ frames
-    left = data.observed.ravel() - factor * data.load @ shapes
+    whole = process + 0.01**2 * np.eye(count) + frames.T @ frames
     mean, covariance = posterior.frames
-    np.testing.assert_allclose(mean, frames @ np.linalg.solve(whole, left), atol=1e-6)
+    np.testing.assert_allclose(mean, frames @ np.linalg.solve(whole, data.observed.ravel()), atol=1e-6)
     expected = np.eye(6) - frames @ np.linalg.solve(whole, frames.T)
     np.testing.assert_allclose(covariance, expected, atol=1e-6)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", ["statfem", "gp"])
-def test_a_turned_picture_is_found(problem, solver):
+def test_a_turned_picture_is_found(problem):
     """`gp` knows of it only by the base at rest."""
-    options = {"clamp": True} if solver == "gp" else {}
-    observed, moved = pictured(problem, OFF)
-    made = make_solver(solver, **options)
+    observed, _ = pictured(problem, OFF)
+    made = make_solver("gp", clamp=True)
     found = made.solve(replace(problem, observations=observed))
     for part, value in zip(PARTS, OFF, strict=True):
         name = f"pressed_{part}"
@@ -88,32 +86,22 @@ def test_a_turned_picture_is_found(problem, solver):
     np.testing.assert_allclose(found.shown(observed.points, field), observed.displacements, atol=0.03)
     as_it_is = made.solve(replace(problem, observations=replace(observed, pressed=FIXED)))
     assert as_it_is.pictures is None
-    if solver == "statfem":  # mechanics tell the turn
-        assert found.stats["pressed_turn"] == pytest.approx(OFF[0], abs=0.3)
-        off = np.abs(field - moved).max()
-        assert off < 0.2 * np.abs(as_it_is.displacement(observed.points) - moved).max()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", ["statfem", "gp"])
-def test_a_marker_left_out_is_predicted_in_its_picture(problem, solver):
+def test_a_marker_left_out_is_predicted_in_its_picture(problem):
     """Its deviation has a part by the frame."""
     observed, _ = pictured(problem, OFF)
     hidden = hiding(replace(problem, observations=observed), 4)
-    found, seen = make_solver(solver).solve(hidden), hidden.observations.visible
+    made, seen = make_solver("gp"), hidden.observations.visible
+    found = made.solve(hidden)
     there = problem.mesh.locate(observed.points)
     shown = found.uncertainty.shown(there)
-    framed = found.field.posterior  # type: ignore[attr-defined]
-    z, pictures = framed.frames[0], FreePictures.of(hidden.observations)
     seen_there = found.shown(observed.points, found.displacement(there))[[4]]
-    place = replace(pictures, points=observed.points[[4]], shown=seen_there)
-    own_shapes = found.field._own(there)[:, [4]]  # type: ignore[attr-defined]
-    _, variance = framed.at(observed.points[[4]], own_shapes, place.about(z).frames)
-    np.testing.assert_allclose(shown[4] ** 2, variance[0], rtol=1e-6)
     assert shown[seen].max() < 0.011  # as exactly as it was seen
-    whole = make_solver(solver).solve(replace(problem, observations=observed))
+    whole = made.solve(replace(problem, observations=observed))
     np.testing.assert_allclose(whole.left_out[[4]], seen_there, atol=1e-4)
-    fixed = make_solver(solver).solve(replace(problem, observations=replace(observed, pressed=FIXED)))
+    fixed = made.solve(replace(problem, observations=replace(observed, pressed=FIXED)))
     assert fixed.uncertainty.shown is None
 
 

@@ -43,7 +43,6 @@ JOBS: dict[str, tuple[dict[str, Any], Material, Load]] = {
     "fem-asm": ({}, Material(), Load()),
     "fem-id": ({}, Material(), Load()),
     "gp": ({}, Material(), Load()),
-    "statfem": ({}, Material(), Load()),
     "pinn-std": ({}, Material(), Load()),
     "pinn-asm": ({}, Material(), Load()),
     "pinn-std local": ({"preset": "local"}, Material(), Load()),

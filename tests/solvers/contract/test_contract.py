@@ -52,7 +52,7 @@ LOADS |= {f"{name} local": LOADS[name] for name in ("pinn-std", "pinn-asm") if n
 PAIRS = [(name, kind) for name in NAMES if name in LOADS for kind in ("mean", "point", "patch", "cylinder")]
 
 ACCURACY = {
-    **dict.fromkeys(("fem", "fem-asm", "statfem", "fem-id", "skfem-p2"), 1e-8),
+    **dict.fromkeys(("fem", "fem-asm", "fem-id", "skfem-p2"), 1e-8),
     **{"fem-nonlinear": 1e-6, "fem-3d": 1e-4},
 }
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance."""

@@ -6,17 +6,17 @@ import pytest
 
 from tests.solvers.contract.golden import JOBS, NUMBERS, golden
 
-TOLERANCES = {"fem-id": 1e-6, "statfem": 2e-5, "pinn-std": 3e-7, "pinn-asm": 1e-6}
+TOLERANCES = {"fem-id": 1e-6, "pinn-std": 3e-7, "pinn-asm": 1e-6}
 """Relative; about ten times the largest difference between Debian 12 and 13, one and two threads.
 
-`docs/reliability.md` has the largest of these differences. `fem-id` and `statfem` search for a least value,
-the networks' equations have large condition numbers.
+`docs/reliability.md` has the largest of these differences. `fem-id` searches for a least value, the
+networks' equations have large condition numbers.
 """
 
 TIGHT = 5e-9
 """Of all others: ten times the largest difference, in a displacement that is a thousandth of the largest."""
 
-SLOW = ("pinn", "fem-id", "fem-nonlinear", "statfem")
+SLOW = ("pinn", "fem-id", "fem-nonlinear")
 
 
 @pytest.mark.parametrize(

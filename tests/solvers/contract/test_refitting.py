@@ -18,7 +18,6 @@ QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 
 PRECISE = {"preset": "local", "weights": "precision"}
 SOLVERS: dict[str, dict[str, object]] = {
     "gp": {},
-    "statfem": {"degree": 1},
     "pinn-asm": QUICK,
     "pinn-asm, weights chosen": QUICK | PRECISE | {"choose": "left-out"},
     "pinn-asm, a soft contact": QUICK | PRECISE | {"contact_deviation": 1.0},

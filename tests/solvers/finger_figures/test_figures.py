@@ -15,9 +15,9 @@ from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.finger_figures import QUANTITIES, break_answer, figures_of
 from pinnray.solvers.finger_figures.measures import (
     force_curve,
-    gradients,
     largest_away_from_corners,
     narrowest_gap,
+    nodal_gradient,
     thinnest_wall,
     wrap_angle,
 )
@@ -67,7 +67,7 @@ def test_wrap_is_positive_where_the_tip_stays_and_the_contact_moves_in() -> None
 
 def test_the_largest_stress_of_a_uniform_strain_is_that_strains() -> None:
     strained = affine([[0.01, 0.0], [0.0, -0.002]])
-    stress, strain = (each.value for each in largest_away_from_corners(strained, gradients(strained)))
+    stress, strain = (each.value for each in largest_away_from_corners(strained, nodal_gradient(strained)))
     state = strained.state(PROBLEM.mesh.at_centroids())
     assert stress == pytest.approx(state.von_mises[0], rel=1e-12)
     assert strain == pytest.approx(0.01, rel=1e-12)
@@ -77,7 +77,7 @@ def test_the_largest_stress_of_a_uniform_strain_is_that_strains() -> None:
 def test_the_largest_stress_depends_little_on_the_mesh() -> None:
     problems = [Problem(finger_mesh(FINGER, settings=MeshSettings(size=size))) for size in (0.5, 0.25)]
     solved = [FemSolver(estimate=False).solve(each) for each in problems]
-    found = [largest_away_from_corners(each, gradients(each))[0] for each in solved]
+    found = [largest_away_from_corners(each, nodal_gradient(each))[0] for each in solved]
     # A measured 1 % apart; the largest value at centroids, corners included, doubles.
     assert found[0].value == pytest.approx(found[1].value, rel=0.03)
 

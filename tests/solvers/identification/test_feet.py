@@ -37,7 +37,7 @@ def pair(standing):
     """The finger and eight markers in it."""
     model = model_of(standing, NAMES)
     seen = observed_at(MARKERS, 0 * MARKERS, NOISE)
-    return model, MarkerModel(model, MarkerData.of(standing.mesh, seen, 0.0, None))
+    return model, MarkerModel(model, MarkerData.of(standing, seen, 0.0))
 
 
 def moved(pair, values):
@@ -129,7 +129,7 @@ def test_friction_bounds_the_tangential_force_to_a_share_of_the_normal_one(rubbe
 def test_derivatives_with_a_bounded_tangential_force_pass_the_taylor_test(rubbed, name):
     model = model_of(rubbed, ("normal_force", "shear_force", "eccentricity"))
     seen = observed_at(rubbed.mesh.markers, np.zeros((9, 2)), NOISE)
-    markers = MarkerModel(model, MarkerData.of(rubbed.mesh, seen, None, None))
+    markers = MarkerModel(model, MarkerData.of(rubbed, seen, None))
     check_taylor(model, markers, name, {"normal_force": 0.16, SHARE: 0.2, "eccentricity": 0.4})
 
 
@@ -137,7 +137,7 @@ def test_markers_that_ask_for_more_than_friction_get_as_much_as_it_allows(rubbed
     """The truth has a tangential force of half of the normal one, the friction is 0.1."""
     free = model_of(replace(rubbed, load=Load()), ("normal_force", "shear_force"))
     seen = observed_at(rubbed.mesh.markers, np.zeros((9, 2)), NOISE)
-    markers = MarkerModel(free, MarkerData.of(rubbed.mesh, seen, None, None))
+    markers = MarkerModel(free, MarkerData.of(rubbed, seen, None))
     response = free.response(values_of(free.unknowns, {"normal_force": 0.16, "shear_force": -0.08}), EXACT)
     shown = observed_at(rubbed.mesh.markers, markers.predicted(response)[0].reshape(-1, 2), NOISE)
     slippery = replace(rubbed, load=rubbed.load.model_copy(update={"friction": 0.1}))

@@ -14,7 +14,7 @@ from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.identification import FemBody, FemIdSolver
 from pinnray.solvers.identification.model import EXACT
 from pinnray.solvers.identification.search import Identifier
-from pinnray.solvers.identification.unknowns import DEFAULT, PARTS, RESOLVED, Doubt  # type: ignore[attr-defined]
+from pinnray.solvers.identification.unknowns import CORNERS, DEFAULT, PARTS, RESOLVED, Doubt  # type: ignore[attr-defined]
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Load
 from tests.solvers.conftest import observed_at
@@ -102,8 +102,14 @@ def test_a_finger_with_a_depth_is_in_no_plane_state(identified):
     solution = identified[2]
     field, mesh = solution.field, solution.problem.mesh
     share = 0.5 * solution.problem.material.poisson**2
-    doubt = Doubt.of_the_plane(replace(field.problem, finger=Design()))
-    assert doubt == (share, share)
+    seen = replace(solution.problem.observations, simulated=False)
+    own = replace(field.problem, finger=Design(), observations=seen)
+    doubt = Doubt.of(own, weighed=False)
+    assert doubt == (share, share, CORNERS)
+    # A drawing with roundings has them, and a press on a scale makes up for whatever is wrong.
+    assert not Doubt.of(replace(own, finger=Design(fillet_radius=0.3)), weighed=False).corners
+    scale = replace(own, observations=replace(seen, weighed=(2.0, 0.1)))
+    assert Doubt.of(scale, weighed=False) == RESOLVED
 
     def deviation(doubt: Doubt) -> np.ndarray:
         model = copy(field.members[0].model)
@@ -189,13 +195,14 @@ def test_a_marker_left_out_in_closed_form_is_nearly_that_of_a_refit(identified, 
         np.testing.assert_allclose(solution.left_out[marker], there, atol=0.5 * NOISE)
 
 
-def test_a_reaction_finds_young(problem):
-    """Twice as stiff under twice the force: the markers are the same, and the force tells."""
+def test_a_weighed_press_finds_young(problem):
+    """Twice as stiff under twice the force: the markers are the same, and the scale tells."""
     observed, true = twin(problem, "neo-hookean", {"normal_force": 0.18})
-    twice = 2 * true.hypothesis.force[1]
-    known = {"parameters": f"{FORCE},young", "reaction": twice, "reaction_error": 0.01, "prior": 3.0}
-    solution = sought(problem, observed, law="given", **known)
-    assert solution.stats["young"] == pytest.approx(2 * 11.4, rel=0.05)
+    twice, finger = 2 * true.hypothesis.force[1], Design()
+    weighed = replace(observed, weighed=(-finger.depth * twice, -0.01 * finger.depth * twice))
+    solution = sought(replace(problem, finger=finger), weighed, law="given", parameters=FORCE)
+    # Its prior is a third.
+    assert solution.stats["young"] == pytest.approx(2 * 11.4, rel=0.06)
     assert solution.reaction[1] == pytest.approx(twice, rel=0.02)
 
 

@@ -110,7 +110,7 @@ def unregistered(problem):
     loose = Registration(turn=2.0, shift=0.3, scale=0.01, tilt=0.01)
     observed = replace(observed, pressed=loose, drawn=loose)
     model = model_of(replace(problem, observations=observed))
-    return model, MarkerModel(model, MarkerData.of(problem.mesh, observed, None, None))
+    return model, MarkerModel(model, MarkerData.of(problem, observed, None))
 
 
 @pytest.mark.slow
@@ -128,7 +128,7 @@ def test_a_finger_beside_its_drawing_shows_what_lies_where_the_markers_are(probl
     pictures, points = response.hypothesis.pictures, markers.measurement.points
     there = pictures.drawn.moved(points)
     fixed = model_of(problem)
-    moved = MarkerModel(fixed, MarkerData.of(problem.mesh, observed_at(there, 0 * there, NOISE), None, None))
+    moved = MarkerModel(fixed, MarkerData.of(problem, observed_at(there, 0 * there, NOISE), None))
     exact = fixed.response(values_of(fixed.unknowns), EXACT)
     assert exact is not None
     shown = pictures.shown(points, moved.predicted(exact)[0].reshape(-1, 2))

@@ -22,14 +22,14 @@ def quick(few_elements, monkeypatch):
 def test_mechanics_predict_a_real_finger_better_than_none():
     """Held-out errors of u and v (rms), mm. Nothing is set by hand: every solver finds the picture's turn."""
     experiment, off = Experiment(FINGERS[1]), {}  # the harder one: its wall wraps around the cylinder
-    for solver in ("gp", "statfem", "fem-id"):  # `pinn-id` takes a minute: benchmarks/validation has it
+    for solver in ("gp", "fem-id"):  # `pinn-id` takes a minute: benchmarks/validation has it
         found = experiment.left_out(solver)
         assert found.left_out is not None
         off[solver] = np.sqrt(((found.left_out - experiment.seen.displacements) ** 2).mean())
     assert found.identified.contact == "cylinder"
     assert not any("COVERS" in said for said in found.status.warnings)
     assert off["fem-id"] < 0.45
-    assert off["fem-id"] < 0.8 * min(off["gp"], off["statfem"])
+    assert off["fem-id"] < 0.8 * off["gp"]
 
 
 @pytest.mark.slow

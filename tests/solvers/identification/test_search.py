@@ -34,7 +34,7 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     np.testing.assert_allclose(found.probabilities, [share[fit.law] for fit in found.fits])
     even = Identified(found.fits, np.array([0.25, 0.75]))
     forces, deviations = np.array([fit.component(np.array([0.0, -1.0])) for fit in found.fits]).T
-    force = even.force()
+    force = even.force
     mean = 0.25 * forces[0] + 0.75 * forces[1]
     variance = np.array([0.25, 0.75]) @ (deviations**2 + (forces - mean) ** 2)
     assert force.force.value == pytest.approx(mean)
@@ -64,14 +64,14 @@ def test_the_variance_of_the_force_is_the_sum_of_what_it_comes_from(identified):
         assert value == pytest.approx(-found.best.response.hypothesis.force[1])
         assert sum(parts.values()) == pytest.approx(deviation**2)
         assert all(part >= 0 for part in parts.values())
-        shares[finger is not None] = found.force().shares
-        assert sum(found.force().shares.values()) == pytest.approx(1)
+        shares[finger is not None] = found.force.shares
+        assert sum(found.force.shares.values()) == pytest.approx(1)
     assert shares[False]["third dimension"] < 0.1  # by what few elements leave
     assert next(iter(shares[True])) == "third dimension"
     # The observations of a body without a depth are most of the rest, and no frame was to be found.
     assert shares[False]["markers"] > 0.2
     assert shares[False]["frames"] == 0
-    assert found.force().advice.startswith(f"{100 * shares[True]['third dimension']:.0f}")
+    assert found.force.advice.startswith(f"{100 * shares[True]['third dimension']:.0f}")
 
 
 @pytest.mark.slow

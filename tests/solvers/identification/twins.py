@@ -35,7 +35,7 @@ def model_of(problem, names=NAMES):
 def marked(model):
     """The default finger's markers in a model."""
     observed = observed_at(model.unknowns.problem.mesh.markers, np.zeros((9, 2)), NOISE)
-    return MarkerModel(model, MarkerData.of(model.unknowns.problem.mesh, observed, None, None))
+    return MarkerModel(model, MarkerData.of(model.unknowns.problem, observed, None))
 
 
 def values_of(unknowns, changed=VALUES):

@@ -39,7 +39,7 @@ class PlainPinn:
 
         Args:
             problem: What is solved.
-            solver: A `PaperPinnSolver` for its settings; collocation at the nodes only.
+            solver: A `PaperPinnSolver` for its settings.
             dtype: Precision.
         """
         self.problem = problem

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from pinnray.solvers.pinn.paper.collocation import collocation_points
 from pinnray.solvers.pinn.paper.modified_mlp import ModifiedMlp
 from pinnray.solvers.pinn.paper.solver import PaperPinnSolver
 from pinnray.solvers.pinn.paper.trained_field import assess_training
@@ -50,17 +49,6 @@ def test_initial_weights_are_glorot_normal():
         assert matrix.std() == pytest.approx((2 / fans) ** 0.5, rel=3 / (2 * matrix.numel()) ** 0.5)
         assert abs(matrix.mean()) < 3 * matrix.std() / matrix.numel() ** 0.5
     assert max(bias.abs().max() for bias in (first[:, :, -1], *biases, output_bias)) == 0
-
-
-@pytest.mark.parametrize(("kind", "tolerance"), [("elements", 1e-12), ("nodes", 0.3)])
-def test_shares_make_a_mean(coarse_mesh, kind, tolerance):
-    """The mean of x² over the body exactly by elements; nodes are biased towards dense parts."""
-    corners = coarse_mesh.points[coarse_mesh.triangles, 0]
-    exact = (corners**2).sum(axis=1) + (corners[:, [1, 2, 0]] * corners).sum(axis=1)
-    mean = (coarse_mesh.areas * exact / 6).sum() / coarse_mesh.areas.sum()
-    points, shares = collocation_points(coarse_mesh, kind)
-    assert shares.sum() == pytest.approx(1.0, rel=1e-12)
-    assert (shares * points[:, 0] ** 2).sum() == pytest.approx(mean, rel=tolerance)
 
 
 class Scaled:

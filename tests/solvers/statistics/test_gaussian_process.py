@@ -1,5 +1,6 @@
 """`gp` against its own definition, and how it treats what it is not told."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.statistics.gaussian_process import GaussianProcessSolver
-from tests.solvers.conftest import hiding, observed_at
+from pinnray.solvers.statistics.posterior import Posterior, log_root_determinant
+from tests.solvers.conftest import check_gradient, hiding, observed_at
 from tests.solvers.statistics.kernels import matern
 
 
@@ -40,8 +42,7 @@ def conditioned(solution, points, given, *, axis):
     """Mean and variance of the process with its constants, by the textbook's equations 2.25 and 2.26."""
     observations = solution.problem.observations
     known, d = observations.points[given], observations.displacements[given, axis]
-    constants = solution.field.posterior.constants
-    variance, length = constants.amplitudes[axis] ** 2, constants.lengths[axis]
+    variance, length = solution.field.variances[axis], solution.field.lengths[axis]
 
     def kernel(first, second):
         return variance * matern(first, second, length)
@@ -63,9 +64,14 @@ def test_mean_and_deviation_are_those_of_the_process(solution, coarse_mesh):
         np.testing.assert_allclose(deviation**2, variance, atol=1e-5)
 
 
+def test_the_gradient_is_the_derivative_also_at_the_markers(solution, coarse_mesh):
+    check_gradient(solution, np.concatenate([coarse_mesh.at_centroids().points[::60], coarse_mesh.markers]))
+
+
 def test_the_constants_are_those_that_scikit_learn_finds(problem):
     """From its start in its ranges: 1e-6 of them, where the search ends at the flat top of the likelihood."""
-    found = GaussianProcessSolver().solve(problem).field.posterior.constants  # type: ignore[attr-defined]
+    found = GaussianProcessSolver().solve(problem).field
+    assert isinstance(found, Posterior)
     observations = problem.observations
     seen = observations.visible
     start = ConstantKernel(10.0, (1e-4, 1e6)) * Matern(30.0, (1.0, 1000.0), 2.5)
@@ -73,7 +79,7 @@ def test_the_constants_are_those_that_scikit_learn_finds(problem):
         process = GaussianProcessRegressor(start, alpha=observations.standard_deviations[seen, axis] ** 2)
         fitted = process.fit(observations.points[seen], observations.displacements[seen, axis])
         expected = np.exp(fitted.kernel_.theta)
-        assert [found.amplitudes[axis] ** 2, found.lengths[axis]] == pytest.approx(expected, rel=1e-6)
+        assert [found.variances[axis], found.lengths[axis]] == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_marker_that_is_left_out_has_no_say_at_all(problem, solution):
@@ -103,13 +109,26 @@ def test_three_markers_will_do_where_none_is_left_out(coarse_mesh):
 
 def test_the_evidence_is_that_of_the_normal_distribution(problem):
     solution = GaussianProcessSolver().solve(problem)
+    assert isinstance(solution.field, Posterior)
     observations = problem.observations
     seen = observations.visible
     points, expected = observations.points[seen], 0.0
-    constants = solution.field.posterior.constants  # type: ignore[attr-defined]
     for axis in (0, 1):
-        variance, length = constants.amplitudes[axis] ** 2, constants.lengths[axis]
+        variance, length = solution.field.variances[axis], solution.field.lengths[axis]
         covariance = variance * matern(points, points, length)
         covariance += np.diag(observations.standard_deviations[seen, axis] ** 2)
         expected += multivariate_normal.logpdf(observations.displacements[seen, axis], cov=covariance)
     assert solution.stats["log_evidence"] == pytest.approx(expected, abs=1e-4)
+
+
+def test_the_determinant_is_the_same_to_the_bit_whatever_lies_beside_the_matrix() -> None:
+    """NumPy takes a diagonal's logarithms one by one if their array follows the matrix, else many at once.
+
+    Where it can take many at once, some of these matrices show it.
+    """
+    generator = np.random.default_rng(2)
+    for _ in range(200):
+        root = np.tril(generator.random((18, 18))) + np.eye(18)
+        found = log_root_determinant(root)
+        assert found == sum(math.log(root[row, row]) for row in range(18))
+        assert found == pytest.approx(np.linalg.slogdet(root @ root.T)[1] / 2, rel=1e-12)

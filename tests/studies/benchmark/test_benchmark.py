@@ -14,6 +14,7 @@ from pinnray.solvers.fem.linear import FemSolver
 from pinnray.studies.benchmark import benchmark
 from pinnray.studies.benchmark.benchmark import BenchmarkJob, run_benchmark
 from pinnray.studies.benchmark.entry import Entry, load_entries
+from pinnray.studies.benchmark.page import COLUMNS, figure_texts
 from pinnray.studies.benchmark.problems import problem_set
 from pinnray.studies.benchmark.references import STEPS, Reference, unpacked
 from pinnray.studies.benchmark.scores import figures
@@ -123,6 +124,14 @@ def test_an_entry_is_a_file_and_those_of_other_sets_are_left_out(tmp_path, two):
     (tmp_path / "bad.json").write_text(json.dumps({"label": "bad"}))
     with pytest.raises(UserError, match=r"bad.json is no entry of the benchmark: settings"):
         load_entries(tmp_path, two)
+
+
+def test_what_the_reference_does_not_tell_apart_is_marked():
+    blank = dict.fromkeys(name for name, _ in COLUMNS.values())
+    rows = [blank | {"force": 0.02}, blank | {"force": -0.025}, blank]
+    force = list(COLUMNS).index("force,\n%")
+    for bound, said in {0.006: ["0.60", "+2.0 ≈", "−2.5 ≈"], 0.004: ["0.40", "+2.0", "−2.5"]}.items():
+        assert [row[force] for row in figure_texts(rows, {"force": bound})] == [*said, "–"]
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.picture_frame import HAND_HELD
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
-from pinnray.solvers.problem import Material, Problem
+from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import BUILT_IN, make_solver
 from pinnray.solvers.solution import Solution, Status
 from pinnray.solvers.solver import Progress, silent
@@ -28,7 +28,7 @@ from pinnray.studies.crossval import cross_validation
 from pinnray.studies.crossval.cross_validation import cross_validate
 from pinnray.studies.crossval.folds import ONE
 from pinnray.studies.crossval.scores import HELD_OUT, SCORED
-from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant, solver_variants
+from pinnray.studies.crossval.study import CrossvalStudy
 from pinnray.studies.sweep.store import JOURNAL, opened
 from pinnray.vision.measurements import write_measurements
 from tests.solvers.conftest import observed_at
@@ -170,7 +170,7 @@ def test_simulated_markers_of_a_file_are_called_simulated_everywhere(tmp_path, c
 def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, observations):
     study = CrossvalStudy(
         design=Design(),
-        variants=solver_variants([make_solver("gp")], Material()),
+        solvers=[make_solver("gp")],
         out=tmp_path / "out",
         mesh=MeshSettings(size=1.0),
         schemes=[ONE],
@@ -190,7 +190,7 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
 def test_folds_of_other_settings_or_of_a_class_without_source_are_run_again(tmp_path, monkeypatch):
     """An edit of a notebook's class cannot be told."""
     digest = partial(cross_validation._digests, seeds=2)
-    one, other = (SolverVariant("fem", FemSolver(degree=degree)) for degree in (1, 2))
+    one, other = (FemSolver(degree=degree) for degree in (1, 2))
     assert digest(one) == digest(one) != digest(other)
     monkeypatch.setattr(FemSolver, "__module__", "a notebook")
     assert digest(one) != digest(one)
@@ -210,7 +210,7 @@ class Refusing(FemSolver):
 def test_a_solver_that_fails_has_no_score_and_is_tried_again(tmp_path, in_line, observations):
     study = CrossvalStudy(
         design=Design(),
-        variants=[SolverVariant("gp", make_solver("gp")), SolverVariant("refusing", Refusing())],
+        solvers=[make_solver("gp"), Refusing()],
         out=tmp_path / "out",
         mesh=MeshSettings(size=2.0),
         schemes=[ONE],
@@ -223,7 +223,7 @@ def test_a_solver_that_fails_has_no_score_and_is_tried_again(tmp_path, in_line, 
         assert result.samples["solver"].unique().tolist() == ["gp"]
         assert Refusing.asked == times
     with pytest.raises(UserError, match="refusing, simulated, simulated: no"):
-        cross_validate(replace(study, variants=study.variants[1:]))
+        cross_validate(replace(study, solvers=study.solvers[1:]))
 
 
 OWN_SCRIPT = """
@@ -252,37 +252,22 @@ def test_a_class_of_the_calling_script_is_judged_beside_solvers_in_processes(tmp
     assert samples_of(tmp_path / "out")["solver"].unique().tolist() == ["gp", "fem"]
 
 
-def test_a_solver_that_chooses_its_weights_is_there_in_two_ways():
-    from pinnray.commands.studies.crossval import read_variants
-    from pinnray.options.shared import SolverOptions
-
-    variants = read_variants(SolverOptions(), "fem,fem-asm", Material())
-    labels = ["fem", "fem-asm", "fem-asm left-out"]
-    assert [variant.label for variant in variants] == labels
-    chosen = [variant.solver.settings().get("choose") for variant in variants]
-    assert chosen == [None, "given", "left-out"]
-    fixed = SolverOptions(solver_set=("fem-asm.choose=left-out",))
-    assert [variant.label for variant in read_variants(fixed, "fem-asm", Material())] == ["fem-asm"]
-    stiff = Material(law="neo-hookean")  # for which there is nothing to choose
-    assert [variant.label for variant in read_variants(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]
-
-
 @pytest.mark.slow
-def test_turned_pictures_are_told_and_cost_statfem_little(tmp_path, in_line):
+def test_turned_pictures_are_told_and_cost_gp_little(tmp_path, in_line):
     """Its held-out error is that of straight pictures within a half; `fem` knows of no picture."""
     frame, errors = '--frame "turn 3 deg, shift 0.3 mm, scale 1 %"', {}
     for name, option in (("straight", ""), ("turned", frame)):
-        line = f"--solvers statfem,fem --schemes one-out --seeds 1 {option}"
+        line = f"--solvers gp,fem --schemes one-out --seeds 1 {option}"
         assert run(line, tmp_path / name) == 0
         means = scores_of(tmp_path / name)["mean"]
         own = means.xs(("one-out", HELD_OUT), level=("scheme", "score"))
         errors[name] = dict(zip(own.index.get_level_values("solver"), own, strict=True))
-    assert errors["turned"]["statfem"] < 1.5 * errors["straight"]["statfem"]
+    assert errors["turned"]["gp"] < 1.5 * errors["straight"]["gp"]
     assert errors["turned"]["fem"] > errors["straight"]["fem"] + 0.1
 
 
 def test_every_seed_has_its_own_frame_of_the_pictures(tmp_path, observations):
-    study = CrossvalStudy(design=Design(), variants=[], out=tmp_path, frame=HAND_HELD)
+    study = CrossvalStudy(design=Design(), solvers=[], out=tmp_path, frame=HAND_HELD)
     turned = study.pressed_picture(observations.points, 0)
     np.testing.assert_allclose(np.abs(turned.values), [5.0, 1.0, 1.0, 0.02, 0.01, 0.01])
     np.testing.assert_array_equal(turned.centre, observations.points.mean(axis=0))

@@ -21,7 +21,7 @@ from pinnray.solvers.solver import FieldSettings, Progress, silent
 from pinnray.studies.crossval.fold_runner import SolverTask, run_folds
 from pinnray.studies.crossval.folds import ALL, LOAD, ONE, RANDOM, Fold, LoadCase
 from pinnray.studies.crossval.scores import FIELDS
-from pinnray.studies.crossval.study import SolverVariant
+from pinnray.studies.crossval.study import of_draw
 from pinnray.studies.crossval.true_fields import FieldSampler, TrueField
 from pinnray.studies.sweep.measurement import Measurement
 from tests.studies.crossval.conftest import NOISE
@@ -40,7 +40,7 @@ def task(coarse_mesh, truth, observations) -> SolverTask:
     return SolverTask(
         name="gp, sliding, joints",
         problem=Problem(coarse_mesh, finger=Design()),
-        variant=variant("gp"),
+        solver=make_solver("gp"),
         load_cases=[
             LoadCase("full", Load(), 1.0, 35.0),
             LoadCase("half", Load(displacement=(0.0, -5.0)), 0.5, 35.0),
@@ -54,10 +54,6 @@ def task(coarse_mesh, truth, observations) -> SolverTask:
 def folds(*wanted: Fold) -> dict[int, dict[str, Fold]]:
     """Folds of one seed."""
     return {0: {fold.name: fold for fold in wanted}}
-
-
-def variant(name: str, **settings: object) -> SolverVariant:
-    return SolverVariant(name, make_solver(name, **settings))
 
 
 def judged(task: SolverTask) -> list[dict[str, Any]]:
@@ -88,7 +84,7 @@ def test_a_solver_of_ones_own_is_judged_whatever_its_name(task, observations):
     task = replace(task, folds=folds(Fold(ONE, "marker 4", (3,))))
     given = observations.displacements
     plain, twice, thrice = (
-        np.array(judged(replace(task, variant=SolverVariant("fem", kind(degree=1))))[0]["errors_mm"]) + given
+        np.array(judged(replace(task, solver=kind(degree=1)))[0]["errors_mm"]) + given
         for kind in (FemSolver, Doubled, Tripled)  # in one folder: no fold of another class is taken over
     )
     np.testing.assert_allclose(twice, 2 * plain, rtol=1e-12)
@@ -121,12 +117,12 @@ class DrawingData(FieldSettings):
 
 
 @pytest.mark.parametrize("kind", [Drawing, DrawingData])
-def test_a_variant_keeps_class_and_settings_and_changes_the_seed(kind):
-    variant = SolverVariant("drawing", kind(size=2.0))
-    made = [variant.make(seed) for seed in (0, 2)]
+def test_a_solver_of_a_draw_keeps_class_and_settings_and_changes_the_seed(kind):
+    solver = kind(size=2.0)
+    made = [of_draw(solver, seed) for seed in (0, 2)]
     assert [type(each) for each in made] == [kind, kind]
     assert [each.given for each in made] == [(3, 2.0), (5, 2.0)]  # type: ignore[attr-defined]
-    assert variant.solver.settings() == {"seed": 3, "size": 2.0}
+    assert solver.settings() == {"seed": 3, "size": 2.0}
 
 
 def test_a_class_that_cannot_be_made_from_its_settings_is_refused_in_one_line():
@@ -134,31 +130,30 @@ def test_a_class_that_cannot_be_made_from_its_settings_is_refused_in_one_line():
         def __init__(self):
             super().__init__()
 
-    with pytest.raises(UserError, match=r"solver drawing cannot be made with {'seed': 4}: .*unexpected"):
-        SolverVariant("drawing", Fixed()).make(1)
+    with pytest.raises(UserError, match=r"solver drawing cannot be made with seed 4: .*unexpected"):
+        of_draw(Fixed(), 1)
 
 
-@pytest.mark.parametrize("name", ["gp", "fem-asm", pytest.param("fem-id", marks=pytest.mark.slow), "statfem"])
+@pytest.mark.parametrize("name", ["gp", "fem-asm", pytest.param("fem-id", marks=pytest.mark.slow)])
 def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name):
     """A marker that is held out is moved by 5 mm: so is its error, and no prediction changes."""
     fold = Fold(ONE, "marker 4", (3,))
     settings = SETTINGS.get(name, {"degree": 1})
     if name == "fem-asm":
         settings = {**settings, "weights": "precision", "choose": "left-out"}
-    own = replace(task, variant=variant(name, **settings), folds=folds(fold))
+    own = replace(task, solver=make_solver(name, **settings), folds=folds(fold))
     moved = observations.displacements.copy()
     moved[3] += [5.0, -5.0]
     other = replace(observations, displacements=moved)
     before = judged(own)[0]
-    relabelled = replace(own.variant, label="moved")  # so that the kept folds are not taken
-    after = judged(replace(own, variant=relabelled, observations=[[other, other]]))[0]
+    after = judged(replace(own, observations=[[other, other]]))[0]
     change = np.zeros((9, 2))
     change[3] = [-5.0, 5.0]
     np.testing.assert_allclose(np.array(after["errors_mm"]) - before["errors_mm"], change, atol=1e-12)
     assert all(after[name] == before[name] for name in FIELDS)
 
 
-@pytest.mark.parametrize("name", ["gp", "fem-asm", "statfem"])
+@pytest.mark.parametrize("name", ["gp", "fem-asm"])
 def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     task, coarse_mesh, observations, truth, name
 ):
@@ -166,7 +161,7 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     held = (1, 3)
     settings = SETTINGS.get(name, {"degree": 1})
     both = folds(Fold(ALL, "all", ()), Fold(RANDOM, "draw 1", held))  # the second one finds shared work
-    _, outcome = judged(replace(task, variant=variant(name, **settings), folds=both))
+    _, outcome = judged(replace(task, solver=make_solver(name, **settings), folds=both))
     visible = ~np.isin(np.arange(9), held)
     problem = Problem(coarse_mesh, observations=replace(observations, visible=visible))
     solution = make_solver(name, **settings).solve(problem)
@@ -184,18 +179,18 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     mine = solution.state(rule.location).von_mises
     squares = [(rule.weights * values**2).sum() for values in (mine - true, true)]
     assert outcome["von_mises"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
-    if name in ("gp", "statfem"):
+    if name == "gp":
         spread = solution.field.standard_deviation(coarse_mesh.locate(observations.points))  # type: ignore[attr-defined]
         np.testing.assert_allclose(outcome["deviations_mm"], np.hypot(spread, NOISE), rtol=1e-5)
     else:
         assert outcome["deviations_mm"] is None
 
 
-@pytest.mark.parametrize("name", ["gp", "fem-asm", "statfem"])
+@pytest.mark.parametrize("name", ["gp", "fem-asm"])
 def test_what_was_learnt_is_carried_to_half_the_load(task, name):
     """All of it is linear, and so is this truth: half the load has half the errors."""
     settings = SETTINGS.get(name, {"degree": 1})
-    outcomes = judged(replace(task, variant=variant(name, **settings)))
+    outcomes = judged(replace(task, solver=make_solver(name, **settings)))
     np.testing.assert_allclose(outcomes[2]["errors_mm"], 0.5 * np.array(outcomes[0]["errors_mm"]), atol=1e-6)
     assert outcomes[2]["displacement"] == pytest.approx(outcomes[0]["displacement"], rel=1e-5)
 
@@ -204,9 +199,7 @@ def test_what_was_learnt_is_carried_to_half_the_load(task, name):
 def test_an_identified_finger_is_carried_to_half_the_load(task, coarse_mesh, observations):
     """By the solver's own `transferred`."""
     solver = make_solver("fem-id", **SETTINGS["fem-id"])
-    own = replace(
-        task, variant=variant("fem-id", **SETTINGS["fem-id"]), folds=folds(Fold(LOAD, "half", (), 1))
-    )
+    own = replace(task, solver=solver, folds=folds(Fold(LOAD, "half", (), 1)))
     (outcome,) = judged(own)
     problem = Problem(coarse_mesh, Material(law="neo-hookean"), observations=observations)
     half = replace(problem, load=task.load_cases[1].load)
@@ -252,11 +245,11 @@ def test_errors_are_those_in_the_picture_whose_frame_was_found(task, truth, obse
     turned = Homography(centre, np.array([3.0, 0.3, -0.2, 0.01, 0.0, 0.0]))
     pictures = Pictures(turned, Homography(centre, np.zeros(6)))
     results = []
-    for label, each in (("fixed", truth), ("turned", replace(truth, pictures=pictures))):
+    for each in (truth, replace(truth, pictures=pictures)):
         monkeypatch.setattr(
             "pinnray.studies.crossval.fold_runner.refitter", lambda *_, each=each: lambda _: each
         )
-        results.append(judged(replace(task, variant=replace(task.variant, label=label))))
+        results.append(judged(task))
     for at_full_load, fixed, found in zip((True, True, False), *results, strict=True):
         moved = observations.displacements if at_full_load else 0.0
         field = np.array(fixed["errors_mm"]) + moved
@@ -272,7 +265,7 @@ def test_the_stress_is_that_of_the_material_that_a_solver_has_found(task, truth,
     )
     halved = judged(task)[0]
     monkeypatch.setattr("pinnray.studies.crossval.fold_runner.refitter", lambda *_: lambda _: truth)
-    own = judged(replace(task, variant=replace(task.variant, label="own")))[0]
+    own = judged(task)[0]
     assert halved["displacement"] == own["displacement"]
     assert halved["von_mises"] > own["von_mises"] + 0.1  # 0.69 and 0.48
 
@@ -283,6 +276,6 @@ def test_an_error_that_is_no_number_is_in_no_mean(task, monkeypatch):
         "pinnray.studies.crossval.fold_runner.FieldSampler.of_solution",
         lambda *_: replace(task.truths[0].sampled, markers=np.full((9, 2), np.nan)),
     )
-    (failed,) = run_folds(replace(task, variant=variant("fem")), lambda *_: None)
+    (failed,) = run_folds(replace(task, solver=make_solver("fem")), lambda *_: None)
     said = "fem: its displacement is not finite at every marker"
     assert (failed.number, failed.state, failed.message) == (task.name, "failed", said)

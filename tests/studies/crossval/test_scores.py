@@ -11,7 +11,6 @@ from scipy.stats import t
 from pinnray.geometry.finger.design import Design
 from pinnray.runtime.tables import terminal_table
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.registry import make_solver
 from pinnray.studies.crossval.folds import (
     ALL,
     DRAWS,
@@ -26,7 +25,7 @@ from pinnray.studies.crossval.folds import (
 )
 from pinnray.studies.crossval.result import CrossvalResult
 from pinnray.studies.crossval.scores import Sample, bootstrap, difference_table, left_out_table, score_table
-from pinnray.studies.crossval.study import CrossvalStudy, SolverVariant
+from pinnray.studies.crossval.study import CrossvalStudy
 from pinnray.studies.crossval.tables import all_tables, truth_tables
 from pinnray.studies.crossval.true_fields import SampledField, TrueField
 from pinnray.studies.sweep.measurement import Measurement
@@ -169,8 +168,7 @@ def result(
         for number, solver in enumerate(solvers, start=1)
         for scheme, held, force in ((ALL, (), -0.123), (ONE, (0,), np.nan), (ONE, (1,), np.nan))
     ]
-    variants = [SolverVariant(solver, make_solver("gp")) for solver in solvers]
-    study = CrossvalStudy(design=Design(), variants=variants, out=Path(), truths=[case[0] for case in cases])
+    study = CrossvalStudy(design=Design(), solvers=[], out=Path(), truths=[case[0] for case in cases])
     none = np.zeros((0, 2))
     true = TrueField(SampledField(none, none, np.zeros((0, 2, 2))), 1.0, 35.0)
     truths = {truth: true for truth, _ in cases}

@@ -75,7 +75,7 @@ def test_no_command_takes_its_usual_size_for_one_that_is_asked_for(tmp_path: Pat
     options, usual = FingerOptions(section=write_beam_mesh(tmp_path / "beam.msh")), MeshSettings(size=0.5)
     finger, sizes = options.read("fast", usual)
     assert sizes is None
-    assert (Job(finger, []).mesh, CrossvalStudy(design=finger, variants=[], out=tmp_path).mesh) == (
+    assert (Job(finger, []).mesh, CrossvalStudy(design=finger, solvers=[], out=tmp_path).mesh) == (
         None,
         None,
     )
@@ -83,6 +83,6 @@ def test_no_command_takes_its_usual_size_for_one_that_is_asked_for(tmp_path: Pat
     assert FingerOptions(mesh_size=0.25).read("fast", usual)[1] == MeshSettings()
     design = FingerOptions().read()[0]
     assert Job(design, []).mesh == MeshSettings()
-    assert CrossvalStudy(design=design, variants=[], out=tmp_path).mesh == usual
+    assert CrossvalStudy(design=design, solvers=[], out=tmp_path).mesh == usual
     asked = MeshSettings()
     assert Job(finger, [], mesh=asked).mesh == asked
