@@ -1,14 +1,12 @@
 """Score of a robot model: its shapes and forces against finite elements, at loads that no fit has seen."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pinnray.robots.chain import MM
+from pinnray.robots.chain import MM, Chain
 from pinnray.robots.presses import Press, PressedFinger
-from pinnray.robots.simulation import Model, Rest, pressed_in_mujoco
-from pinnray.runtime.arrays import FloatArray
+from pinnray.robots.simulation import Rest, pressed_in_mujoco
 from pinnray.runtime.tables import Cell
 
 
@@ -55,7 +53,6 @@ class ScoredPress:
 class ModelScore:
     """Errors of a model at all loads."""
 
-    model: str
     presses: tuple[ScoredPress, ...]
 
     @property
@@ -88,9 +85,8 @@ class ModelScore:
         )
 
 
-def scored(model: Model, finger: PressedFinger, loads: Sequence[Press]) -> ModelScore:
-    """Press a model under loads and compare with the finite elements."""
-    rest: FloatArray = MM * finger.front
-    depth = finger.problem.mesh.depth
-    found = (pressed_in_mujoco(model, load, finger.radius, depth, rest) for load in loads)
-    return ModelScore(model.name, tuple(ScoredPress(*pair) for pair in zip(loads, found, strict=True)))
+def scored(text: str, chain: Chain, finger: PressedFinger) -> ModelScore:
+    """Press a chain, with its MJCF, under the loads held out and compare with the finite elements."""
+    rest, depth = MM * finger.front, finger.problem.mesh.depth
+    found = (pressed_in_mujoco(text, chain, load, finger.radius, depth, rest) for load in finger.held_out)
+    return ModelScore(tuple(ScoredPress(*pair) for pair in zip(finger.held_out, found, strict=True)))
