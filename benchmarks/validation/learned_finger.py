@@ -1,7 +1,7 @@
-"""A finger that is measured once: python -m benchmarks.validation.learned_finger [SEEDS]
+"""A finger that is measured once: ten unseen presses, after three presses and a weighed one, and without.
 
-A finger whose modulus is known to 30 % is pressed ten times at unseen places, after three presses and a weighed one
-have taught it, and without them: errors of the force, half intervals, and how many hold. Some 70 s a seed.
+`python -m benchmarks.validation.learned_finger [SEEDS]` prints errors of the force, half intervals and how
+often they hold. The modulus is known to 30 %. Some 70 s a seed.
 """
 
 import sys

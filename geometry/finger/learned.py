@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from pinnray.geometry.finger.parameters import CheckedModel
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import atomic_path
+from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_toml
 
 TABLE = "learned"
@@ -79,7 +80,15 @@ def read_learned(path: Path | None) -> Learned | None:
     if path is None or not path.is_file():
         return None
     table = read_toml(path, "design file").get(TABLE)
-    return None if table is None else Learned(**table)
+    if table is None:
+        return None
+    needed = [name for name, field in Learned.model_fields.items() if field.is_required()]
+    if missing := [name for name in needed if not isinstance(table, dict) or name not in table]:
+        raise UserError(f"{path}: the table {TABLE} has no {missing[0]}; --learn writes a whole one")
+    try:
+        return Learned(**table)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
 
 
 def write_learned(path: Path, learned: Learned, lines: str) -> None:

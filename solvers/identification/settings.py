@@ -37,6 +37,8 @@ class IdentifyingSolver(FieldSettings):
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        if self.parameters:
+            parse_unknowns(self.name, self.parameters, self.sought)  # or says what is wrong
         self.check_positive("prior")
         self.check_not_negative("marker_radius")
 

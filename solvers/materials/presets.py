@@ -40,10 +40,10 @@ such number was found.
 TPU_SPREAD, SYLGARD_SPREAD = 0.2, 0.26
 """Standard deviations of Young's moduli over them.
 
-Printed TPU has 100 to 146 MPa by the direction of its lines alone (Eng. Proc. 113 (2025) 19), and sources of one
-filament differ by a factor of two: of logarithms that are all as likely within it, the deviation is ln 2 / 12^½.
-That of Sylgard 184 is of the range that its source gives. Of the other silicones no spread was found: their
-moduli count as exact.
+Printed TPU has 100 to 146 MPa by the direction of its lines alone (Eng. Proc. 113 (2025) 19), and sources of
+one filament differ by a factor of two: of logarithms that are all as likely within it, the deviation is
+ln 2 / 12^½. That of Sylgard 184 is of the range that its source gives. Of the other silicones no spread was
+found: their moduli count as exact.
 """
 
 SMOOTH_ON = "Smooth-On, technical bulletin, 100 % modulus (ASTM D412)"

@@ -26,6 +26,8 @@ FILES: dict[str, str | bytes] = {
     "empty.csv": "",
     "binary.csv": bytes(range(256)),
     "good.csv": f"{HEADER}\n20,-1,0,-5\n85,-1,-2,-0.5\n",
+    "weighed.csv": f"# weighed: heavy\n{HEADER}\n20,-1,0,-5\n",
+    "taught.toml": '[learned]\npictures = 1\nunknowns = ["young"]\n',
     "file": "",
     "far.csv": f"{HEADER}\n20,-1,1e308,0\n",
     "underscore.csv": f"{HEADER}\n2_0,-1,0,0\n",
