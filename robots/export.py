@@ -111,7 +111,7 @@ def _header(pressed: PressedFinger, settings: ExportSettings) -> Sequence[str]:
         "Frame: x from the base to the tip, y out of the front face, z along the depth; the base is held.",
         f"Springs of {settings.hinges} hinges fitted to fem-nonlinear ({material.law}, "
         f"E = {material.young:g} MPa, nu = {material.poisson:g}) under a cylinder of radius "
-        f"{pressed.radius:g} mm without friction, up to a stroke of {stroke:g} mm, beyond which it is not known.",
+        f"{pressed.radius:g} mm without friction, up to a stroke of {stroke:g} mm; beyond, it is not known.",
         f"Plane strain: a force is N/mm times the depth of {problem.mesh.depth:g} mm. Gravity is off.",
         f"Damping is not fitted: a loss factor of {settings.loss_factor:g} is stated.",
         "Attached to another model, whose time step holds, give that one at most 1 ms: MuJoCo's 2 ms make it "
