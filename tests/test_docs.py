@@ -452,7 +452,7 @@ def test_the_measurements_in_the_docs_can_be_read(tmp_path):
 @pytest.mark.parametrize(
     ("page", "column", "listed"),
     [
-        (FORCE, "parameter that can be found", "pinnray.solvers.identification.unknowns:NAMES"),
+        (FORCE, "parameter that can be found", "pinnray.solvers.identification.unknowns:DEFAULT"),
         (OWN_TRUTH, "scheme", "pinnray.studies.crossval.folds:SCHEMES"),
         (OWN_TRUTH, "truth", "pinnray.comparison.evaluation.truths:TRUTHS"),
     ],

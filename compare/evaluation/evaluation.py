@@ -194,6 +194,7 @@ class Evaluation:
                 arrays[entry.name] = value
             elif entry.name not in ("history", "certificate"):
                 header[entry.name] = dict(value) if isinstance(value, Mapping) else value
+        header["identified"] = FORCE.dump_python(self.identified, mode="json")
         header["figures"] = self.figures and asdict(self.figures)
         header["uncertainty"] = self.uncertainty and self.uncertainty.model_dump()
         arrays |= {f"history_{name}": column for name, column in self.history.items()}

@@ -84,7 +84,7 @@ def read_learned(path: Path | None) -> Learned | None:
         return None
     needed = [name for name, field in Learned.model_fields.items() if field.is_required()]
     if missing := [name for name in needed if not isinstance(table, dict) or name not in table]:
-        raise UserError(f"{path}: the table {TABLE} has no {missing[0]}; --learn writes a whole one")
+        raise UserError(f"{path}: the table {TABLE} has no {missing[0]}; let it be learned anew")
     try:
         return Learned(**table)
     except UserError as error:

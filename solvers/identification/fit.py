@@ -35,7 +35,7 @@ NORMAL = float(ndtri((1 + LEVEL) / 2))
 SOURCES = {
     "third dimension": "the third dimension",
     "markers": "the errors of the markers",
-    "misfit": "what no finger of this drawing explains: see clamp, drawing and the frames of the pictures",
+    "misfit": "what no finger of this drawing explains",
     "contact": "place, width and pressure of the contact",
     "corners": "the roundings of the cavities' corners, which the drawing leaves out",
     "modulus": "Young's modulus",

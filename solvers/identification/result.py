@@ -34,6 +34,8 @@ CONTRADICTED = 20.0
 """φ from which the markers are not those of the finger: it is 1 to 2 over the truths of
 `comparison.evaluation.truths`, 60 with a clamp that gave by 0.5 degrees and 0.4 mm, and 270 to 410 with
 markers in another order."""
+LEAST_SHARE = 0.01
+"""Least share of the variance of the force that is told."""
 PROBABLE = 0.01
 """Least probability of a law whose field is kept."""
 
@@ -70,14 +72,16 @@ class Identified:
         parts = self.best.variances(stroke) | {"law": float(self.probabilities @ found**2)}
         whole = sum(parts.values()) or 1.0
         shares = {name: parts[name] / whole for name in sorted(parts, key=parts.__getitem__, reverse=True)}
-        first, share = next(iter(shares.items()))
+        split = ", ".join(
+            f"{100 * share:.0f} % {SOURCES[name]}" for name, share in shares.items() if share >= LEAST_SHARE
+        )
         narrower = narrowing_phrase(self.best, stroke, parts["law"])
         return IdentifiedForce(
             force,
             self._mean([fit.component(across) for fit in self.fits]),
             self._mean(places) if places else None,
             shares,
-            f"{100 * share:.0f} % of the variance of the force comes from {SOURCES[first]}. {narrower}",
+            f"The variance of the force comes from: {split}. {narrower}",
             self.best.contact,
             self.best.learned,
         )

@@ -62,7 +62,11 @@ def test_a_width_that_no_terminal_has_does_not_count(columns, monkeypatch, capsy
 
 def test_a_preset_and_a_material_give_what_no_option_gives() -> None:
     options = PhysicsOptions(material="tpu-95a", poisson=0.4)
-    assert options.values("paper") == {"load": "point", "young": 26.0, "poisson": 0.4, "loss": 0.1}
+    usual = {"young": 26.0, "young_deviation": 5.2, "loss": 0.1}
+    assert options.values("paper") == {"load": "point", "poisson": 0.4, **usual}
+    # The spread of a preset is not that of another modulus, which may have its own.
+    assert PhysicsOptions(material="tpu-95a", young="20").read()[0].young_deviation == 0
+    assert PhysicsOptions(material="tpu-95a", young="20±1").read()[0].young_deviation == 1
     assert PhysicsOptions(load="mean").read("paper")[1].kind == "mean"  # though it is the usual one
 
 

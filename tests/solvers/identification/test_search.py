@@ -71,7 +71,8 @@ def test_the_variance_of_the_force_is_the_sum_of_what_it_comes_from(identified):
     # The observations of a body without a depth are most of the rest, and no frame was to be found.
     assert shares[False]["markers"] > 0.2
     assert shares[False]["frames"] == 0
-    assert found.force.advice.startswith(f"{100 * shares[True]['third dimension']:.0f}")
+    said = f"comes from: {100 * shares[True]['third dimension']:.0f} % the third dimension"
+    assert said in found.force.advice
 
 
 @pytest.mark.slow
