@@ -1,6 +1,6 @@
 """A model for MuJoCo pressed by the cylinder of a load, until it is at rest.
 
-Needs the extra `robots`: MuJoCo 4, whose earlier versions have other elastic constants of flexible bodies.
+Needs the extra `robots`.
 """
 
 import importlib.util
@@ -15,7 +15,6 @@ import numpy as np
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.mjcf import HARDER
 from pinnray.robots.presses import Press
-from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 
@@ -31,21 +30,6 @@ FAULTS = ("CONTACTFULL", "CNSTRFULL", "BADQPOS", "BADQVEL", "BADQACC")
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
-    """A model for MuJoCo.
-
-    Attributes:
-        name: Of its file.
-        text: MJCF.
-        front: From a model and its state, the places of the front's points, shape (m, 2), m.
-    """
-
-    name: str
-    text: str
-    front: Callable[[Any, Any], FloatArray]
-
-
-@dataclass(frozen=True, eq=False)
 class Rest:
     """A pressed model at rest."""
 
@@ -56,23 +40,16 @@ class Rest:
 
 
 def check_mujoco() -> None:
-    """Raise a `UserError` unless MuJoCo 4 is installed."""
+    """Raise a `UserError` unless MuJoCo is installed."""
     if importlib.util.find_spec("mujoco") is None:
         raise UserError("MuJoCo is not installed; pip install 'pinn-ray[robots]'")
-    import mujoco
-
-    if int(mujoco.__version__.split(".")[0]) < 4:
-        raise UserError(
-            f"this is MuJoCo {mujoco.__version__}, whose flexible bodies have other elastic constants; "
-            "pip install 'pinn-ray[robots]'"
-        )
 
 
-def chain_front(chain: Chain, rest: FloatArray) -> Callable[[Any, Any], FloatArray]:
+def chain_front(chain: Chain, rest: FloatArray) -> Callable[[Any], FloatArray]:
     """The front's points, at rest in shape (m, 2), m, as the simulator's links carry them."""
     links = chain.link_of(rest)
 
-    def places(model: Any, data: Any) -> FloatArray:
+    def places(data: Any) -> FloatArray:
         found = rest.copy()
         for link in range(1, chain.hinges + 1):
             body, own = data.body(f"link{link}"), links == link
@@ -83,26 +60,14 @@ def chain_front(chain: Chain, rest: FloatArray) -> Callable[[Any, Any], FloatArr
     return places
 
 
-def flex_front(body: SolidMesh, rest: FloatArray) -> Callable[[Any, Any], FloatArray]:
-    """The front's points, at rest in shape (m, 2), m, between the body's nodes, meant over the depth."""
-    flat = np.unique(body.section.boundary("front"))
-    flat = flat[body.section.points[flat, 0].argsort()]
-    nodes = flat + len(body.section.points) * np.arange(body.levels)[:, None]
-    drawn = MM * body.section.points[flat]
-
-    def places(model: Any, data: Any) -> FloatArray:
-        moved = data.flexvert_xpos.reshape(-1, 3)[nodes, :2].mean(axis=0) - drawn
-        between = [np.interp(rest[:, 0], drawn[:, 0], each) for each in moved.T]
-        return np.asarray(rest + np.column_stack(between))
-
-    return places
-
-
-def pressed_in_mujoco(model: Model, load: Press, radius: float, depth: float, rest: FloatArray) -> Rest:
+def pressed_in_mujoco(
+    text: str, chain: Chain, load: Press, radius: float, depth: float, rest: FloatArray
+) -> Rest:
     """Press a model as a load says.
 
     Args:
-        model: The model.
+        text: The MJCF of a chain.
+        chain: The chain.
         load: Centre and travel of the cylinder.
         radius: Of the cylinder, mm.
         depth: Of the finger, mm.
@@ -110,7 +75,7 @@ def pressed_in_mujoco(model: Model, load: Press, radius: float, depth: float, re
     """
     import mujoco
 
-    spec = mujoco.MjSpec.from_string(model.text)
+    spec = mujoco.MjSpec.from_string(text)
     centre = MM * load.centre
     body = spec.worldbody.add_body(name="indenter", mocap=True, pos=[*centre, 0])
     body.add_geom(
@@ -121,6 +86,7 @@ def pressed_in_mujoco(model: Model, load: Press, radius: float, depth: float, re
         solref=[float(each) for each in HARDER["solref"].split()],
         solimp=[*(float(each) for each in HARDER["solimp"].split()), 0.5, 2],
     )
+    front = chain_front(chain, rest)
     with _silent_warnings():
         compiled = spec.compile()
         data = mujoco.MjData(compiled)
@@ -134,7 +100,7 @@ def pressed_in_mujoco(model: Model, load: Press, radius: float, depth: float, re
             mujoco.mj_step(compiled, data)
             if count * step > RAMP + (1 - MEAN) * HOLD:
                 forces.append(_force(compiled, data))
-                places.append(model.front(compiled, data))
+                places.append(front(data))
         seconds = (time.process_time() - started) / (RAMP + HOLD)
     faults = sum(data.warning[getattr(mujoco.mjtWarning, f"mjWARN_{name}")].number for name in FAULTS)
     force = np.mean(forces, axis=0)
