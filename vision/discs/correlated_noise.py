@@ -13,7 +13,7 @@ import numpy as np
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.vision.discs.disc_image_model import EDGE, EDGES, Array, X, Y, disc_image, irregular_columns
-from pinnray.vision.discs.fit_priors import prior_and_limits
+from pinnray.vision.discs.fit_priors import Known, prior_and_limits
 from pinnray.vision.discs.least_squares import DiscFit, beyond_limits, normal_matrices, robust_weights
 from pinnray.vision.discs.pixel_windows import PixelWindows
 
@@ -27,7 +27,7 @@ def correlated_noise(
     residuals: Array,
     chosen: BoolArray,
     radii: FloatArray,
-    tolerance: float,
+    known: Known,
 ) -> FloatArray:
     """Variance of the noise that counts for the centres, over that of the fit.
 
@@ -37,7 +37,7 @@ def correlated_noise(
         residuals: Of the pixels, shape (n, p).
         chosen: Pixels that belong to the model, shape (n, p).
         radii: Known or guessed, shape (n,), pixels.
-        tolerance: Of the radii, see `prior_and_limits`.
+        known: Of the discs.
 
     Returns:
         By sums over neighbours and by single pixels, shape (n, 2); not a number where no pixel counts.
@@ -49,7 +49,7 @@ def correlated_noise(
     levels, derivatives = disc_image(parameters.astype(np.float32), window.x, window.y)
     weights = robust_weights(residuals / noise, chosen & ~beyond_limits(window.values, levels))
     present = parameters[:, irregular_columns(parameters.shape[1])[1] :].reshape(-1, EDGES, EDGE).any(axis=2)
-    prior, _ = prior_and_limits(parameters, present, radii, tolerance)
+    prior, _ = prior_and_limits(parameters, present, radii, known)
     inverse = np.linalg.inv(normal_matrices(derivatives, weights, fitted.variance, prior.precision))
     influence = (inverse[:, [X, Y]] / fitted.variance[:, None, None]).astype(np.float32) @ derivatives
     scores = influence * (weights * residuals / noise)[:, None]

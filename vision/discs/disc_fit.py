@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, frozen_array
 from pinnray.vision.discs import disc_image_model as model
+from pinnray.vision.discs.fit_priors import Known
 from pinnray.vision.discs.fit_stages import fit_discs_of_one_size
 from pinnray.vision.discs.least_squares import DiscFit
+from pinnray.vision.discs.pixel_windows import LIGHTEST
 from pinnray.vision.frames.frame import GreyImage
 
 KNOWN_RADIUS = 0.01
@@ -76,12 +78,23 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
     sizes = np.broadcast_to(guesses[:, 2] if radii is None else radii, (len(guesses),))
     sizes = frozen_array(sizes, dtype=np.float64, shape=(None,), name="radii")
     fit = DiscFit.start(np.zeros((len(guesses), model.WIDTH)), np.zeros((len(guesses), 2), dtype=np.int64))
-    tolerance = np.inf if radii is None else KNOWN_RADIUS
-    groups = np.rint(np.log(sizes) / np.log(1.4))  # of about one size, which share the shape of their windows
-    for group in np.unique(groups):
-        (alike,) = np.nonzero(groups == group)
-        fit.put(alike, fit_discs_of_one_size(grey, guesses[alike, :2], sizes[alike], tolerance))
+    known = Known.of(len(guesses), np.inf if radii is None else KNOWN_RADIUS)
+    _fit(fit, grey, guesses, sizes, known, np.ones(len(guesses), dtype=bool))
+    if (clipped := fit.parameters[:, model.LIGHT] >= LIGHTEST).any():
+        _fit(
+            fit, grey, guesses, sizes, known.lit(fit, fit.settled & (fit.seen >= LEAST_SEEN_UNKNOWN)), clipped
+        )
     return _accepted(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
+
+
+def _fit(
+    fit: DiscFit, grey: GreyImage, guesses: FloatArray, radii: FloatArray, known: Known, chosen: BoolArray
+) -> None:
+    """Fit the chosen discs; those of about one size at once, which share the shape of their windows."""
+    sizes = np.rint(np.log(radii) / np.log(1.4))
+    for size in np.unique(sizes[chosen]):
+        (alike,) = np.nonzero((sizes == size) & chosen)
+        fit.put(alike, fit_discs_of_one_size(grey, guesses[alike, :2], radii[alike], known.at(alike)))
 
 
 def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs:

@@ -1,10 +1,14 @@
 """Prior of the parameters of a disc's image, and the longest steps of its fit."""
 
-import numpy as np
+from typing import NamedTuple
 
-from pinnray.runtime.arrays import BoolArray, FloatArray
+import numpy as np
+from scipy.special import softmax
+
+from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.vision.discs.disc_image_model import (
     BLUR,
+    CONTRAST,
     EDGES,
     HALO,
     LIGHT,
@@ -17,7 +21,7 @@ from pinnray.vision.discs.disc_image_model import (
     Y,
     irregular_columns,
 )
-from pinnray.vision.discs.least_squares import DiscPrior
+from pinnray.vision.discs.least_squares import DiscFit, DiscPrior
 from pinnray.vision.discs.pixel_windows import LIGHTEST
 
 DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.05}
@@ -31,14 +35,67 @@ OUTLINE_DEVIATION, OUTLINE_STEP = 0.05, 0.05
 """The same for the waves of an irregular outline, over the radius."""
 HALO_DEVIATION, HALO_STEP = 1.0, 0.3
 """The same for the halo of a sharpened edge, over the contrast."""
+BRIGHTER = 3.0
+"""Largest light at a disc over the median, and the median over the least; beyond, a level is no measure."""
 CLIPPED = 100.0
 """Prior standard deviation of a clipped level, grey levels."""
 CLIPPED_SHADE = 0.002
-"""Prior standard deviation of the relative gradient of the light at a disc on a clipped ground, 1/pixel."""
+"""Prior standard deviation of the mean relative gradient of the light, 1/pixel."""
+SCATTERS = np.geomspace(1e-5, 5e-3, 32)
+"""Standard deviations of the gradient at discs from its mean that are weighed, 1/pixel."""
+
+
+class Known(NamedTuple):
+    """Knowledge of discs before their fit.
+
+    Attributes:
+        tolerance: Relative standard deviation of the radii; infinite if they are guessed.
+        shade: Relative gradient of the light at discs on a clipped ground, shape (n, 2), 1/pixel.
+        shade_deviation: Its standard deviations, shape (n, 2).
+    """
+
+    tolerance: float
+    shade: FloatArray
+    shade_deviation: FloatArray
+
+    @classmethod
+    def of(cls, count: int, tolerance: float) -> "Known":
+        """Knowledge without any of the light."""
+        return cls(tolerance, np.zeros((count, 2)), np.full((count, 2), CLIPPED_SHADE))
+
+    def at(self, places: IntArray) -> "Known":
+        """The same of some discs."""
+        return self._replace(shade=self.shade[places], shade_deviation=self.shade_deviation[places])
+
+    def lit(self, fit: DiscFit, trusted: BoolArray) -> "Known":
+        """The same with the gradient of the light at a disc from the trusted others in the picture.
+
+        The gradients, which are relative, times the light itself, by the levels within the discs, scatter
+        normally about a mean; the variance of the scatter is its expectation over `SCATTERS`, which are
+        equally probable before.
+
+        Source: A. Gelman et al., Bayesian Data Analysis, third edition, 2013, section 5.4.
+        """
+        within = np.maximum(fit.parameters[:, LIGHT] - fit.parameters[:, CONTRAST], 1.0)
+        light = np.clip(within / np.median(within), 1 / BRIGHTER, BRIGHTER)[:, None]
+        precision = np.where(trusted[:, None], np.maximum(fit.shade_precision, 1e-3), 1e-3)
+        fitted = light * fit.parameters[:, [SHADE_X, SHADE_Y]]
+        variances = light**2 / precision
+        weights = 1 / (SCATTERS[:, None, None] ** 2 + variances)
+        total = weights.sum(axis=1) + CLIPPED_SHADE**-2.0
+        mean = (weights * fitted).sum(axis=1) / total
+        evidence = (np.log(weights).sum(axis=1) - (weights * (fitted - mean[:, None]) ** 2).sum(axis=1)) / 2
+        evidence -= (np.log(total) + (mean / CLIPPED_SHADE) ** 2) / 2
+        scatter = SCATTERS**2 @ softmax(evidence.sum(axis=1))
+        weights = 1 / (scatter + variances)
+        others = weights.sum(axis=0) - weights + CLIPPED_SHADE**-2.0
+        shade = ((weights * fitted).sum(axis=0) - weights * fitted) / others
+        deviation = np.sqrt(scatter + 1 / others)
+        return self._replace(shade=shade / light, shade_deviation=deviation / light)
 
 
 def prior_and_limits(
-    start: FloatArray, present: BoolArray, radii: FloatArray, tolerance: float
+    start: FloatArray, present: BoolArray, radii: FloatArray, known: Known
 ) -> tuple[DiscPrior, FloatArray]:
     """Prior of the parameters, and their longest steps; absent edges keep zero contrast.
 
@@ -46,7 +103,7 @@ def prior_and_limits(
         start: Parameters at the start of the fit, shape (n, m).
         present: Edges that are there, shape (n, 2).
         radii: Known or guessed, shape (n,), pixels.
-        tolerance: Relative standard deviation of the radii; infinite if they are guessed.
+        known: Of the discs.
     """
     mean, deviations, limits = start.copy(), np.full(start.shape, 1e3), np.full(start.shape, 1e3)
     mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
@@ -58,9 +115,11 @@ def prior_and_limits(
         deviations[:, HALO], limits[:, HALO] = HALO_DEVIATION, HALO_STEP
     clipped = start[:, LIGHT] >= LIGHTEST
     deviations[clipped, LIGHT] = CLIPPED
-    for column in (SHADE_X, SHADE_Y):
-        deviations[clipped, column] = CLIPPED_SHADE
-    deviations[:, RADIUS] = np.minimum(tolerance * radii, 1e3)
+    for column, shade, deviation in zip(
+        (SHADE_X, SHADE_Y), known.shade.T, known.shade_deviation.T, strict=True
+    ):
+        mean[clipped, column], deviations[clipped, column] = shade[clipped], deviation[clipped]
+    deviations[:, RADIUS] = np.minimum(known.tolerance * radii, 1e3)
     edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
     deviations[:, first_edge:] = edges.reshape(len(start), -1)
     limits[:, list(STEPS)] = list(STEPS.values())

@@ -14,7 +14,7 @@ from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 from pinnray.vision.discs import disc_image_model as model
 from pinnray.vision.discs.correlated_noise import correlated_noise
 from pinnray.vision.discs.disc_image_model import Array
-from pinnray.vision.discs.fit_priors import MISSING, prior_and_limits
+from pinnray.vision.discs.fit_priors import MISSING, Known, prior_and_limits
 from pinnray.vision.discs.least_squares import DiscFit, fit_disc_model, misfit, refined_fit
 from pinnray.vision.discs.pixel_windows import PixelWindows
 from pinnray.vision.discs.straight_edges import with_edges
@@ -38,7 +38,7 @@ OTHER_SIZE = 5.0
 
 
 def better_outlines(
-    ellipses: DiscFit, start: FloatArray, window: PixelWindows, radii: FloatArray, tolerance: float
+    ellipses: DiscFit, start: FloatArray, window: PixelWindows, radii: FloatArray, known: Known
 ) -> tuple[IntArray, DiscFit, FloatArray]:
     """Fits of irregular outlines that explain the pixels better than ellipses do.
 
@@ -47,26 +47,26 @@ def better_outlines(
         start: Parameters of fits that leave out less, shape (n, m).
         window: The pixels around the discs.
         radii: Known or guessed, shape (n,), pixels.
-        tolerance: Of the radii, see `prior_and_limits`.
+        known: Of the discs.
 
     Returns:
         The numbers of these discs, shape (k,), their fits, whose centres are the centroids of the outlines,
         and the noise that counts for them, as of `correlated_noise`.
     """
-    outlines, residuals = _outlined(window, start, radii, tolerance)
+    outlines, residuals = _outlined(window, start, radii, known)
     noise = np.maximum(np.minimum(ellipses.variance, outlines.variance), window.noise**2)
     gain = misfit(window, ellipses.parameters, noise) - misfit(window, outlines.parameters, noise)
-    good = _whole(window, outlines, radii, tolerance) & (gain > PENALTY)
+    good = _whole(window, outlines, radii, known.tolerance) & (gain > PENALTY)
     doubtful = ~(ellipses.settled & (ellipses.seen > LEAST_SEEN)) & ~good
     (tried,) = np.nonzero(doubtful)
     if len(tried):
-        lenient, left = _outlined(window.at(tried), start[tried], radii[tried], tolerance, lenient=True)
+        lenient, left = _outlined(window.at(tried), start[tried], radii[tried], known.at(tried), lenient=True)
         outlines.put(tried, lenient)
         residuals[tried] = left
-        good[tried] = _whole(window.at(tried), lenient, radii[tried], tolerance)
+        good[tried] = _whole(window.at(tried), lenient, radii[tried], known.tolerance)
     (better,) = np.nonzero(good)
     outlines, own = outlines.at(better), window.at(better)
-    noise = correlated_noise(own, outlines, residuals[better], own.within, radii[better], tolerance)
+    noise = correlated_noise(own, outlines, residuals[better], own.within, radii[better], known.at(better))
     noise += TAKEN_UP * np.maximum(noise - 1, 0)
     if np.isfinite(noise).any():
         noise = np.fmax(noise, np.nanmedian(noise, axis=0))
@@ -86,7 +86,7 @@ def _whole(window: PixelWindows, outlines: DiscFit, radii: FloatArray, tolerance
 
 
 def _outlined(
-    window: PixelWindows, start: FloatArray, radii: FloatArray, tolerance: float, *, lenient: bool = False
+    window: PixelWindows, start: FloatArray, radii: FloatArray, known: Known, *, lenient: bool = False
 ) -> tuple[DiscFit, Array]:
     """Fit discs with irregular outlines, from the moments of what circles leave of the darkness.
 
@@ -99,7 +99,7 @@ def _outlined(
     for _ in range(2):
         start = _by_moments(window, start)
     start, present = with_edges(window, start, window.within)
-    prior, limits = prior_and_limits(start, present, radii, tolerance)
+    prior, limits = prior_and_limits(start, present, radii, known)
     plain = prior._replace(precision=prior.precision.copy())
     plain.precision[:, model.HALO] = MISSING**-2.0  # a halo is sought after the outline
     if lenient:

@@ -72,6 +72,7 @@ class DiscFit:
         origins: Shape (n, 2), pixels.
         covariances: Of the centres, from the variance of the noise, shape (n, 2, 2), pixels².
         variance: Of the noise, shape (n,), grey levels².
+        shade_precision: Of the relative gradient of the light by the pixels alone, shape (n, 2), pixels².
         seen: Share of the information on the radius that kept its weight, shape (n,).
         settled: Whether the last step was small, shape (n,).
     """
@@ -80,6 +81,7 @@ class DiscFit:
     origins: IntArray
     covariances: FloatArray
     variance: FloatArray
+    shade_precision: FloatArray
     seen: FloatArray
     settled: BoolArray
 
@@ -89,8 +91,8 @@ class DiscFit:
         count = len(parameters)
         covariances = np.tile(np.eye(2), (count, 1, 1))
         nothing = np.zeros(count)
-        unsettled = np.zeros(count, dtype=bool)
-        return cls(parameters, origins, covariances, np.ones(count), nothing, unsettled)
+        unknown, unsettled = np.zeros((count, 2)), np.zeros(count, dtype=bool)
+        return cls(parameters, origins, covariances, np.ones(count), unknown, nothing, unsettled)
 
     def at(self, places: IntArray) -> "DiscFit":
         """The fit of some discs."""
@@ -165,7 +167,10 @@ def fit_disc_model(
         active = active[~result.settled[active]]
         if not len(active):
             break
-    result.covariances[:] = np.linalg.inv(information)[:, :2, :2]
+    covariances, shades = np.linalg.inv(information), [model.SHADE_X, model.SHADE_Y]
+    result.covariances[:] = covariances[:, :2, :2]
+    variances = np.maximum(covariances[:, shades, shades], 1e-12)
+    result.shade_precision[:] = np.maximum(1 / variances - prior.precision[:, shades], 0)
     return result, all_residuals
 
 
