@@ -5,6 +5,7 @@ The only module that imports CadQuery; import it where it is used.
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from errno import EIO
 from pathlib import Path
 
 import cadquery as cq
@@ -98,7 +99,20 @@ def cad_contents(finger: Finger, formats: Sequence[str]) -> dict[str, bytes]:
     """The contents of a finger's CAD files in some formats, by name."""
     with tempfile.TemporaryDirectory() as folder:
         files = [file for name in formats for file in WRITERS[name](finger, Path(folder))]
-        return {file.name: file.read_bytes() for file in files}
+        return {file.name: _whole(file) for file in files}
+
+
+def _whole(path: Path) -> bytes:
+    """The content of a file; an `OSError` if it has no end: OpenCASCADE does not say that a disk is full."""
+    content = path.read_bytes()
+    if path.suffix == ".stl":  # a head, whose last number counts the triangles, and 50 bytes for each
+        whole = len(content) == 84 + 50 * int.from_bytes(content[80:84], "little")
+    else:
+        end = {".step": b"END-ISO-10303-21;", ".dxf": b"EOF"}[path.suffix]
+        whole = content.rstrip().endswith(end)
+    if not whole:
+        raise OSError(EIO, "a part was not written; is the disk full?", str(path))
+    return content
 
 
 def _wires(finger: Finger) -> tuple[cq.Wire, list[cq.Wire]]:

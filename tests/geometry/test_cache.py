@@ -135,12 +135,24 @@ def test_a_full_cache_is_a_warning_and_the_mesh_is_there(tmp_path: Path, monkeyp
     assert len(mesh.markers) == 9
 
 
-def test_a_full_disk_in_the_worker_names_the_place(full_disk):
-    task = ChildCall("this", cache._mesher, ({}, COARSE.model_dump(), None))
+@pytest.mark.parametrize(
+    ("task", "end"),
+    [
+        (ChildCall("this", cache._mesher, ({}, COARSE.model_dump(), None)), ": File too large"),
+        # OpenCASCADE writes a part and says nothing
+        pytest.param(
+            ChildCall("this", cache._cad_writer, ({}, ["step"])),
+            "/finger.step: a part was not written; is the disk full?",
+            marks=pytest.mark.slow,
+        ),
+    ],
+    ids=["mesh", "cad"],
+)
+def test_a_full_disk_in_the_worker_names_the_place(full_disk, task, end):
     with Pool(1) as pool:  # a new process, which inherits the full disk
         ((_, answer),) = pool.answers(perform, {"this": (task, 8.0)})
     assert str(answer).startswith("this failed: /")
-    assert str(answer).endswith(": File too large")
+    assert str(answer).endswith(end)
 
 
 @pytest.mark.parametrize(
