@@ -33,8 +33,9 @@ def export(
     Warns of loads that `fem-nonlinear` did not reach.
 
     Args:
-        kind: `mujoco`: a chain of hinges, fitted to `fem-nonlinear` under a cylinder at several places, up to
-            the stroke; `mesh`: tetrahedra and their surface.
+        kind: `mujoco`: a chain of hinges and a flexible body, both fitted to `fem-nonlinear` under a cylinder
+            at several places, up to the stroke, and a gripper of two chains; `mesh`: tetrahedra, their
+            surface, and the material.
         design: A finger in one of the ways of `mesh`.
         out: Output folder.
         size: Largest element of `fem-nonlinear` in walls and ribs, mm; 1 if None.

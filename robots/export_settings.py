@@ -24,6 +24,6 @@ class ExportSettings(CheckedModel):
     places: int = bounded(6, 2, 20, "", "", "Number of places of the cylinder for the fit")
     score: bool = Field(
         default=False,
-        description="Press the chain in MuJoCo at ten loads that the fit has not seen, and compare with "
+        description="Press the models of mujoco at ten loads that the fit has not seen, and compare with "
         "fem-nonlinear",
     )

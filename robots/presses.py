@@ -56,6 +56,11 @@ class PressedFinger:
     lost: tuple[str, ...] = ()
 
     @property
+    def full(self) -> list[Press]:
+        """The last of the fitted equilibria at each place."""
+        return list({each.place: each for each in self.fitted}.values())
+
+    @property
     def radius(self) -> float:
         """Radius of the cylinder, mm."""
         return float(self.problem.load.radius or 0)

@@ -1,12 +1,15 @@
 """Score of a robot model: its shapes and forces against finite elements, at loads that no fit has seen."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from pinnray.robots.chain import MM, Chain
+from pinnray.robots.chain import MM
 from pinnray.robots.presses import Press, PressedFinger
-from pinnray.robots.simulation import Rest, pressed_in_mujoco
+from pinnray.robots.simulation import Model, Rest, pressed_in_mujoco
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import Cell
 
 
@@ -53,6 +56,7 @@ class ScoredPress:
 class ModelScore:
     """Errors of a model at all loads."""
 
+    model: str
     presses: tuple[ScoredPress, ...]
 
     @property
@@ -84,9 +88,14 @@ class ModelScore:
             f"{of['largest_force_error_percent']:.2g} %); {of['computing_s_per_s']:.2g} CPU s a second"
         )
 
+    def document(self) -> Mapping[str, Any]:
+        """Everything, for JSON."""
+        return {**self.values(), "steady": self.steady, "loads": [each.row() for each in self.presses]}
 
-def scored(text: str, chain: Chain, finger: PressedFinger) -> ModelScore:
-    """Press a chain, with its MJCF, under the loads held out and compare with the finite elements."""
-    rest, depth = MM * finger.front, finger.problem.mesh.depth
-    found = (pressed_in_mujoco(text, chain, load, finger.radius, depth, rest) for load in finger.held_out)
-    return ModelScore(tuple(ScoredPress(*pair) for pair in zip(finger.held_out, found, strict=True)))
+
+def scored(model: Model, finger: PressedFinger, loads: Sequence[Press]) -> ModelScore:
+    """Press a model under loads and compare with the finite elements."""
+    rest: FloatArray = MM * finger.front
+    depth = finger.problem.mesh.depth
+    found = (pressed_in_mujoco(model, load, finger.radius, depth, rest) for load in loads)
+    return ModelScore(model.name, tuple(ScoredPress(*pair) for pair in zip(loads, found, strict=True)))

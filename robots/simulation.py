@@ -1,6 +1,6 @@
 """A model for MuJoCo pressed by the cylinder of a load, until it is at rest.
 
-Needs the extra `robots`.
+Needs the extra `robots`: MuJoCo 4, whose earlier versions have other elastic constants of flexible bodies.
 """
 
 import importlib.util
@@ -15,6 +15,7 @@ import numpy as np
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.mjcf import HARDER
 from pinnray.robots.presses import Press
+from pinnray.robots.solid_mesh import SolidMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 
@@ -30,6 +31,21 @@ FAULTS = ("CONTACTFULL", "CNSTRFULL", "BADQPOS", "BADQVEL", "BADQACC")
 
 
 @dataclass(frozen=True, eq=False)
+class Model:
+    """A model for MuJoCo.
+
+    Attributes:
+        name: Of its file.
+        text: MJCF.
+        front: From a model and its state, the places of the front's points, shape (m, 2), m.
+    """
+
+    name: str
+    text: str
+    front: Callable[[Any, Any], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
 class Rest:
     """A pressed model at rest."""
 
@@ -40,16 +56,23 @@ class Rest:
 
 
 def check_mujoco() -> None:
-    """Raise a `UserError` unless MuJoCo is installed."""
+    """Raise a `UserError` unless MuJoCo 4 is installed."""
     if importlib.util.find_spec("mujoco") is None:
         raise UserError("MuJoCo is not installed; pip install 'pinn-ray[robots]'")
+    import mujoco
+
+    if int(mujoco.__version__.split(".")[0]) < 4:
+        raise UserError(
+            f"this is MuJoCo {mujoco.__version__}, whose flexible bodies have other elastic constants; "
+            "pip install 'pinn-ray[robots]'"
+        )
 
 
-def chain_front(chain: Chain, rest: FloatArray) -> Callable[[Any], FloatArray]:
+def chain_front(chain: Chain, rest: FloatArray) -> Callable[[Any, Any], FloatArray]:
     """The front's points, at rest in shape (m, 2), m, as the simulator's links carry them."""
     links = chain.link_of(rest)
 
-    def places(data: Any) -> FloatArray:
+    def places(model: Any, data: Any) -> FloatArray:
         found = rest.copy()
         for link in range(1, chain.hinges + 1):
             body, own = data.body(f"link{link}"), links == link
@@ -60,14 +83,26 @@ def chain_front(chain: Chain, rest: FloatArray) -> Callable[[Any], FloatArray]:
     return places
 
 
-def pressed_in_mujoco(
-    text: str, chain: Chain, load: Press, radius: float, depth: float, rest: FloatArray
-) -> Rest:
+def flex_front(body: SolidMesh, rest: FloatArray) -> Callable[[Any, Any], FloatArray]:
+    """The front's points, at rest in shape (m, 2), m, between the body's nodes, meant over the depth."""
+    flat = np.unique(body.section.boundary("front"))
+    flat = flat[body.section.points[flat, 0].argsort()]
+    nodes = flat + len(body.section.points) * np.arange(body.levels)[:, None]
+    drawn = MM * body.section.points[flat]
+
+    def places(model: Any, data: Any) -> FloatArray:
+        moved = data.flexvert_xpos.reshape(-1, 3)[nodes, :2].mean(axis=0) - drawn
+        between = [np.interp(rest[:, 0], drawn[:, 0], each) for each in moved.T]
+        return np.asarray(rest + np.column_stack(between))
+
+    return places
+
+
+def pressed_in_mujoco(model: Model, load: Press, radius: float, depth: float, rest: FloatArray) -> Rest:
     """Press a model as a load says.
 
     Args:
-        text: The MJCF of a chain.
-        chain: The chain.
+        model: The model.
         load: Centre and travel of the cylinder.
         radius: Of the cylinder, mm.
         depth: Of the finger, mm.
@@ -75,7 +110,7 @@ def pressed_in_mujoco(
     """
     import mujoco
 
-    spec = mujoco.MjSpec.from_string(text)
+    spec = mujoco.MjSpec.from_string(model.text)
     centre = MM * load.centre
     body = spec.worldbody.add_body(name="indenter", mocap=True, pos=[*centre, 0])
     body.add_geom(
@@ -86,7 +121,6 @@ def pressed_in_mujoco(
         solref=[float(each) for each in HARDER["solref"].split()],
         solimp=[*(float(each) for each in HARDER["solimp"].split()), 0.5, 2],
     )
-    front = chain_front(chain, rest)
     with _silent_warnings():
         compiled = spec.compile()
         data = mujoco.MjData(compiled)
@@ -100,7 +134,7 @@ def pressed_in_mujoco(
             mujoco.mj_step(compiled, data)
             if count * step > RAMP + (1 - MEAN) * HOLD:
                 forces.append(_force(compiled, data))
-                places.append(front(data))
+                places.append(model.front(compiled, data))
         seconds = (time.process_time() - started) / (RAMP + HOLD)
     faults = sum(data.warning[getattr(mujoco.mjtWarning, f"mjWARN_{name}")].number for name in FAULTS)
     force = np.mean(forces, axis=0)

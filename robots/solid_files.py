@@ -1,12 +1,14 @@
-"""Files of the extruded body for other programs: VTK and STL, in metres."""
+"""Files of the extruded body for other programs: VTK and STL, in metres, and its material."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyvista
 
 from pinnray.robots.solid_mesh import SolidMesh
-from pinnray.runtime.atomic import atomic_path
+from pinnray.runtime.atomic import atomic_path, write_json
+from pinnray.solvers.material import Material
 
 
 def write_solid(out: Path, body: SolidMesh) -> tuple[Path, Path]:
@@ -19,3 +21,17 @@ def write_solid(out: Path, body: SolidMesh) -> tuple[Path, Path]:
         with atomic_path(path) as partial:
             data.save(partial)
     return files
+
+
+def write_material(path: Path, material: Material, density: float, loss_factor: float) -> None:
+    """Write the material in SI units; the loss factor is stated, not measured."""
+    content: dict[str, Any] = {
+        "schema": 1,
+        "length_unit": "m",
+        "young_Pa": 1e6 * material.young,
+        "poisson": material.poisson,
+        "density_kg_per_m3": density,
+        "loss_factor": loss_factor,
+        "substance": material.substance and material.substance.name,
+    }
+    write_json(path, content)

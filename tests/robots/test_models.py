@@ -7,7 +7,7 @@ import pyvista
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
-from pinnray.robots.mjcf import chain_mjcf
+from pinnray.robots.mjcf import Damping, chain_mjcf, gripper_mjcf
 from pinnray.robots.simulation import chain_front
 from pinnray.robots.solid_files import write_solid
 from pinnray.robots.solid_mesh import SolidMesh
@@ -60,7 +60,8 @@ def test_the_chain_has_the_mass_of_the_finger_and_the_slopes_of_its_places(secti
 
 def test_mujoco_has_the_masses_springs_and_places_of_the_chain(front, chain, springs):
     mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(chain_mjcf("short", chain, springs, 2.0, SHORT.depth, 0.3))
+    damping = Damping(0.3, springs.frequencies[0])
+    model = mujoco.MjModel.from_xml_string(chain_mjcf("short", chain, springs, 2.0, SHORT.depth, damping))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     inertia = np.zeros((model.nv, model.nv))
@@ -69,7 +70,7 @@ def test_mujoco_has_the_masses_springs_and_places_of_the_chain(front, chain, spr
     data.qpos[:] = q = 0.03 * np.array([MM / 0.03, 1, -2, 3, 1, -1])
     data.qvel[:] = speed = 2 * q
     mujoco.mj_forward(model, data)
-    assert chain_front(chain, MM * front)(data) == pytest.approx(chain.placed(q, MM * front)[0])
+    assert chain_front(chain, MM * front)(model, data) == pytest.approx(chain.placed(q, MM * front)[0])
     assert data.qfrc_spring == pytest.approx(
         -springs.rows.T @ (springs.stiffnesses * (springs.rows @ q)), rel=1e-6
     )
@@ -90,3 +91,27 @@ def test_the_tetrahedra_fill_the_body_and_name_the_nodes_of_its_boundaries(secti
     assert np.abs(base[:, 0]).max() < 1e-9
     assert np.abs(front[:, 1]).max() < 1e-9
     assert np.ptp(front[:, 2]) == pytest.approx(MM * section.depth)
+
+
+def test_a_gripper_of_two_fingers_closes_on_its_object_in_its_own_time_step(tmp_path, chain, springs):
+    """It is nearly at rest after a second, and both press alike; MuJoCo's own time step is twice as long."""
+    mujoco = pytest.importorskip("mujoco")
+    (tmp_path / "chain.xml").write_text(
+        chain_mjcf("short", chain, springs, 2.0, SHORT.depth, Damping(0.3, springs.frequencies[0]))
+    )
+    place = np.array([SHORT.contact_abscissa, 0.0])
+    scene = gripper_mjcf("gripper", "chain.xml", place, 6.0, SHORT.depth, 2.0)
+    (tmp_path / "gripper.xml").write_text(scene)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "gripper.xml"))
+    assert model.opt.timestep <= 5e-4  # of 1 ms, an object of 15 mm was held for two seconds only
+    assert model.ntendon == 2 * (chain.hinges + 1)
+    data = mujoco.MjData(model)
+    for step in range(1000):
+        data.ctrl[:] = 2.5e-3 * min(1.0, step / 400)
+        mujoco.mj_step(model, data)
+    assert not any(each.number for each in data.warning)
+    assert np.abs(data.qvel).max() < 0.02
+    left, right = data.actuator_force
+    assert left == pytest.approx(right, rel=1e-3)
+    assert left > 0.1
+    assert np.abs(data.body("object").xpos[1:]).max() < 1e-4

@@ -20,8 +20,9 @@ def command(
 ) -> int:
     """Write a finger for MuJoCo or any program that reads tetrahedra, in SI units.
 
-    mujoco: a chain of hinges, fitted to fem-nonlinear under a cylinder at several places, up to --stroke; the
-    default --mesh-size is 1. mesh: tetrahedra and their surface.
+    mujoco: a chain of hinges and a flexible body, both fitted to fem-nonlinear under a cylinder at several
+    places, up to --stroke, and a gripper of two chains around it; the default --mesh-size is 1. mesh:
+    tetrahedra, their surface, and the material.
 
     Args:
         kind: Program: mujoco, or mesh for others.
@@ -37,11 +38,11 @@ def command(
     done = export(
         kind, chosen, out=out, size=mesh, material=material, load=load, progress=True, **dict(settings)
     )
-    if done.score:
-        print(done.score.sentence)
+    for each in done.scores:
+        print(f"{each.model}: {each.sentence}")
     for path in done.files:
         print(path)
-    if done.score and not done.score.steady:
-        say("warning: the chain did not come to rest at every load")
+    if unsteady := [each.model for each in done.scores if not each.steady]:
+        say(f"warning: {' and '.join(unsteady)} did not come to rest at every load")
         return NOT_CONVERGED
     return 0
