@@ -204,6 +204,11 @@ _TRUTHS = (
         radius=10.0,
         slope=0.0,
     ),
+    Truth(
+        "friction",
+        f"neo-Hookean, {_PATCH} and that friction holds half way between sliding and sticking",
+        slope=-0.07,
+    ),
     Truth("rubbing", f"neo-Hookean, {_ROUGH.format(10, 0.5)}", radius=10.0, friction=0.5, slope=0.0),
     Truth(
         "3d", f"neo-Hookean finger in three dimensions, of which the side face is seen, {_SLIDES}", solid=True
