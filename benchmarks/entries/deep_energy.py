@@ -67,7 +67,7 @@ class DeepEnergySolver:
         given = NetworkProblem(problem, self.quadrature)
         network = Network(self, given)
         energies = self._train(network, given, 100 * problem.material.young, progress)
-        field = NetworkField(network)
+        field = NetworkField(network, given)
         energy, reaction = energy_and_force(problem, field)
         change = abs(energies[-1] / energies[-len(energies) // 10] - 1)
         message = f"the energy changed by {change:.1e} in the last tenth of {len(energies)} steps"
@@ -80,15 +80,17 @@ class DeepEnergySolver:
         self, network: "Network", given: NetworkProblem, penalty: float, progress: Progress
     ) -> list[float]:
         """Minimise the energy; returns it at every step."""
-        points, energies = given.points.requires_grad_(), list[float]()
+        points, energies = torch.cat([given.points, given.contact]).requires_grad_(), list[float]()
+        inside = len(given.points)
 
         def loss() -> torch.Tensor:
             optimiser.zero_grad()
-            gradient = displacement_gradients(network(points), points)
+            moved = network(points)
+            gradient = displacement_gradients(moved[:inside], points)[:inside]
             value = (given.areas * given.density(gradient)).sum()
             energies.append(value.item())
-            if given.shares is None:  # the mean is met exactly, the rest by a penalty
-                value = value + penalty * (given.missed(network(given.contact)) ** 2).sum(dim=1).mean()
+            if given.patch:  # the mean is met exactly, the rest by a penalty
+                value = value + penalty * given.missed(moved[inside:])
             value.backward()
             return value
 
@@ -105,16 +107,11 @@ class DeepEnergySolver:
 
 
 class Network(torch.nn.Module):
-    """The displacement: w + (t - mean of w) d / mean of d, where w = d N and d is zero at the base."""
+    """Layers of tanh neurons, with Fourier features before them if there are any."""
 
     def __init__(self, solver: DeepEnergySolver, given: NetworkProblem) -> None:
         super().__init__()
         self._given = given
-        self._first, last = given.base[given.base[:, 1].argmin()], given.base[given.base[:, 1].argmax()]
-        along = (last - self._first) / (last - self._first).norm()
-        self._normal = torch.stack([along[1], -along[0]])
-        alike = torch.full((len(given.contact), 1), 1 / len(given.contact), dtype=torch.float64)
-        self._weights = alike if given.shares is None else given.shares
         self._frequencies = torch.pi * solver.scale * torch.randn(2, solver.features, dtype=torch.float64)
         widths = [2 * solver.features or 2, *[solver.width] * solver.layers, 2]
         layers: list[torch.nn.Module] = []
@@ -125,14 +122,8 @@ class Network(torch.nn.Module):
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:
         """Displacement, mm."""
-        both, stroke = torch.cat([points, self._given.contact]), self._given.stroke
-        places = self._given.scaled(both)
+        places = self._given.scaled(points)
         if self._frequencies.shape[1]:
             phases = places @ self._frequencies
             places = torch.cat([phases.sin(), phases.cos()], dim=1)
-        away = self._given.scaled(both) @ self._normal - self._given.scaled(self._first) @ self._normal
-        away = away.abs()[:, None]
-        own = stroke.abs().max() * away * self._layers(places)
-        count = len(points)
-        means = [(self._weights * each[count:]).sum(dim=0) for each in (own, away)]
-        return own[:count] + (stroke - means[0]) * away[:count] / means[1]
+        return self._given.displacement(self._layers(places), points)

@@ -1,7 +1,7 @@
 """DeepXDE's networks trained on the energy: its points, losses and optimisers, and an energy as the loss.
 
 DeepXDE has no energy method of its own: a residual of its class PDE is an energy density times area, and the
-loss is their sum. Base and contact are met by penalties, as its examples of elasticity do.
+loss is their sum. Its transform of the output holds the base and moves the contact in the mean.
 """
 
 import os
@@ -30,7 +30,7 @@ class DeepXdeEntry:
         adam: Steps of Adam.
         lbfgs: Steps of L-BFGS after them.
         rate: Learning rate of Adam.
-        penalty: Weight of base and contact over Young's modulus.
+        penalty: Weight of the contact's points over Young's modulus, where each is prescribed.
         seed: Of the random numbers.
     """
 
@@ -59,28 +59,26 @@ class DeepXdeEntry:
         dde.optimizers.config.set_LBFGS_options(maxcor=50, maxiter=self.lbfgs, ftol=0, gtol=0)
         at_once = {"iter_per_step": self.lbfgs, "fun_per_step": int(1.25 * self.lbfgs)}
         dde.optimizers.config.LBFGS_options.update(at_once)  # its own of 1,000 would be passed before it asks
-        inside, clamped = len(given.points), len(given.points) + len(given.base)
-        factor = self.penalty * problem.material.young
+        inside, factor = len(given.points), self.penalty * problem.material.young
 
         def energies(x, y):
             rows = [dde.grad.jacobian(y, x, i=axis)[:inside] for axis in (0, 1)]
-            energy = given.areas * given.density(torch.stack(rows, dim=1))
-            held = [factor * (each**2).mean() for each in (y[inside:clamped], given.missed(y[clamped:]))]
-            return [each.reshape(1) for each in (energy.sum(), *held)]
+            energy = (given.areas * given.density(torch.stack(rows, dim=1))).sum()
+            return [energy.reshape(1), *([factor * given.missed(y[inside:]).reshape(1)] * given.patch)]
 
-        points = torch.cat([given.points, given.base, given.contact]).numpy()
+        points = torch.cat([given.points, given.contact]).numpy()
         data = dde.data.PDE(dde.geometry.PointCloud(points), energies, [], anchors=points)
         data.train_x_all = data.train_x = points  # in this order
         data.train_next_batch = lambda batch_size=None: (points, None, None)
         net = dde.nn.FNN([2, *[self.width] * self.layers, 2], "tanh", "Glorot normal")
         net.apply_feature_transform(given.scaled)
-        net.apply_output_transform(lambda _, y: y * given.stroke.abs().max())
+        net.apply_output_transform(lambda x, y: given.displacement(y, x))
         model = dde.Model(data, net)
         model.compile("adam", lr=self.rate, loss=lambda _, value: value.sum())
         model.train(iterations=self.adam, display_every=100_000, verbose=0)
         model.compile("L-BFGS", loss=lambda _, value: value.sum())
         history, _ = model.train(display_every=100_000, verbose=0)
-        field = NetworkField(net)
+        field = NetworkField(net, given)
         energy, reaction = energy_and_force(problem, field)
         stats = {"seconds": time.perf_counter() - started, "parameters": net.num_trainable_parameters()}
         message = f"DeepXDE has no criterion; the loss ended at {sum(history.loss_train[-1]):.3g}"

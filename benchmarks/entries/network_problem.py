@@ -17,9 +17,9 @@ class NetworkProblem:
     Attributes:
         points: Where the energy is evaluated, shape (n, 2), mm.
         areas: Their weights, shape (n,), mm².
-        base: Nodes of the base, shape (b, 2), mm.
-        contact: Points at which the contact is prescribed, shape (c, 2), mm.
-        shares: Weights of their mean displacement, shape (c, 1); None where every point is prescribed.
+        patch: Whether every point of the contact is prescribed, and not their mean alone.
+        contact: Its points, shape (c, 2), mm.
+        weights: Of their mean, shape (c, 1).
         stroke: Prescribed displacement, shape (2,), mm.
     """
 
@@ -28,14 +28,19 @@ class NetworkProblem:
         mesh, rule = problem.mesh, body_quadrature(problem.mesh, degree)
         self._law, self._lame = problem.material.law, problem.material.lame
         self.points, self.areas = torch.tensor(rule.location.points), torch.tensor(rule.weights)
-        self.base = torch.tensor(mesh.points[np.unique(mesh.boundary("base"))])
-        contact, shares = contact_functional(problem)
-        self.shares = torch.tensor(shares)[:, None] if problem.load.kind == "mean" else None
-        if self.shares is None:
+        contact, weights = contact_functional(problem)
+        self.patch = problem.load.kind == "patch"
+        if self.patch:
             contact = mesh.points[np.unique(mesh.boundary("contact"))]
-        self.contact, self.stroke = torch.tensor(contact), torch.tensor(problem.load.values)
+            weights = np.full(len(contact), 1 / len(contact))
+        self.contact, self.weights = torch.tensor(contact), torch.tensor(weights)[:, None]
+        self.stroke = torch.tensor(problem.load.values)
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
         self._middle, self._half = torch.tensor((low + high) / 2), float((high - low).max() / 2)
+        base = torch.tensor(mesh.points[mesh.boundary("base").ravel()])
+        self._first, last = base[base[:, 1].argmin()], base[base[:, 1].argmax()]
+        along = (last - self._first) / (last - self._first).norm()
+        self._normal = torch.stack([along[1], -along[0]]) / self._half
 
     def density(self, gradient: torch.Tensor) -> torch.Tensor:
         """Energy density at displacement gradients (n, 2, 2), shape (n,), MPa."""
@@ -45,26 +50,40 @@ class NetworkProblem:
         """Points as coordinates from -1 to 1 along the longer side."""
         return (points - self._middle) / self._half
 
+    def displacement(self, output: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
+        """Displacement, mm, of points of which those of the contact are last, by a network's output (n, 2).
+
+        It is w + (t - mean of w) d / mean of d, where t is the stroke, the means are over the contact, and
+        w = t d N with the output N and the distance d from the line of the base: both are met exactly.
+        """
+        away = ((points - self._first) @ self._normal).abs()[:, None]
+        own = self.stroke.abs().max() * away * output
+        means = [(self.weights * each[-len(self.contact) :]).sum(dim=0) for each in (own, away)]
+        return own + (self.stroke - means[0]) * away / means[1]
+
     def missed(self, moved: torch.Tensor) -> torch.Tensor:
-        """By how much displacements of `contact` miss the stroke, point by point or in their mean, mm."""
-        return (moved if self.shares is None else (self.shares * moved).sum(dim=0)[None]) - self.stroke
+        """Mean square by which displacements of the contact's points miss the stroke, mm²."""
+        return ((moved - self.stroke) ** 2).sum(dim=1).mean()
 
 
 class NetworkField:
-    """The displacement that a network gives at points, as a `DisplacementField`."""
+    """The displacement that a network gives at points and, last, those of the contact."""
 
-    def __init__(self, network: Callable[[torch.Tensor], torch.Tensor]) -> None:
-        self._network = network
+    def __init__(self, network: Callable[[torch.Tensor], torch.Tensor], given: NetworkProblem) -> None:
+        self._network, self._contact = network, given.contact
 
     def displacement(self, location: Any) -> np.ndarray:
         """Displacement, shape (n, 2), mm."""
         with torch.no_grad():
-            return self._network(torch.tensor(location.points)).numpy()
+            return self._moved(torch.tensor(location.points)).numpy()
 
     def gradient(self, location: Any) -> np.ndarray:
         """Its gradient, shape (n, 2, 2)."""
         points = torch.tensor(location.points, requires_grad=True)
-        return displacement_gradients(self._network(points), points).detach().numpy()
+        return displacement_gradients(self._moved(points), points).detach().numpy()
+
+    def _moved(self, points: torch.Tensor) -> torch.Tensor:
+        return self._network(torch.cat([points, self._contact]))[: len(points)]
 
 
 def displacement_gradients(moved: torch.Tensor, points: torch.Tensor) -> torch.Tensor:

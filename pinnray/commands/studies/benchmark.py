@@ -28,7 +28,7 @@ def command(
 
     Args:
         solvers: Names of solvers, separated by commas.
-        problems: Set of problems: small (12, a few minutes) or full (39).
+        problems: Set of problems: small (12, a few minutes) or full (40).
         entries: Folder with entries of others to show beside them, such as docs/benchmark.
         time_limit: Longest time for a problem, s.
         out: Output folder; default out/benchmark-PROBLEMS.
