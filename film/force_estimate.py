@@ -197,7 +197,7 @@ def force_table(
     delays = 1000 * np.array([force.delay for force in forces])
     unexplained = sum(force.reading.inflation > 1 for force in known)
     caption = (
-        "in brackets: intervals of 95 %, for Young's modulus as given and the walls as drawn within their "
+        "in brackets: intervals of 95 %, for Young's modulus as it is given, and the walls within their "
         f"tolerances; {len(known)} of {len(forces)} frames have a force, in {unexplained} of them the "
         f"markers are farther off than noise explains; {delays.mean():.0f} ms after a frame, at most "
         f"{delays.max():.0f} ms"

@@ -15,7 +15,7 @@ PLANES = ("strain", "stress")
 
 
 class Lame(NamedTuple):
-    """Lamé constants, MPa: numbers or, at points in a body of several materials, arrays of one at each."""
+    """Lamé constants, MPa."""
 
     λ: float  # As it stands in the law; in plane stress the reduced one, 2 λ μ / (λ + 2 μ)
     μ: float  # Shear modulus

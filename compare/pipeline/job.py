@@ -10,7 +10,7 @@ from pinnray.comparison.evaluation.truths import SLIDING, TRUTHS, Truth, check_t
 from pinnray.comparison.figures import Picture, check_formats, page_width
 from pinnray.geometry.cache import mesh_sizes
 from pinnray.geometry.finger.finger import Finger
-from pinnray.geometry.finger.learned import Learned
+from pinnray.geometry.finger.learned import Learned, check_target
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.content_hash import has_source
@@ -105,8 +105,8 @@ def prepared(job: Job) -> Job:
     check_walls(job.simulated)
     if job.presses and job.measurements is None:
         raise UserError("presses are other pictures of a measured finger; give measurements, too")
-    if job.learn is not None and job.learn.suffix != ".toml":
-        raise UserError(f"learn {job.learn}: give the name of a design file, such as my-finger.toml")
+    if job.learn is not None:
+        check_target(job.learn)
     radius, measured = job.design.marker_radius, job.measurements
     if isinstance(measured, Path):
         measured = read_measurements(measured, marker_radius=radius)

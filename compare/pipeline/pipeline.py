@@ -202,11 +202,11 @@ def _write(
 
 
 def _write_learned(path: Path, finger: Finger, comparison: Results) -> None:
-    """Write the design file of a finger with what the first solver that identified it has learned."""
-    found = [own.learned for each in comparison.evaluations if (own := each.identified) and own.learned]
-    if not found:
-        raise UserError(f"learn {path}: no solver has identified the finger; nothing was learned")
-    write_learned(path, found[0], finger_lines(finger))
+    """Write the design file of a finger with what the first solver has learned that identified it."""
+    converged = [each.identified for each in comparison.evaluations if each.converged]
+    found = [own.learned for own in converged if own and own.learned]
+    if found:
+        write_learned(path, found[0], finger_lines(finger))
 
 
 def _provenance(folder: Path, job: Job, comparison: Results, stages: Stages) -> dict[str, Any]:

@@ -292,7 +292,7 @@ def _loads_found(scores: Scores) -> list[str]:
 
 
 def _convergence(scores: Scores) -> RunAnswer:
-    """The solvers that did not converge, failed or were left out, and the error of the mesh."""
+    """The solvers that did not converge, failed or were left out."""
     faulty = {scores.label(name): own for name, own in scores.solvers.items() if not own.converged}
     sentences = [f"{name}: {own.message.rstrip('. ')}." for name, own in faulty.items()]
     for what, reasons in (("failed", scores.failed), ("was left out", scores.left_out)):
@@ -301,12 +301,6 @@ def _convergence(scores: Scores) -> RunAnswer:
     count = len(scores.solvers) + len(scores.failed)
     met = "the solver met its" if count == 1 else f"{_all(count)} solvers met their"
     verdict = f"{len(bad)} of {count} solvers: {_listed(bad)}." if bad else f"Nothing: {met} own criterion."
-    own = scores[scores.reference].uncertainty
-    if own and not any(each.family == "neural network" for each in scores.solvers.values()):
-        sentences.append(
-            f"The mesh leaves {scores.label(scores.reference)} an estimated error of "
-            f"{share(own.rel_l2_displacement)} in displacement and {share(own.rel_l2_von_mises)} in stress."
-        )
     return RunAnswer("What is not converged?", verdict, sentences)
 
 

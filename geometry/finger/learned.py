@@ -91,6 +91,18 @@ def read_learned(path: Path | None) -> Learned | None:
         raise UserError(f"{path}: {error}") from None
 
 
+def check_target(path: Path) -> None:
+    """Refuse a file for `write_learned` that is no .toml file, or holds something else.
+
+    Raises:
+        UserError: If it is refused.
+    """
+    if path.suffix != ".toml":
+        raise UserError(f"learn {path}: give the name of a design file, such as my-finger.toml")
+    if path.exists() and read_learned(path) is None:
+        raise UserError(f"learn {path}: it holds a finger of which nothing was learned; name another file")
+
+
 def write_learned(path: Path, learned: Learned, lines: str) -> None:
     """Write what was learned of a finger after the lines of its design or description, atomically."""
     own = {name: np.array(value) for name, value in learned.model_dump().items()}

@@ -29,12 +29,12 @@ def _young(stress: float) -> float:
 
 
 TPU_LOSS = 0.1
-"""Loss of fingers printed of TPU, from the errors that elastic finite elements make on fin-ray fingers.
+"""Loss taken for printed TPU, from the errors of elastic finite elements on fin-ray fingers.
 
-Their root mean square is 2.11 % of the largest force while loading and 4.34 % over the whole grasp
-(arXiv:2605.00307), so 5.8 % on a way back as long as the loading: in squares 5.4 % more. A force that is
-lower by a share of itself has a loss of 9 % then, one that is lower by a constant of 11 %. Of silicones no
-such number was found.
+The material of these is not said. Their root mean square is 2.11 % of the largest force while loading and
+4.34 % over the whole grasp (arXiv:2605.00307), so 5.8 % on a way back as long as the loading: in squares 5.4
+% more. A force that is lower by a share of itself has a loss of 9 % then, one that is lower by a constant of
+11 %. Of silicones no such number was found.
 """
 
 TPU_SPREAD, SYLGARD_SPREAD = 0.2, 0.26

@@ -95,14 +95,13 @@ class Posterior:
 
     def shown_deviation(self, pictures: FreePictures, location: LocatedPoints) -> FloatArray:
         """Standard deviation of what pictures show of the displacement, shape (n, 2), mm."""
-        return self.shown(pictures, location.points)[1]
+        (z, _), points = self.frames, location.points
+        there = replace(pictures, points=points, shown=self.shown(pictures, points))
+        return self._deviation(points, there.about(z).frames)
 
-    def shown(self, pictures: FreePictures, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What pictures show of the displacement of points (n, 2), and its standard deviation: (n, 2), mm."""
-        z, _ = self.frames
-        shown = pictures.at(z).shown(points, self.mean(points))
-        there = replace(pictures, points=points, shown=shown)
-        return shown, self._deviation(points, there.about(z).frames)
+    def shown(self, pictures: FreePictures, points: FloatArray) -> FloatArray:
+        """What pictures show of the displacement of points (n, 2), mm: shape (n, 2), mm."""
+        return pictures.at(self.frames[0]).shown(points, self.mean(points))
 
     def _deviation(self, points: FloatArray, frames: FloatArray) -> FloatArray:
         """Standard deviation of u + the frames (p, n, 2), mm, times z at points (n, 2): (n, 2), mm."""

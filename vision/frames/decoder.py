@@ -58,7 +58,7 @@ class Decoder:
         Raises:
             UserError: If it is no whole picture, or neither of 8 nor of 16 bits.
         """
-        numbers, first = pages(content, label), self._image(content, label)
+        numbers, first = pages(content), self._image(content, label)
         if len(numbers) == 1 and numbers[0]:
             first = self._in_8_bits(self._page(content, numbers[0], label), label)
         if len(numbers) == 1:

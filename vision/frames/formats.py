@@ -1,6 +1,5 @@
 """Formats of picture files: those that are not read, and the numbers of pages."""
 
-import re
 import struct
 import warnings
 from collections.abc import Sequence
@@ -9,8 +8,6 @@ from io import BytesIO
 
 from PIL import Image as PictureFile
 from PIL import ImageSequence
-
-from pinnray.runtime.errors import UserError
 
 PNG, TIFF = b"\x89PNG\r\n\x1a\n", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 HEAD = 64
@@ -29,8 +26,6 @@ read them, and one calibration fits all.
 _BRANDS = frozenset(b"heic heix heim heis hevc hevx mif1 msf1 mif2 avif avis crx".split())
 SUBFILE, _SMALLER, _MASK = 254, 1, 4
 """A TIFF page's tag NewSubfileType, and its bits: a smaller copy of another page, a mask of one."""
-DESCRIPTION = 270
-"""A TIFF page's tag ImageDescription, in which ImageJ writes how many images it has."""
 DAMAGED = (OSError, SyntaxError, LookupError, ValueError, struct.error, PictureFile.DecompressionBombError)
 """Errors of Pillow for a picture that is damaged or too large."""
 
@@ -49,33 +44,23 @@ def has_pages(head: bytes) -> bool:
     return head.startswith((PNG, *TIFF)) or (head.startswith(b"RIFF") and head[8:12] == b"WEBP")
 
 
-def pages(content: bytes, label: str) -> Sequence[int]:
+def pages(content: bytes) -> Sequence[int]:
     """Numbers of a picture's pages: more than [0] for a TIFF of several, an animated PNG or WebP.
 
     Smaller copies and masks of other pages of a TIFF are left out.
-
-    Raises:
-        UserError: If there are fewer than ImageJ says in the file; it names the file by `label`.
 
     Source: TIFF 6.0, section 8, NewSubfileType.
     """
     if not has_pages(content):
         return [0]
-    kinds, promised = [], 0
+    kinds = []
     with (
         suppress(*DAMAGED),
         warnings.catch_warnings(action="ignore"),
         PictureFile.open(BytesIO(content)) as file,
     ):
-        said = re.search(r"ImageJ=[^\0]*?images=(\d+)", str(getattr(file, "tag_v2", {}).get(DESCRIPTION)))
-        promised = int(said[1]) if said else 0
         if not content.startswith(TIFF):
             return range(getattr(file, "n_frames", 1))
         for page in ImageSequence.Iterator(file):
             kinds.append(getattr(page, "tag_v2", {}).get(SUBFILE, 0))
-    if promised > len(kinds):
-        raise UserError(
-            f"cannot read {label}: its end is missing, or it is a stack of more than 4 GB: {len(kinds)} of "
-            f"its {promised} pages can be read; save it as single pictures"
-        )
     return [page for page, kind in enumerate(kinds) if not kind & (_SMALLER | _MASK)] or [0]

@@ -16,8 +16,6 @@ from pinnray.vision.frames.formats import HEAD, PNG, UNREAD, UNREAD_SUFFIXES, ha
 from pinnray.vision.frames.frame import RIG_MARK, CapturedImage, Image, ImageStream
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
-ANIMATION = ".gif"
-"""Suffix of pictures of many frames that FFmpeg reads as films, each by itself."""
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:
@@ -35,13 +33,10 @@ def picture_paths(source: str | Path) -> list[Path]:
     path = Path(source)
     if path.is_dir():
         shown = [file for file in path.iterdir() if not file.name.startswith(".")]
-        foreign = UNREAD_SUFFIXES | {ANIMATION}
-        others = sorted((file for file in shown if file.suffix.lower() in foreign), key=natural_order)
+        others = sorted((file for file in shown if file.suffix.lower() in UNREAD_SUFFIXES), key=natural_order)
         if others:
             more = f" and {len(others) - 1} more" if len(others) > 1 else ""
-            is_gif = others[0].suffix.lower() == ANIMATION
-            remedy = "a GIF is a film of its own" if is_gif else UNREAD
-            raise UserError(f"{path} holds {others[0].name}{more}: {remedy}; or take them out")
+            raise UserError(f"{path} holds {others[0].name}{more}: {UNREAD}; or take them out")
         found = [file for file in shown if file.suffix.lower() in SUFFIXES and file.is_file()]
     elif path.exists() or not has_magic(str(source)):
         found = [path]

@@ -69,7 +69,7 @@ def open_frames(
         raise UserError(f"{str(source)!r}: there is no such video, picture or folder")
     paths = picture_paths(str(source))
     single = len(paths) == 1
-    number = len(pages(content_of(paths[0]), f"the picture {paths[0]}")) if single else len(paths)
+    number = len(pages(content_of(paths[0]))) if single else len(paths)
     return Frames(
         str(source), images_of_files(paths, usual), rate=usual, count=number, timed=rate is not None
     )
@@ -127,7 +127,7 @@ def _images(source: Path) -> Iterator[tuple[str, Image]]:
     if not source.is_file() or is_picture(source):
         for path in picture_paths(source):
             content, label = content_of(path), f"the picture {path}"
-            every = max(1, len(pages(content, label)) // FRAMES_OF_A_VIDEO)
+            every = max(1, len(pages(content)) // FRAMES_OF_A_VIDEO)
             yield from islice(Decoder()(content, label, str(path)), None, None, every)
         return
     with open_frames(source) as frames:

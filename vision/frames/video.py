@@ -6,7 +6,6 @@ colour differences of HEVC with 10 bits are a fraction of a pixel beside OpenCV'
 """
 
 import math
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from fractions import Fraction
@@ -33,8 +32,6 @@ from pinnray.vision.frames.frame import (
     plausible_rate,
 )
 
-MISSING_FRACTION = 0.02
-"""Tolerance of a video's frame count, as a fraction: the number in its header may be that wrong."""
 CODECS = {
     ".mkv": ("FFV1", "ffv1", "bgr0"),
     ".avi": ("MJPG", "mjpeg", "yuvj420p"),
@@ -56,7 +53,7 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
 
     Nothing but the file is opened, whatever its content or its name says: FFmpeg takes `concat:a.mkv` for two
     files and `http:a` for an address, so that it gets the open file. Frames of more than `MOST_PIXELS` are
-    not read. Iterating warns if far fewer frames can be read than the file says that it has.
+    not read.
 
     Raises:
         UserError: If it is no video, or not one frame can be read.
@@ -84,26 +81,19 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
     rate = plausible_rate(float(stream.average_rate or 0), rate)
     duration = (container.duration or 0) / av.time_base
     count = stream.frames or round(duration * rate) or None
-    images, lossy = _images_of_video(path, file, container, rate, count), bool(stream.codec.lossy)
+    images, lossy = _images_of_video(path, file, container, rate), bool(stream.codec.lossy)
     return Frames(str(path), images, rate=rate, count=count, lossy=lossy)
 
 
-def _images_of_video(
-    path: Path, file: BufferedReader, container: InputContainer, rate: float, count: int | None
-) -> ImageStream:
-    """Images with increasing times: a frame without a later time follows the last one by 1 / `rate`.
-
-    A missing end is reported only if the last time falls short, too: where the rate varies, `count` is only
-    the product of duration and `rate`.
-    """
-    read, first, last = 0, math.nan, -math.inf
+def _images_of_video(path: Path, file: BufferedReader, container: InputContainer, rate: float) -> ImageStream:
+    """Images with increasing times: a frame without a later time follows the last one by 1 / `rate`."""
+    read, last = 0, -math.inf
     reformatter, tick = VideoReformatter(), container.streams.video[0].time_base
     simulated = RIG_MARK in container.metadata.values()
     with file, container:
         for frame in _decoded(container):
             time = -math.inf if frame.pts is None or tick is None else float(frame.pts * tick)
             last = time if time > last else last + 1 / rate if read else 0.0
-            first = first if read else last
             image = reformatter.reformat(
                 frame,
                 format="bgr24",
@@ -118,12 +108,6 @@ def _images_of_video(
     if not read:
         raise UserError(
             f"no frame of the video {path} can be read: it is damaged, too large, or FFmpeg lacks its codec"
-        )
-    if count and max(read, (last - first) * rate + 1) < count - max(1, MISSING_FRACTION * count):
-        warnings.warn(
-            f"{path} says that it has {count} frames, but only the first {read} can be read: "
-            "it was cut off or is damaged there",
-            stacklevel=3,
         )
 
 

@@ -31,19 +31,16 @@ def command(
         out: Camera file, .json.
     """
     from pinnray.camera import calibrate
-    from pinnray.film.calibration_report import calibration_table, draw_calibration
+    from pinnray.film.calibration_report import calibration_table
 
     if not images:
         raise UserError("no photograph was given; name at least 4 that show the board")
     calibration = calibrate(
         images, board, square=square, marker=marker, dictionary=dictionary, k3=k3, out=out
     )
-    picture = out.with_suffix(".png")
-    draw_calibration(calibration).save(picture)
     for reason in dict.fromkeys(calibration.left_out.values()):
         names = [name for name, said in calibration.left_out.items() if said == reason]
         say(f"warning: left out {', '.join(names)}: {reason}")
     Console().print(calibration_table(calibration))
     print(out)
-    print(picture)
     return 0

@@ -73,7 +73,7 @@ def command(
     from pinnray.film.track_film import track_film, track_table
     from pinnray.geometry.cache import finger_mesh
     from pinnray.geometry.drawing.drawn_finger import finger_lines
-    from pinnray.geometry.finger.learned import write_learned
+    from pinnray.geometry.finger.learned import check_target, write_learned
     from pinnray.runtime.machine import machine, package_versions
     from pinnray.runtime.output_folder import check_output, check_same_job, replaced_folder, write_run
     from pinnray.runtime.stages import Stages
@@ -81,6 +81,8 @@ def command(
 
     if (elastic.model_fields_set or learn) and not force:
         raise UserError(f"--{min(elastic.model_fields_set, default='learn')} is for --force")
+    if learn is not None:
+        check_target(learn)
     (design, settings), learned = finger.read(usual=MESH), finger.learned()
     film, material = options.of(source), elastic.made() if force else None
     if material:

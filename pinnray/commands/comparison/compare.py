@@ -167,7 +167,9 @@ def command(
                 found = evaluation.identified.phrase(job.design.depth)
                 console.print(f"{evaluation.label} found: {found}", soft_wrap=True, highlight=False)
         if job.learn is not None:
-            console.print(f"learned: {job.learn}", soft_wrap=True, highlight=False)
+            kept = any(each.identified and each.converged for each in comparison.evaluations)
+            said = job.learn if kept else "nothing, as no solver that identifies the finger converged"
+            console.print(f"learned: {said}", soft_wrap=True, highlight=False)
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
     for fault in comparison.unfinished:
         say(f"error: {fault}")

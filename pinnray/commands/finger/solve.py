@@ -46,7 +46,7 @@ def command(
     from pinnray.comparison.report.output_files import write_vtu
     from pinnray.functions import solve
     from pinnray.geometry.drawing.drawn_finger import finger_lines
-    from pinnray.geometry.finger.learned import write_learned
+    from pinnray.geometry.finger.learned import check_target, write_learned
     from pinnray.solvers.finger_figures import break_answer
     from pinnray.solvers.registry import make_solver, unknown_solver
     from pinnray.vision.measurements import parse_weighed, read_measurements
@@ -70,6 +70,8 @@ def command(
         made = make_solver(made.name, **made.settings() | {"stops": stops})
     file = existing_table(measurements)
     seen = None if file is None else read_measurements(file, marker_radius=chosen.marker_radius)
+    if taught.learn is not None:
+        check_target(taught.learn)
     if taught.weighed is not None and seen is not None:
         seen = replace(seen, weighed=parse_weighed(taught.weighed))
     if seen is None and (taught.weighed or taught.presses or taught.learn):
@@ -103,7 +105,7 @@ def command(
         print(break_answer(figures.strain_over_break, figures.peak_radius))
     if found := solution.identified:
         print(found.advice)
-        if taught.learn is not None and found.learned is not None:
+        if taught.learn is not None and found.learned is not None and solution.status.converged:
             write_learned(taught.learn, found.learned, finger_lines(chosen))
             written.append(taught.learn)
     for path in written:

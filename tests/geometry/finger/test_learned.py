@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pinnray.geometry.finger.design import Design
-from pinnray.geometry.finger.learned import Learned, read_learned, write_learned
+from pinnray.geometry.finger.learned import Learned, check_target, read_learned, write_learned
 from pinnray.geometry.finger.presets import load_design
 from pinnray.runtime.errors import UserError
 
@@ -46,6 +46,10 @@ def test_a_design_file_keeps_it_and_the_design(tmp_path):
     np.testing.assert_allclose(found.correlation, learned.correlation, atol=1e-8)
     assert load_design(tmp_path / "mine.toml") == design.replaced(name="mine")
     assert read_learned(tmp_path / "another.toml") is None
+    check_target(tmp_path / "mine.toml")  # may be learned on
+    (tmp_path / "own.toml").write_text("height = 95\n")
+    with pytest.raises(UserError, match="it holds a finger of which nothing was learned"):
+        check_target(tmp_path / "own.toml")
 
 
 @pytest.mark.parametrize(

@@ -73,4 +73,4 @@ def test_a_smaller_copy_is_no_page(tmp_path):
     small.encoderinfo = {"tiffinfo": {254: 1}}
     Image.fromarray(np.full((12, 16), 70, np.uint8)).save(path, save_all=True, append_images=[small])
     assert seen(path) == [70]
-    assert list(pages(path.read_bytes(), "a")) == [0]
+    assert list(pages(path.read_bytes())) == [0]

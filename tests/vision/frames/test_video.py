@@ -97,19 +97,17 @@ def test_hevc_of_10_bits_is_read():
 
 
 @pytest.mark.parametrize("suffix", [".mkv", ".avi"])
-def test_a_truncated_video_says_how_much_was_read(suffix, tmp_path):
+def test_a_truncated_video_is_read_as_far_as_it_goes(suffix, tmp_path):
     path = written(tmp_path / f"a{suffix}", smooth(40))
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
-    with pytest.warns(UserWarning, match="40 frames"):
-        back = read(path)
-    assert 10 < len(back) < 30
+    assert 10 < len(read(path)) < 30
 
 
 def test_whole_videos_do_not_warn(tmp_path):
     with warnings.catch_warnings(action="error"):
         read(written(tmp_path / "a.mkv", smooth(3), rate=59.94))
-        read(VIDEOS / "h264_variable_rate.mkv")  # of which OpenCV says that it has 16 frames
+        read(VIDEOS / "h264_variable_rate.mkv")
 
 
 def test_what_is_no_video_is_refused_and_ffmpeg_is_silent(tmp_path, capfd):
