@@ -92,7 +92,8 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
         solvers=solvers,
         check=partial(check_positions, given) if given else None,
     )
-    problem = Problem(mesh, job.material, job.load, finger=job.design, learned=job.learned)
+    learned = job.learned if given else None  # a simulated finger is as it is drawn
+    problem = Problem(mesh, job.material, job.load, finger=job.design, learned=learned)
     if presses := [each for each in job.presses if isinstance(each, Observations)]:
         with stages.stage("presses") as progress:
             for each in presses:
