@@ -103,8 +103,8 @@ def prepared(job: Job) -> Job:
             raise UserError("a truth is for a simulated experiment; with measurements leave it out")
         check_truths([job.truth], job.design)
     check_walls(job.simulated)
-    if job.presses and job.measurements is None:
-        raise UserError("presses are other pictures of a measured finger; give measurements, too")
+    if (job.presses or job.learn is not None) and job.measurements is None:
+        raise UserError("presses and learn are for a measured finger; give measurements, too")
     if job.learn is not None:
         check_target(job.learn)
     radius, measured = job.design.marker_radius, job.measurements
