@@ -16,6 +16,7 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import Cell, terminal_table, write_csv
+from pinnray.solvers.identification.fit import split_phrase
 from pinnray.solvers.identification.model import ResponseModel
 from pinnray.solvers.identification.tracker import ForceReading, ForceTracker
 from pinnray.solvers.identification.unknowns import DEFAULT, Unknowns
@@ -202,6 +203,10 @@ def force_table(
         f"markers are farther off than noise explains; {delays.mean():.0f} ms after a frame, at most "
         f"{delays.max():.0f} ms"
     )
+    if known:
+        caption += (
+            f"; the variance of the largest force comes from: {split_phrase(largest.reading.variances)}"
+        )
     if loss and (remark := loss_remark(forces, loss)):
         caption += f"; {remark}"
     if passed_over is not None:

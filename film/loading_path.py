@@ -106,6 +106,7 @@ class LoadingPath:
             reading,
             force=with_loss(reading.force, self._force, self._loss),
             tangential_force=with_loss(reading.tangential_force, self._tangential_force, self._loss),
+            variances={**reading.variances, "loss": (self._loss * self._force / 2) ** 2},
         )
 
 

@@ -9,6 +9,7 @@ mean m and the precision P, for n observations
 Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
 """
 
+from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.special import ndtri
 from pinnray.geometry.finger.learned import Learned
 from pinnray.geometry.mesh.boundary import mean_thickness
 from pinnray.runtime.arrays import FloatArray, IntArray
-from pinnray.solvers.assimilation.estimation import LEVEL, Estimate
+from pinnray.solvers.assimilation.estimation import LEVEL, Estimate, Prior
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
 from pinnray.solvers.identification.unknowns import (
@@ -42,10 +43,13 @@ SOURCES = {
     "finger": "walls, clamp and Poisson's ratio",
     "frames": "the frames of the pictures",
     "law": "the choice between the laws",
+    "loss": "the material's loss",
 }
 """What the variance of a force comes from, in words."""
 
 
+LEAST_SHARE = 0.01
+"""Least share of the variance of a force that is told."""
 SIDE_ODDS = 150.0
 """Of free side faces to plane strain before the markers are seen: what `LAW_ODDS` calls very strong evidence
 is asked for plane strain, which only simulated markers have."""
@@ -61,6 +65,16 @@ class FoundParameter(NamedTuple):
     low: float
     high: float
     resolution: float
+
+
+class Posterior(NamedTuple):
+    """What an estimate of p standardised values z rests on."""
+
+    prior: Prior
+    covariance: FloatArray  # Of z, shape (p, p)
+    inflation: float  # φ
+    quantile: float  # Half an interval over the standard deviation
+    slopes: FloatArray  # Derivatives of the values by z, shape (p,)
 
 
 class Fit(NamedTuple):
@@ -144,29 +158,10 @@ class Fit(NamedTuple):
         return component_of(self.model, self.response, self.standard_errors, direction)
 
     def variances(self, direction: FloatArray) -> dict[str, float]:
-        """Variance of that component, (N/mm)^2, by what it comes from: names of `SOURCES`.
-
-        With the estimate's error C A^T e - C R^T p, for unit errors e of the observations and p of the prior,
-        it is the sum of independent parts; of unknowns that are known together each has its share. Where φ is
-        above one, all but 1 / φ^2 of the observations' is misfit.
-        """
-        found, unknowns = self.estimate, self.model.unknowns
-        slopes = self.response.force_slopes @ direction * found.slopes
-        spread = found.quantile / NORMAL * found.covariance @ slopes
-        noise = float(((found.sensitivities[found.kept] @ spread) ** 2).sum())
-        misfit = 1 - 1 / found.inflation**2
-        value = float(self.response.force @ direction)
-        parts = dict.fromkeys(SOURCES, 0.0)
-        parts["third dimension"] = (self.model.doubt.force * value) ** 2
-        parts["corners"] = (self.model.doubt.corners * value) ** 2
-        parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
-        shares = spread * (found.prior.precision @ spread)
-        for name, part in zip(unknowns.names, shares.tolist(), strict=True):
-            contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
-            frame = name.startswith(("pressed", "drawn"))
-            finger = "modulus" if name == "young" else "finger"
-            parts["contact" if contact else "frames" if frame else finger] += part
-        return parts
+        """Variance of that component, (N/mm)^2, by what it comes from; see `variance_parts`."""
+        found = self.estimate
+        parts = Posterior(found.prior, found.covariance, found.inflation, found.quantile, found.slopes)
+        return variance_parts(self.model, self.response, parts, direction)
 
     @property
     def learned(self) -> Learned | None:
@@ -174,6 +169,40 @@ class Fit(NamedTuple):
         found = self.estimate
         wider = (found.quantile / NORMAL) ** 2
         return self.model.unknowns.learned(found.parameters, found.z, wider * found.covariance)
+
+
+def variance_parts(
+    model: ResponseModel, response: Response, found: Posterior, direction: FloatArray
+) -> dict[str, float]:
+    """Variance of the force's component in a direction, (2,), (N/mm)^2, by what it comes from: of `SOURCES`.
+
+    With the estimate's error C A^T e - C R^T p, for unit errors e of the observations and p of the prior, it
+    is the sum of independent parts; of unknowns that are known together each has its share. Where φ is above
+    one, all but 1 / φ^2 of the observations' is misfit.
+    """
+    slopes, wider = response.force_slopes @ direction * found.slopes, found.quantile / NORMAL
+    spread = wider * found.covariance @ slopes
+    shares = spread * (found.prior.precision @ spread)
+    noise = max(wider * float(spread @ slopes) - float(shares.sum()), 0.0)
+    misfit, value = 1 - 1 / found.inflation**2, float(response.force @ direction)
+    parts = dict.fromkeys(SOURCES, 0.0)
+    parts["third dimension"] = (model.doubt.force * value) ** 2
+    parts["corners"] = (model.doubt.corners * value) ** 2
+    parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
+    for name, part in zip(model.unknowns.names, shares.tolist(), strict=True):
+        contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
+        frame = name.startswith(("pressed", "drawn"))
+        finger = "modulus" if name == "young" else "finger"
+        parts["contact" if contact else "frames" if frame else finger] += part
+    return parts
+
+
+def split_phrase(variances: Mapping[str, float]) -> str:
+    """What a variance comes from in words, by names of `SOURCES`, the largest first."""
+    whole = sum(variances.values()) or 1.0
+    ordered = sorted(variances, key=variances.__getitem__, reverse=True)
+    told = [name for name in ordered if variances[name] >= LEAST_SHARE * whole]
+    return ", ".join(f"{100 * variances[name] / whole:.0f} % {SOURCES[name]}" for name in told)
 
 
 def component_of(

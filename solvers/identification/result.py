@@ -11,7 +11,7 @@ from pinnray.solvers.assimilation.estimation import LEVEL, MIN_RESOLUTION
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
 from pinnray.solvers.identification.field import STEP, IdentifiedField, IdentifiedSideFace, Member, Snapshot
-from pinnray.solvers.identification.fit import NORMAL, SOURCES, Fit
+from pinnray.solvers.identification.fit import NORMAL, Fit, split_phrase
 from pinnray.solvers.identification.narrowing import narrowing_phrase
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import (
@@ -34,8 +34,6 @@ CONTRADICTED = 20.0
 """φ from which the markers are not those of the finger: it is 1 to 2 over the truths of
 `comparison.evaluation.truths`, 60 with a clamp that gave by 0.5 degrees and 0.4 mm, and 270 to 410 with
 markers in another order."""
-LEAST_SHARE = 0.01
-"""Least share of the variance of the force that is told."""
 PROBABLE = 0.01
 """Least probability of a law whose field is kept."""
 
@@ -72,16 +70,13 @@ class Identified:
         parts = self.best.variances(stroke) | {"law": float(self.probabilities @ found**2)}
         whole = sum(parts.values()) or 1.0
         shares = {name: parts[name] / whole for name in sorted(parts, key=parts.__getitem__, reverse=True)}
-        split = ", ".join(
-            f"{100 * share:.0f} % {SOURCES[name]}" for name, share in shares.items() if share >= LEAST_SHARE
-        )
         narrower = narrowing_phrase(self.best, stroke, parts["law"])
         return IdentifiedForce(
             force,
             self._mean([fit.component(across) for fit in self.fits]),
             self._mean(places) if places else None,
             shares,
-            f"The variance of the force comes from: {split}. {narrower}",
+            f"The variance of the force comes from: {split_phrase(parts)}. {narrower}",
             self.best.contact,
             self.best.learned,
         )

@@ -13,7 +13,8 @@ The contact has its drawn prior in every frame, because it may move.
 """
 
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Prior, inflation_of, quantile_of, values_of
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
-from pinnray.solvers.identification.fit import NORMAL, component_of, place_of
+from pinnray.solvers.identification.fit import NORMAL, Posterior, component_of, place_of, variance_parts
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
 from pinnray.solvers.identification.unknowns import CONTACT, SHARE
 from pinnray.solvers.solution import Estimated, stroke_axes
@@ -54,6 +55,8 @@ class ForceReading:
     evaluations: int  # Equilibria that were computed
     seconds: float
     status: str  # Remarks in words; empty if there are none
+    # Of the force, (N/mm)^2, by what it comes from; see `variance_parts`
+    variances: Mapping[str, float] = field(default_factory=dict)
 
 
 class _Linearised(NamedTuple):
@@ -65,13 +68,11 @@ class _Linearised(NamedTuple):
     response: Response  # The equilibrium
 
 
-class _Posterior(NamedTuple):
-    """Estimate of z, shape (p,), its covariance, φ, half an interval over its deviation."""
+class _Found(NamedTuple):
+    """Estimate of z, shape (p,), and what it rests on."""
 
     z: FloatArray
-    covariance: FloatArray
-    inflation: float
-    quantile: float
+    posterior: Posterior
 
 
 class ForceTracker:
@@ -142,13 +143,15 @@ class ForceTracker:
         if not visible.all():
             hidden = ", ".join(str(number + 1) for number in np.flatnonzero(~visible))
             remarks.append(f"hidden: marker {hidden}")
-        if found.inflation > 1:
-            remarks.append(f"the markers are {found.inflation:.2g} times as far off as noise explains")
+        if found.posterior.inflation > 1:
+            remarks.append(
+                f"the markers are {found.posterior.inflation:.2g} times as far off as noise explains"
+            )
         return self._reading(found, "; ".join(remarks))
 
     def _searched(
         self, prior: Prior, rows: BoolArray, observed: FloatArray, noise: FloatArray
-    ) -> _Posterior | None:
+    ) -> _Found | None:
         """The estimate; None if no equilibrium is found near it."""
         for _ in range(17):  # equilibria: enough for a jump from rest by forty millimetres
             last = self._last
@@ -169,7 +172,7 @@ class ForceTracker:
             self._evaluations += 1
         return None
 
-    def _posterior(self, prior: Prior, slopes: FloatArray, residuals: FloatArray) -> _Posterior:
+    def _posterior(self, prior: Prior, slopes: FloatArray, residuals: FloatArray) -> _Found:
         """The minimum for residuals (n,) over σ at the last equilibrium and their derivatives (n, p)."""
         root, inflation = prior.root, 1.0
         observed = slopes @ self._last.z - residuals
@@ -181,7 +184,16 @@ class ForceTracker:
             used, inflation = inflation, inflation_of(slopes @ z - observed, freedom)
             if abs(inflation / used - 1) < 1e-3:
                 break
-        return _Posterior(z, np.linalg.inv(rows.T @ rows), used, quantile_of(used, freedom))
+        return _Found(
+            z,
+            Posterior(
+                prior,
+                np.linalg.inv(rows.T @ rows),
+                used,
+                quantile_of(used, freedom),
+                values_of(self._parameters, z)[1],
+            ),
+        )
 
     def _linearised(self, z: FloatArray) -> _Linearised | None:
         """The markers about the equilibrium at z; None if there is none.
@@ -194,7 +206,7 @@ class ForceTracker:
         predicted, slopes = self._markers.predicted(response)
         return _Linearised(z, predicted, slopes * derivatives, response)
 
-    def _learn(self, found: _Posterior, *, anew: bool) -> None:
+    def _learn(self, found: _Found, *, anew: bool) -> None:
         """Make the finger in a frame the prior of other frames, or average it with the prior.
 
         The covariance stays one frame's: the errors of a camera and of the model are common to all.
@@ -204,18 +216,20 @@ class ForceTracker:
         if anew:
             finger = np.ix_(self._of_finger, self._of_finger)
             precision = self._drawn.precision.copy()
-            precision[finger] = np.linalg.inv(found.covariance[finger])
+            precision[finger] = np.linalg.inv(found.posterior.covariance[finger])
         else:
             mean = self._known.mean + (mean - self._known.mean) / self._learnt
         self._known = Prior(mean, precision)
 
-    def _reading(self, found: _Posterior, status: str) -> ForceReading:
+    def _reading(self, found: _Found, status: str) -> ForceReading:
         values, derivatives = values_of(self._parameters, found.z)
-        errors = found.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(found.covariance)
+        posterior = found.posterior
+        errors = posterior.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(posterior.covariance)
         response = self._model.extrapolated(self._last.response, values)
+        stroke, side = stroke_axes(self._unknowns.problem.load)
         force, across = (
             _estimated(*component_of(self._model, response, errors, self._stiffness * axis))
-            for axis in stroke_axes(self._unknowns.problem.load)
+            for axis in (stroke, side)
         )
         place, around = place_of(self._unknowns, response, errors)
         ends = np.clip(place + NORMAL * around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
@@ -224,7 +238,8 @@ class ForceTracker:
             force=force,
             tangential_force=across,
             position=Estimated(place, float(ends[0]), float(ends[1])),
-            inflation=found.inflation,
+            variances=variance_parts(self._model, response, posterior, self._stiffness * stroke),
+            inflation=found.posterior.inflation,
         )
 
     def _unknown(self, status: str) -> ForceReading:
