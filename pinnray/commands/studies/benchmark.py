@@ -7,7 +7,7 @@ from rich.console import Console
 from pinnray.options.shared import OptionalOutputPath, SolverOptions, going_on_from
 from pinnray.runtime.exits import NOT_CONVERGED, say
 
-WIDE = ("no.", "v. Mises,\n%", "energy,\n%", "memory,\nGB")
+WIDE = ("no.", "solved", "v. Mises,\n%", "energy,\n%", "memory,\nGB")
 """Headings of columns for which a terminal is too narrow."""
 
 
