@@ -96,7 +96,7 @@ def summary_table(found: Benchmark) -> TextTable:
             number, entry = str(numbers.index(each["entry"]) + 1), each["entry"]
             counts = [f"{each[count]:.0f}/{len(problems)}" for count in ("solved", "converged")]
             rows.append((number, entry, law, *counts, *figures, f"{each['broken']:.0f}"))
-    headings = ("no.", "entry", "law", "solved", "converged", *COLUMNS, "broken\nclaims")
+    headings = ("no.", "entry", "law", "solved", "con-\nverged", *COLUMNS, "broken\nclaims")
     title = "Medians over the problems of each law that an entry solved"
     return TextTable(title, headings, rows, f"{MEANINGS} {_notes(found.entries)}", left=("entry", "law"))
 
@@ -111,7 +111,7 @@ def _problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextT
     shown = [(label, row) for label, row in rows if row.state != "refused"]
     texts = figure_texts([vars(row) for _, row in shown], Reference.load(problem).bounds)
     cells = [(label, *figures, row.state) for (label, row), figures in zip(shown, texts[1:], strict=True)]
-    reasons = [f"{label}: {row.message}" for label, row in shown if row.state != "done"]
+    reasons = [f"{label}: {row.message.rstrip('.')}." for label, row in shown if row.state != "done"]
     headings = ("entry", *COLUMNS, "ended")
     return TextTable(
         f"{problem.name}: {problem.words}",
