@@ -93,7 +93,7 @@ def page() -> Table:
         if entries:
             draw_front(found).save(DOCS / "pictures" / f"benchmark-{which}.png")
         for name, table in {"entries": summary_table(found), "broken claims": broken_table(found)}.items():
-            headings = [heading.replace("\n", " ") for heading in table.headings]
+            headings = [heading.replace("-\n", "").replace("\n", " ") for heading in table.headings]
             shown = markdown(headings, table.rows, left=3) if table.rows else "None.\n"
             fill(PAGE, f"{name}: {which}", shown)
     last = summary_table(found)

@@ -10,6 +10,7 @@ import pandas as pd
 from pinnray.runtime.content_hash import content_hash, has_source, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import machine, package_versions
+from pinnray.runtime.notebook import brief
 from pinnray.runtime.processes.pool import Pool, known_to_children
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.registry import MissingLibraryError, make_solver
@@ -61,6 +62,7 @@ class Benchmark:
     problems: ProblemSet
     entries: Sequence[Entry]
     remarks: Sequence[str] = ()
+    __repr__ = brief
 
     def table(self) -> pd.DataFrame:
         """A row for each entry and problem; see `EntryRow`."""
@@ -68,12 +70,13 @@ class Benchmark:
         return pd.DataFrame(rows, columns=["entry", *EntryRow.__dataclass_fields__]).drop(columns="claimed")
 
     def medians(self) -> pd.DataFrame:
-        """By entry and law: medians of the figures where it solved a problem, how many, and broken claims."""
+        """By entry and law: medians over the problems solved, how many, how many converged, broken claims."""
         table = self.table()
         table["linear"] = table["problem"].map({each.name: each.linear for each in self.problems.problems})
-        table["broken"] = table["broken"].map(len)
+        table["broken"], table["converged"] = table["broken"].map(len), table["state"] == "done"
         solved = table[table["displacement"].notna()].groupby(["entry", "linear"], sort=False)
-        return solved[list(FIGURES)].median().assign(solved=solved.size(), broken=solved["broken"].sum())
+        counts = solved[["converged", "broken"]].sum()
+        return solved[list(FIGURES)].median().assign(solved=solved.size(), **counts)
 
 
 def run_benchmark(job: BenchmarkJob, stages: Stages | None = None) -> Benchmark:
@@ -88,6 +91,10 @@ def run_benchmark(job: BenchmarkJob, stages: Stages | None = None) -> Benchmark:
         check_name(solver.name)
     if not labels or len(set(labels)) < len(labels):
         raise UserError(f"name each solver once, and one at least, not {', '.join(labels) or 'none'}")
+    kept = {each.label: each.settings for each in map(Entry.load, (job.out / ENTRIES).glob("*.json"))}
+    for solver, label in zip(job.solvers, labels, strict=True):
+        if content_hash(kept.get(label, {})) != content_hash(solver.settings() if label in kept else {}):
+            raise UserError(f"{job.out} holds an entry of {label} with other settings; name another --out")
     others, remarks = load_entries(job.others, problems) if job.others else ([], [])
     definition = {
         "problems": problems.described,

@@ -26,6 +26,8 @@ class EntryRow:
     von_mises_away: float | None = None  #: A wall's thickness away from corners and contact
     force: float | None = None  #: Relative, with sign
     energy: float | None = None  #: Excess over the reference's, relative
+    base: float | None = None  #: Largest displacement of the base over the stroke
+    contact: float | None = None  #: What the mean at the contact lacks to the load's, over the stroke
     seconds: float | None = None  #: Processor time, s
     times_fem: float | None = None  #: The same as a multiple of what `fem` takes
     memory: float | None = None  #: Most memory of the process, GB
@@ -91,11 +93,11 @@ def load_entries(folder: Path, problems: ProblemSet) -> tuple[list[Entry], list[
     """
     if not folder.is_dir():
         raise UserError(f"there is no folder {folder} of entries")
-    every = [Entry.load(file) for file in sorted(folder.glob("*.json"))]
-    fitting = [each for each in every if each.problems == problems.described]
-    named = [each for each in every if each.problems["name"] == problems.name]
-    left_out = [each.label for each in named if each not in fitting]
-    remark = f"left out, since they are of another version of the problems: {', '.join(left_out)}"
+    every = {file.name: Entry.load(file) for file in sorted(folder.glob("*.json"))}
+    named = {name: each for name, each in every.items() if each.problems["name"] == problems.name}
+    fitting = [each for each in named.values() if each.problems == problems.described]
+    left_out = [name for name, each in named.items() if each not in fitting]
+    remark = f"left out, since they are of another version of the set {problems.name}: {', '.join(left_out)}"
     return fitting, [remark] if left_out else []
 
 

@@ -44,7 +44,7 @@ def write_benchmark(found: Benchmark, folder: Path, record: Mapping[str, Any]) -
     write_text(folder / FIGURES, found.table().to_csv(index=False, lineterminator="\n", float_format="%.6g"))
     caption = (
         "Median error over median time; the numbers are those of the table below. Line: the front, which no "
-        "entry beats in both. Hollow: not every problem of the law was solved."
+        "entry beats in both. Open symbols: solved or converged some problems only."
     )
     pages = write_page(
         folder / PAGE,
@@ -91,12 +91,12 @@ def summary_table(found: Benchmark) -> TextTable:
         bounds = pd.DataFrame([Reference.load(each).bounds for each in problems]).median().to_dict()
         own = medians[laws == linear].reset_index()
         texts = figure_texts(own.to_dict("records"), bounds)
-        rows.append(("", BOUND, law, "", *texts[0], ""))
+        rows.append(("", BOUND, law, "", "", *texts[0], ""))
         for (_, each), figures in zip(own.iterrows(), texts[1:], strict=True):
             number, entry = str(numbers.index(each["entry"]) + 1), each["entry"]
-            solved = f"{each['solved']:.0f}/{len(problems)}"
-            rows.append((number, entry, law, solved, *figures, f"{each['broken']:.0f}"))
-    headings = ("no.", "entry", "law", "solved", *COLUMNS, "broken\nclaims")
+            counts = [f"{each[count]:.0f}/{len(problems)}" for count in ("solved", "converged")]
+            rows.append((number, entry, law, *counts, *figures, f"{each['broken']:.0f}"))
+    headings = ("no.", "entry", "law", "solved", "con-\nverged", *COLUMNS, "broken\nclaims")
     title = "Medians over the problems of each law that an entry solved"
     return TextTable(title, headings, rows, f"{MEANINGS} {_notes(found.entries)}", left=("entry", "law"))
 
@@ -111,7 +111,7 @@ def _problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextT
     shown = [(label, row) for label, row in rows if row.state != "refused"]
     texts = figure_texts([vars(row) for _, row in shown], Reference.load(problem).bounds)
     cells = [(label, *figures, row.state) for (label, row), figures in zip(shown, texts[1:], strict=True)]
-    reasons = [f"{label}: {row.message}" for label, row in shown if not row.solved]
+    reasons = [f"{label}: {row.message.rstrip('.')}." for label, row in shown if row.state != "done"]
     headings = ("entry", *COLUMNS, "ended")
     return TextTable(
         f"{problem.name}: {problem.words}",

@@ -47,10 +47,11 @@ def draw_front(found: Benchmark, page: float = WIDTH) -> Figure:
                 axes.grid(visible=True, which="both", alpha=0.6)
                 known = medians[medians.index.get_level_values("linear") == linear].dropna()
                 costs = known[["times_fem", name]].to_numpy() * [1.0, 100.0]
-                whole = (known["solved"] == known["solved"].max()).to_numpy()
+                count = sum(each.linear == linear for each in found.problems.problems)
+                whole, sure = (known[["solved", "converged"]] == count).to_numpy().T
                 best = costs[whole][unbeaten(costs[whole])]
                 axes.step(*best[best[:, 0].argsort()].T, where="post", color=MUTED, lw=1.0, zorder=1)
-                for (label, _), point, filled in zip(known.index, costs, whole, strict=True):
+                for (label, _), point, filled in zip(known.index, costs, sure, strict=True):
                     colour, mark = looks[label]
                     axes.plot(*point, mark, color=colour, mfc=colour if filled else "white", ms=5)
         for (name, _), row in zip(SHOWN.items(), grid, strict=True):  # at the last limits of the axes

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from pinnray.runtime.errors import UserError
+from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import contact_functional
 from pinnray.solvers.solution import SolidField, Solution
 from pinnray.solvers.solver import Solver, Traits, UnsupportedProblemError, check_problem, solved
 from pinnray.studies.benchmark.problems import BenchmarkProblem
@@ -23,6 +25,8 @@ ESTIMATED = 2.0
 """Largest true error over the error that the solver estimates."""
 MISSED_ENERGY = 0.02
 """Largest share of the energy by which a result may be below the least: then its quadrature misses some."""
+CONDITIONS = 1e-3
+"""Largest deviation at base and contact over the stroke, by which the force is then off in proportion."""
 QUICK_S = 5.0
 """CPU time up to which a solve is repeated, s: the first one in a process also loads libraries."""
 REPEATS = 3
@@ -64,10 +68,37 @@ def score(task: BenchmarkTask, _report: Callable[..., None]) -> list[Measurement
 
 
 def figures(solution: Solution, reference: Reference) -> dict[str, Any]:
-    """Errors by `MEASURES`, what was claimed, and the claims that are not true."""
+    """Errors by `MEASURES`, deviations at base and contact, what was claimed, and what of it is not true."""
     errors = reference.errors(reference.sampled(solution))
-    claimed = claims(solution)
-    return {**errors, "claimed": claimed, "broken": broken_claims(solution, errors, claimed, reference)}
+    claimed, stroke = claims(solution), float(np.linalg.norm(solution.problem.load.values))
+    off = missed(solution)
+    broken = broken_claims(solution, errors, claimed, reference)
+    broken += [MISSED[name].format(each) for name, each in off.items() if not each <= CONDITIONS * stroke]
+    return {
+        **errors,
+        **{name: each / stroke for name, each in off.items()},
+        "claimed": claimed,
+        "broken": broken,
+    }
+
+
+def missed(solution: Solution) -> dict[str, float]:
+    """Largest displacement of the base, and what the mean at the contact lacks to the load's, if any, mm."""
+    problem, load = solution.problem, solution.problem.load
+    space = LagrangeSpace(problem.mesh, 2)
+    base = solution.displacement(space.nodes[space.boundary_nodes("base")])
+    off = {"base": float(np.linalg.norm(base, axis=1).max())}
+    if load.kind in ("mean", "patch"):
+        points, weights = contact_functional(problem)
+        mean = weights @ solution.displacement(points)
+        off["contact"] = float(np.linalg.norm(mean[load.prescribed] - load.values))
+    return off
+
+
+MISSED = {
+    "base": "the base moves by {:.2g} mm",
+    "contact": "the contact misses the mean displacement by {:.2g} mm",
+}
 
 
 def claims(solution: Solution) -> dict[str, float | bool]:

@@ -160,7 +160,11 @@ def run_tasks(
         if not isinstance(answer, ProcessFailed):
             found = list(answer)
         elif answer.exit_code is None:
-            found = [Measurement(name, "not converged", f"{OUT_OF_TIME}: after {hard:.3g} s", hard)]
+            found = [
+                Measurement(
+                    name, "not converged", f"{OUT_OF_TIME} of {time_limit:g} s, after {hard:.3g} s", hard
+                )
+            ]
         else:
             times = f"its worker process died {deaths} times" if deaths > 1 else answer.message
             found = [Measurement(name, "failed", times, 0.0)]

@@ -5,9 +5,9 @@ from pathlib import Path
 from rich.console import Console
 
 from pinnray.options.shared import OptionalOutputPath, SolverOptions, going_on_from
-from pinnray.runtime.exits import say
+from pinnray.runtime.exits import NOT_CONVERGED, say
 
-WIDE = ("no.", "v. Mises,\n%", "energy,\n%", "memory,\nGB")
+WIDE = ("no.", "solved", "v. Mises,\n%", "energy,\n%", "memory,\nGB")
 """Headings of columns for which a terminal is too narrow."""
 
 
@@ -57,4 +57,5 @@ def command(
         print(path)
     for remark in found.remarks:
         say(f"warning: {remark}")
-    return 0
+    own = [row.state for entry in found.entries[: len(job.solvers)] for row in entry.rows]
+    return 0 if set(own) <= {"done", "refused"} else NOT_CONVERGED

@@ -12,12 +12,13 @@ from pinnray.solvers.solver import Progress, silent
 
 @dataclass(frozen=True)
 class Scaled:
-    """`fem` with its displacement and force times a factor, and an error estimate over the true one."""
+    """`fem`, its displacement and force times a factor plus a shift, mm, its error estimate times another."""
 
     factor: float = 1.0
     estimate: float = 1.0
     converged: bool = True
     wait_s: float = 0.0
+    shift: float = 0.0
     name = "scaled"
     laws = ("linear",)
     loads = ("mean",)
@@ -31,7 +32,7 @@ class Scaled:
             raise ZeroDivisionError("no factor")
         found = FemSolver().solve(problem)
         assert isinstance(found.field, LagrangeField)
-        field = LagrangeField(found.field.space, self.factor * found.field.values)
+        field = LagrangeField(found.field.space, self.factor * found.field.values + self.shift)
         error = found.error and replace(found.error, displacement=self.estimate * found.error.displacement)
         return replace(
             found, solver=self.name, field=field, error=error, energy=self.factor**2 * found.energy,

@@ -9,6 +9,7 @@ import pytest
 import pinnray as pr
 from benchmarks.entries.references import packed
 from pinnray.cli import main
+from pinnray.options.shared import SolverOptions
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.studies.benchmark import benchmark
@@ -66,11 +67,12 @@ def test_packed_values_are_within_half_a_step():
         (Scaled(), []),  # honest
         (
             Scaled(1.07),
-            ["displacement is off by 0.07 (limit 0.05), force is off", "error estimated at"],
+            ["off by 0.07 (limit 0.05), force is off", "error estimated at", "contact misses"],
         ),  # wrong, and sure of itself
-        (Scaled(1.07, estimate=100.0, converged=False), []),  # wrong, and says so
+        (Scaled(1.07, estimate=100.0, converged=False), ["contact misses"]),  # wrong, and says so
         (Scaled(estimate=0.1), ["error estimated at"]),  # right, but not as right as it says
-        (Scaled(0.97, estimate=100.0), ["below the least"]),  # less energy than there can be
+        (Scaled(0.97, estimate=100.0), ["below the least", "contact misses"]),  # less than there can be
+        (Scaled(shift=0.1, estimate=100.0), ["base moves by 0.14 mm", "mean displacement by 0.14 mm"]),
     ],
 )
 def test_claims_that_are_not_true_are_found(solver, words):
@@ -106,7 +108,7 @@ def test_a_solver_that_takes_too_long_has_a_row(tmp_path, two, monkeypatch):
     monkeypatch.setattr(benchmark, "_unit_times", lambda *_: {})
     found = run_benchmark(BenchmarkJob(solvers=[Scaled(wait_s=60)], out=tmp_path, time_limit=3.0))
     assert found.entries[0].rows[0].state == "out of time"
-    assert found.entries[0].rows[0].message == "stopped at the time limit: after 3 s"
+    assert found.entries[0].rows[0].message == "stopped at the time limit of 3 s, after 3 s"
     assert "no multiples" in found.remarks[0]
 
 
@@ -114,13 +116,15 @@ def test_an_entry_is_a_file_and_those_of_other_sets_are_left_out(tmp_path, two):
     found = pr.benchmark([Scaled(1.07)], entries=None, out=tmp_path / "out")
     page = (tmp_path / "out" / "benchmark.html").read_text()
     assert page.index("Claims that are not true") < page.index("Medians over")
+    assert "scaled: says so" not in page
+    assert len(repr(found)) < 300
     (entry,) = found.entries
     assert Entry.load(tmp_path / "out" / "entries" / "scaled-small.json") == entry
     replace(entry, label="old", problems={**entry.problems, "version": 0}).save(tmp_path)
     entry.save(tmp_path)
     fitting, remarks = load_entries(tmp_path, two)
     assert fitting == [entry]
-    assert "old" in remarks[0]
+    assert remarks == ["left out, since they are of another version of the set small: old-small.json"]
     (tmp_path / "bad.json").write_text(json.dumps({"label": "bad"}))
     with pytest.raises(UserError, match=r"bad.json is no entry of the benchmark: settings"):
         load_entries(tmp_path, two)
@@ -132,6 +136,19 @@ def test_what_the_reference_does_not_tell_apart_is_marked():
     force = list(COLUMNS).index("force,\n%")
     for bound, said in {0.006: ["0.60", "+2.0 ≈", "−2.5 ≈"], 0.004: ["0.40", "+2.0", "−2.5"]}.items():
         assert [row[force] for row in figure_texts(rows, {"force": bound})] == [*said, "–"]
+
+
+def test_a_result_that_did_not_converge_is_told(tmp_path, two, capsys, monkeypatch):
+    line = ["benchmark", "--out", str(tmp_path)]
+    for solver, code in ((Scaled(), 0), (Scaled(converged=False), 2)):
+        monkeypatch.setattr(SolverOptions, "read", lambda *_, solver=solver: [solver])
+        assert main(line) == code
+    assert f"{tmp_path} holds an entry of scaled with other settings" in capsys.readouterr().err
+    other = tmp_path / "other"
+    assert main([*line[:2], str(other)]) == 3
+    assert "scaled: says so" in (other / "benchmark.html").read_text()
+    medians = pr.benchmark([Scaled(converged=False)], out=other).medians()
+    assert medians[["solved", "converged"]].to_numpy().tolist() == [[1, 0]]
 
 
 @pytest.mark.parametrize(
