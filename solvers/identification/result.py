@@ -254,6 +254,8 @@ class Identified:
             parts.append(f"free side faces {sides:.1%} probable, plane strain {1 - sides:.1%}")
         elif seen is None or not seen.plane:
             parts.append("in plane strain: the third dimension takes fem-id and a finger with a depth")
+        if known := self.best.model.unknowns.problem.learned:
+            parts.append(f"with what {known.pictures} pictures, {known.weighed} weighed, have taught before")
         parts += [f"no equilibrium of the {law} law was found near the markers" for law in self.lost]
         parts += [f"{said}: not used" for said in self._contradictions()]
         missed = np.delete(missed, self.best.doubted, axis=0)

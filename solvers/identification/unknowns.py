@@ -149,7 +149,7 @@ class Unknowns:
         finger = [name for name in names if name not in (*WALLS, "feet") or name in self.motion.names]
         if problem.load.friction:
             finger = [SHARE if name == "shear_force" else name for name in finger]
-        learned = problem.learned is not None and "young" in problem.learned.unknowns
+        learned = problem.learned is not None and problem.learned.weighed > 0
         if problem.material.young_deviation or learned or (seen is not None and seen.weighed):
             finger.append("young")
         finger += self.feet.names

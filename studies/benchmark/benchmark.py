@@ -94,7 +94,7 @@ def run_benchmark(job: BenchmarkJob, stages: Stages | None = None) -> Benchmark:
     kept = {each.label: each.settings for each in map(Entry.load, (job.out / ENTRIES).glob("*.json"))}
     for solver, label in zip(job.solvers, labels, strict=True):
         if content_hash(kept.get(label, {})) != content_hash(solver.settings() if label in kept else {}):
-            raise UserError(f"{job.out} holds an entry of {label} with other settings; name another --out")
+            raise UserError(f"{job.out} holds an entry of {label} with other settings; name another folder")
     others, remarks = load_entries(job.others, problems) if job.others else ([], [])
     definition = {
         "problems": problems.described,

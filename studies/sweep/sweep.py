@@ -162,7 +162,7 @@ def run_tasks(
         elif answer.exit_code is None:
             found = [
                 Measurement(
-                    name, "not converged", f"{OUT_OF_TIME} of {time_limit:g} s, after {hard:.3g} s", hard
+                    name, "not converged", f"{OUT_OF_TIME}: after {hard:.3g} s, of {time_limit:g} s", hard
                 )
             ]
         else:

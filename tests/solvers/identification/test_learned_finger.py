@@ -56,9 +56,11 @@ def test_the_next_press_has_a_third_of_the_interval(finger, learned):
     own = replace(finger, observations=observed)
     halves = []
     for known in (None, learned):
-        value, low, high = SOLVER.solve(replace(own, learned=known)).identified.force
+        found = SOLVER.solve(replace(own, learned=known))
+        value, low, high = found.identified.force
         assert low < force < high
         halves.append((high - low) / 2 / value)
+    assert "with what 2 pictures, 1 weighed, have taught" in found.status.message
     assert halves[0] > 0.5  # as the modulus
     assert halves[1] < halves[0] / 3
     assert value == pytest.approx(force, rel=3 * SCALE)

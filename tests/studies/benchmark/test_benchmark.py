@@ -108,7 +108,7 @@ def test_a_solver_that_takes_too_long_has_a_row(tmp_path, two, monkeypatch):
     monkeypatch.setattr(benchmark, "_unit_times", lambda *_: {})
     found = run_benchmark(BenchmarkJob(solvers=[Scaled(wait_s=60)], out=tmp_path, time_limit=3.0))
     assert found.entries[0].rows[0].state == "out of time"
-    assert found.entries[0].rows[0].message == "stopped at the time limit of 3 s, after 3 s"
+    assert found.entries[0].rows[0].message == "stopped at the time limit: after 3 s, of 3 s"
     assert "no multiples" in found.remarks[0]
 
 
