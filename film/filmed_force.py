@@ -39,7 +39,7 @@ def true_forces(
         recording: The film.
         depth: Of the finger, mm.
         loss: Of the material. Its displacements are the elastic ones, as they are prescribed and the whole
-            body relaxes alike; see `with_loss` for its forces.
+            body relaxes alike; see `viscoelastic_forces`.
     """
     history = solution.history
     if solution.states:
@@ -52,7 +52,7 @@ def true_forces(
     place = None if places is None else CubicSpline(shares, places)
     rows: list[dict[str, Cell]] = []
     loads = [recording.load(number) for number in range(len(recording.motion))]
-    forces = with_loss(components, recording.motion, loss) if loss else components(loads)
+    forces = viscoelastic_forces(components, recording.motion, loss) if loss else components(loads)
     for number, (load, (force, across)) in enumerate(zip(loads, forces.tolist(), strict=True)):
         rows.append(
             {
@@ -67,7 +67,9 @@ def true_forces(
     return rows
 
 
-def with_loss(elastic: Callable[[FloatArray], FloatArray], motion: Motion, loss: float) -> FloatArray:
+def viscoelastic_forces(
+    elastic: Callable[[FloatArray], FloatArray], motion: Motion, loss: float
+) -> FloatArray:
     """Forces in the frames of a film of a material that loses energy, shape (f, 2), N.
 
     They are those of a standard linear solid: F - g R, where R is how much of the elastic force F has relaxed

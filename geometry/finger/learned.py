@@ -1,4 +1,4 @@
-"""What pictures have taught of a finger: means, deviations and correlations of walls, clamp and modulus."""
+"""Knowledge of a finger from its pictures: means, deviations and correlations of walls, clamp and modulus."""
 
 import json
 from collections.abc import Sequence

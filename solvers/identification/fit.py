@@ -67,7 +67,7 @@ class FoundParameter(NamedTuple):
     resolution: float
 
 
-class Posterior(NamedTuple):
+class PosteriorSpread(NamedTuple):
     """What an estimate of p standardised values z rests on."""
 
     prior: Prior
@@ -160,7 +160,7 @@ class Fit(NamedTuple):
     def variances(self, direction: FloatArray) -> dict[str, float]:
         """Variance of that component, (N/mm)^2, by what it comes from; see `variance_parts`."""
         found = self.estimate
-        parts = Posterior(found.prior, found.covariance, found.inflation, found.quantile, found.slopes)
+        parts = PosteriorSpread(found.prior, found.covariance, found.inflation, found.quantile, found.slopes)
         return variance_parts(self.model, self.response, parts, direction)
 
     @property
@@ -172,7 +172,7 @@ class Fit(NamedTuple):
 
 
 def variance_parts(
-    model: ResponseModel, response: Response, found: Posterior, direction: FloatArray
+    model: ResponseModel, response: Response, found: PosteriorSpread, direction: FloatArray
 ) -> dict[str, float]:
     """Variance of the force's component in a direction, (2,), (N/mm)^2, by what it comes from: of `SOURCES`.
 

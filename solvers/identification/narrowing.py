@@ -1,4 +1,4 @@
-"""What would narrow the interval of an identified force most, computed from the posterior of a fit.
+"""Further measurements, and the interval of an identified force that each would leave, by the posterior.
 
 A further observation of deviation one with sensitivities a leaves (C^-1 + a^T a)^-1 of a covariance C; what
 is measured by itself, such as the walls or the frames of the pictures, is known exactly from then on.

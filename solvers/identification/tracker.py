@@ -25,7 +25,7 @@ from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Prior, inflation_of, quantile_of, values_of
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
-from pinnray.solvers.identification.fit import NORMAL, Posterior, component_of, place_of, variance_parts
+from pinnray.solvers.identification.fit import NORMAL, PosteriorSpread, component_of, place_of, variance_parts
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
 from pinnray.solvers.identification.unknowns import CONTACT, SHARE
 from pinnray.solvers.solution import Estimated, stroke_axes
@@ -72,7 +72,7 @@ class _Found(NamedTuple):
     """Estimate of z, shape (p,), and what it rests on."""
 
     z: FloatArray
-    posterior: Posterior
+    posterior: PosteriorSpread
 
 
 class ForceTracker:
@@ -186,7 +186,7 @@ class ForceTracker:
                 break
         return _Found(
             z,
-            Posterior(
+            PosteriorSpread(
                 prior,
                 np.linalg.inv(rows.T @ rows),
                 used,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from pinnray.film.filmed_force import with_loss
+from pinnray.film.filmed_force import viscoelastic_forces
 from pinnray.film.loading_path import LoadingPath
 from pinnray.solvers.identification.tracker import ForceReading
 from pinnray.solvers.solution import Estimated
@@ -51,7 +51,7 @@ def test_a_second_loading_is_a_reloading_until_it_goes_farther():
 def test_intervals_hold_on_the_way_back_if_the_loss_is_given(assumed, least, most):
     """The truth is a standard linear solid of a loss of 10 %, the interval knows no more than this number."""
     path, forces, inside = LoadingPath(assumed), elastic(SHARES), []
-    truth = with_loss(elastic, MOTION, 0.1)
+    truth = viscoelastic_forces(elastic, MOTION, 0.1)
     for number, loading in enumerate(followed(path)):
         force, across = (Estimated(each, *sorted((0.97 * each, 1.03 * each))) for each in forces[number])
         reading = ForceReading(force, across, Estimated(35.0, 34.0, 36.0), 1.0, 1, 0.0, "")
@@ -66,7 +66,7 @@ def test_intervals_hold_on_the_way_back_if_the_loss_is_given(assumed, least, mos
 def test_a_filmed_cycle_loses_what_it_should(loss):
     motion = Motion(rest=6, moving=200, held=1, back=200)
     shares = motion.load(np.arange(len(motion)) + motion.shutter / 2)
-    forces, top = with_loss(elastic, motion, loss)[:, 0], int(shares.argmax())
+    forces, top = viscoelastic_forces(elastic, motion, loss)[:, 0], int(shares.argmax())
     loaded, unloaded = trapezoid(forces[: top + 1], shares[: top + 1]), -trapezoid(forces[top:], shares[top:])
     assert 1 - unloaded / loaded == pytest.approx(loss, rel=0.03)  # a frame is a hundredth of the way
     assert forces.max() == pytest.approx(elastic([1.0])[0, 0], rel=1e-3)

@@ -1,4 +1,4 @@
-"""What pictures have taught of a finger: its file, and what it says beyond what was known before."""
+"""Knowledge of a finger from its pictures: its file, and what it adds to what was known before."""
 
 import numpy as np
 import pytest
