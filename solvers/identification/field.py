@@ -86,6 +86,12 @@ def displacements_in_space(snapshots: Sequence[Snapshot], location: LocatedPoint
     return found
 
 
+def shown_displacements(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
+    """What pictures show of `displacements_in_space`, each of shape (n, 2), mm."""
+    moved = zip(snapshots, displacements_in_space(snapshots, location), strict=True)
+    return [each.pictures.shown(location.points, displacement) for each, displacement in moved]
+
+
 def gradients(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
     """Gradients by the place before the load of snapshots of one body, each of shape (n, d, d).
 
@@ -130,12 +136,7 @@ class IdentifiedField(Snapshot):
     def shown_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of what pictures show of the displacement at points (n, 2), mm: (n, 2), mm."""
         location = _on(self.problem, points)
-        return self._deviation(
-            lambda them: [
-                each.pictures.shown(location.points, moved)
-                for each, moved in zip(them, displacements_in_space(them, location), strict=True)
-            ]
-        )
+        return self._deviation(lambda them: shown_displacements(them, location))
 
     def von_mises_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of the von Mises stress at points (n, 2), mm: shape (n,), MPa."""

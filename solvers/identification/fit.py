@@ -10,6 +10,7 @@ Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from pinnray.geometry.mesh.boundary import mean_thickness
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Estimate, Prior
 from pinnray.solvers.elasticity import LawName
+from pinnray.solvers.identification.field import STEP, Snapshot
 from pinnray.solvers.identification.model import MarkerData, Response, ResponseModel
 from pinnray.solvers.identification.unknowns import (
     CONTACT,
@@ -30,6 +32,7 @@ from pinnray.solvers.identification.unknowns import (
     SHARE,
     Unknowns,
 )
+from pinnray.solvers.problem import Problem
 
 NORMAL = float(ndtri((1 + LEVEL) / 2))
 """Half of an interval over the standard deviation, of a normal distribution."""
@@ -162,6 +165,25 @@ class Fit(NamedTuple):
         found = self.estimate
         parts = PosteriorSpread(found.prior, found.covariance, found.inflation, found.quantile, found.slopes)
         return variance_parts(self.model, self.response, parts, direction)
+
+    def snapshots(self, problem: Problem) -> tuple[Snapshot, list[Snapshot]]:
+        """The finger, and that `STEP` times each of the independent standard errors away, to first order."""
+        found, *steps = (self._snapshot(problem, each) for each in (0.0, *(STEP * self.standard_errors).T))
+        return found, steps
+
+    def _snapshot(self, problem: Problem, error: FloatArray | float) -> Snapshot:
+        """The finger with the values of the fit plus an error, shape (p,)."""
+        unknowns = self.model.unknowns
+        there = self.model.extrapolated(self.response, self.response.values + error)
+        return Snapshot(
+            problem=replace(problem, material=unknowns.material(there.values)),
+            walls=unknowns.motion,
+            changes=there.hypothesis.changes,
+            clamp=there.motion,
+            body=self.model.body,
+            state=there.state,
+            pictures=there.hypothesis.pictures,
+        )
 
     @property
     def learned(self) -> Learned | None:

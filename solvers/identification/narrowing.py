@@ -11,8 +11,8 @@ import numpy as np
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.assimilation.misfit import boundary_distances
+from pinnray.solvers.identification.field import STEP, shown_displacements
 from pinnray.solvers.identification.fit import NORMAL, Fit
-from pinnray.solvers.identification.model import MarkerData, MarkerModel
 from pinnray.solvers.identification.unknowns import WALLS
 
 CANDIDATES = 60
@@ -67,11 +67,10 @@ def _tried(fit: Fit, direction: FloatArray) -> Iterator[Remedy]:
         yield Remedy("fiducials and a fixed camera", known(frames))
     if (walls := np.isin(names, WALLS)).any():
         yield Remedy("walls that are measured", known(walls))
-    points, rows = _places(fit)
-    pulled = rows @ found.covariance
-    gained = pulled @ slopes
-    inner = np.eye(2) + np.einsum("mip,mjp->mij", pulled, rows)
-    less = wider * np.einsum("mi,mi->m", gained, np.linalg.solve(inner, gained[..., None])[..., 0])
+    points, moves = _places(fit)
+    gained = moves @ (fit.response.force_slopes @ direction @ fit.standard_errors)
+    inner = np.eye(2) + np.einsum("mip,mjp->mij", moves, moves)
+    less = np.einsum("mi,mi->m", gained, np.linalg.solve(inner, gained[..., None])[..., 0])
     if len(points):
         best = int(less.argmax())
         place = "({:.0f}, {:.0f})".format(*points[best])
@@ -79,13 +78,17 @@ def _tried(fit: Fit, direction: FloatArray) -> Iterator[Remedy]:
 
 
 def _places(fit: Fit) -> tuple[FloatArray, FloatArray]:
-    """Places (m, 2), mm, in the drawn body where a marker would fit, and its sensitivities, (m, 2, p)."""
-    data, mesh = fit.measurement, fit.model.unknowns.problem.mesh
+    """Places (m, 2), mm, in the drawn body where a marker would fit, and how far it moves there.
+
+    That is by each of p independent errors of one standard deviation, over the error of a marker: (m, 2, p).
+    """
+    data, problem = fit.measurement, fit.model.unknowns.problem
+    mesh, wider = problem.mesh, fit.estimate.quantile / NORMAL
     centres = mesh.at_centroids().points
     centres = centres[:: max(1, len(centres) // (10 * CANDIDATES))]
     centres = centres[boundary_distances(mesh, centres) > 0.9 * data.radius]
     centres = centres[:: max(1, len(centres) // CANDIDATES)]
-    marker = MarkerData(centres, np.zeros_like(centres), np.ones_like(centres), 0.0)
-    _, slopes = MarkerModel(fit.model, marker).predicted(fit.response)
-    noise = fit.estimate.inflation * float(np.median(data.deviations))
-    return centres, (slopes * fit.estimate.slopes / noise).reshape(len(centres), 2, -1)
+    found, steps = fit.snapshots(problem)
+    own, *others = shown_displacements([found, *steps], mesh.locate(centres))
+    noise = wider * STEP * fit.estimate.inflation * float(np.median(data.deviations))
+    return centres, np.stack([(other - own) / noise for other in others], axis=-1)

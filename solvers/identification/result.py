@@ -1,7 +1,7 @@
 """All fits of the unknowns, one a law, and the solution with its numbers and sentence."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, MIN_RESOLUTION
 from pinnray.solvers.assimilation.misfit import leave_one_out_displacements
 from pinnray.solvers.elasticity import LawName
-from pinnray.solvers.identification.field import STEP, IdentifiedField, IdentifiedSideFace, Member, Snapshot
+from pinnray.solvers.identification.field import IdentifiedField, IdentifiedSideFace, Member
 from pinnray.solvers.identification.fit import NORMAL, Fit, split_phrase
 from pinnray.solvers.identification.narrowing import narrowing_phrase
 from pinnray.solvers.problem import Problem
@@ -107,7 +107,7 @@ class Identified:
         unstable = best.model.unstable(best.response)
         missed, without = self._residuals()
         members = [
-            _member(fit, float(probability), problem)
+            Member(float(probability), *fit.snapshots(problem), fit.response, fit.model)
             for fit, probability in zip(self.fits, self.probabilities, strict=True)
             if fit is best or probability >= PROBABLE
         ]
@@ -269,29 +269,3 @@ class Identified:
         ]:
             parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
         return "; ".join(parts)
-
-
-def _member(fit: Fit, probability: float, problem: Problem) -> Member:
-    """The finger of a fit and its neighbours by a step of each independent standard error."""
-    return Member(
-        probability,
-        _snapshot(fit, problem),
-        [_snapshot(fit, problem, error) for error in (STEP * fit.standard_errors).T],
-        fit.response,
-        fit.model,
-    )
-
-
-def _snapshot(fit: Fit, problem: Problem, error: FloatArray | float = 0.0) -> Snapshot:
-    """The finger with the values of a fit plus an error, shape (p,), to first order."""
-    unknowns = fit.model.unknowns
-    there = fit.model.extrapolated(fit.response, fit.response.values + error)
-    return Snapshot(
-        problem=replace(problem, material=unknowns.material(there.values)),
-        walls=unknowns.motion,
-        changes=there.hypothesis.changes,
-        clamp=there.motion,
-        body=fit.model.body,
-        state=there.state,
-        pictures=there.hypothesis.pictures,
-    )

@@ -33,6 +33,9 @@ TOLERANCE = 1e-2
 MOST_ITERATIONS = 8
 """Iterations of conjugate gradients that cost less than factors of the tangent at hand."""
 
+ALIKE = 0.5
+"""Change of a tangent over itself up to which its factors tell the signs of its eigenvalues."""
+
 
 class WallMetric(NamedTuple):
     """Change of coordinates by moved walls at the quadrature points: M, (q, 2, 2), and det(I + ∇W), (q,)."""
@@ -106,7 +109,21 @@ class NetworkBody:
     def _negative(self, tangent: torch.Tensor) -> int:
         """Number of negative eigenvalues of a tangent A at the quadrature points."""
         with pool():
+            if self._factors is not None and self._alike(self._factors, tangent):
+                return self._factors.negative
             return self._factorised(tangent).negative
+
+    def _alike(self, factors: Factors, tangent: torch.Tensor) -> bool:
+        """Whether a tangent K has as many negative eigenvalues as that of the factors, K0.
+
+        On the way from K0 to K one changes its sign only if K0^-1 (K - K0) has an eigenvalue of -1 or less.
+        The one farthest from zero is found by the power method, from one vector.
+        """
+        change = torch.from_numpy(np.random.default_rng(0).normal(size=(1, *self.shape)))
+        for _ in range(MOST_ITERATIONS):
+            vector = change / change.norm()
+            change = _back_substituted(factors, self._product(factors, tangent, vector)) - vector
+        return float(change.norm()) < ALIKE
 
     def _solved(self, tangent: torch.Tensor, right: FloatArray) -> FloatArray:
         """Solutions for generalised forces (r, *shape) with the tangent A at the quadrature points."""

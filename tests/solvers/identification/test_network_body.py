@@ -114,6 +114,19 @@ def test_factors_from_far_away_are_replaced(body, mesh, state, changes):
     assert body.factorisations == before + 1
 
 
+@pytest.mark.parametrize(
+    ("stiffer", "new", "falling"), [(0.8, 0, False), (0.4, 1, False), (-1.0, 1, True)], ids=str
+)
+def test_factors_of_a_tangent_nearby_tell_of_stability(body, mesh, state, changes, stiffer, new, falling):
+    """Where the tangent has changed by less than half; with moduli below zero the energy falls everywhere."""
+    body.linearised(state, LAME, changes).solve(pressed(body, mesh)[None])
+    before = body.factorisations
+    lame = LAME._replace(λ=stiffer * LAME.λ, μ=stiffer * LAME.μ)
+    negative = body.linearised(state, lame, changes).negative()
+    assert body.factorisations == before + new
+    assert negative == (state.size if falling else 0)
+
+
 def test_slopes_by_walls_and_moduli_are_those_of_differences(body, state, changes):
     walls, moduli, _ = body.force_slopes(state, LAME, changes)
     for found, one in zip(walls, np.eye(len(changes)), strict=True):
