@@ -131,26 +131,29 @@ class IdentifiedField(Snapshot):
     def standard_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of `displacement_in_space` at points (n, 2), mm: shape (n, 2), mm."""
         location = _on(self.problem, points)
-        return self._deviation(lambda them: displacements_in_space(them, location))
+        return self._deviation(lambda them: displacements_in_space(them, location))[1]
 
     def shown_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of what pictures show of the displacement at points (n, 2), mm: (n, 2), mm."""
         location = _on(self.problem, points)
-        return self._deviation(lambda them: shown_displacements(them, location))
+        return self._deviation(lambda them: shown_displacements(them, location))[1]
 
     def von_mises_deviation(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Standard deviation of the von Mises stress at points (n, 2), mm: shape (n,), MPa."""
         location = _on(self.problem, points)
-        found = self._deviation(lambda them: von_mises_stresses(them, location))
+        own, found = self._deviation(lambda them: von_mises_stresses(them, location))
         if not (share := self.members[0].model.doubt.stress):
             return found
-        (own,), mesh = von_mises_stresses([self], location), self.problem.mesh
-        (all_over,) = von_mises_stresses([self], mesh.at_centroids())
         # Over a section bending differs from that of the plane also where the plane has little stress.
+        mesh, all_over = self.problem.mesh, own
+        if not np.array_equal(location.points, (centroids := mesh.at_centroids()).points):
+            (all_over,) = von_mises_stresses([self], centroids)
         return np.hypot(found, share * np.hypot(own, np.sqrt(np.average(all_over**2, weights=mesh.areas))))
 
-    def _deviation(self, quantities: Callable[[Sequence[Snapshot]], list[FloatArray]]) -> FloatArray:
-        """Standard deviation of a quantity, a function of snapshots of one body."""
+    def _deviation(
+        self, quantities: Callable[[Sequence[Snapshot]], list[FloatArray]]
+    ) -> tuple[FloatArray, FloatArray]:
+        """A quantity, a function of snapshots of one body, by the best fit, and its standard deviation."""
         best: FloatArray | None = None
         variance: FloatArray | float = 0.0
         for member in self.members:
@@ -158,7 +161,7 @@ class IdentifiedField(Snapshot):
             best = own if best is None else best
             spread = sum(((step - own) / STEP) ** 2 for step in steps)
             variance = variance + member.probability * (spread + (own - best) ** 2)
-        return np.sqrt(variance)
+        return np.asarray(best), np.sqrt(variance)
 
 
 @dataclass(frozen=True, eq=False)
