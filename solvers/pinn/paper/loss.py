@@ -72,10 +72,11 @@ Chunk = tuple[LossTerm, slice]
 
 
 class LossEvaluation(NamedTuple):
-    """The loss at some parameters."""
+    """The loss at some parameters, on their device: nothing is read back."""
 
-    terms: dict[str, float]  # Value of every term, without its factor
-    total: float  # Sum of factor times term
+    values: (
+        torch.Tensor
+    )  # Value of every term, without its factor, and the total, in double precision, (k + 1,)
     gradient: torch.Tensor  # Of the total, shape (networks, parameters)
 
 
@@ -93,20 +94,22 @@ class Loss:
         Chunks are added in their order, so that rounding is independent of the number of threads.
         """
 
-        def part(chunk: Chunk) -> tuple[str, float, torch.Tensor]:
+        def part(chunk: Chunk) -> tuple[str, torch.Tensor, torch.Tensor]:
             term, rows = chunk
             own = parameters.detach().requires_grad_()
             value = term.value(self.network, own, rows)
             (slope,) = torch.autograd.grad(self.factors[term.name] * value, own)
-            return term.name, float(value.detach()), slope
+            return term.name, value.detach().double(), slope
 
-        terms = dict.fromkeys(self.factors, 0.0)
+        # A GPU's work is captured where it is launched, which other threads do not.
+        parts = map(part, self._chunks) if parameters.is_cuda else imap_in_threads(part, self._chunks)
+        terms = {name: parameters.new_zeros((), dtype=torch.float64) for name in self.factors}
         gradient = torch.zeros_like(parameters)
-        for name, value, slope in imap_in_threads(part, self._chunks):
+        for name, value, slope in parts:
             terms[name] += value
             gradient += slope
-        total = sum(self.factors[name] * value for name, value in terms.items())
-        return LossEvaluation(terms, total, gradient)
+        total = torch.stack([self.factors[name] * value for name, value in terms.items()]).sum()
+        return LossEvaluation(torch.stack([*terms.values(), total]), gradient)
 
     @cached_property
     def _chunks(self) -> list[Chunk]:

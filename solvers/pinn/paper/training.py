@@ -16,6 +16,10 @@ from pinnray.solvers.solver import Progress, TrainingDiverged
 
 DIVERGED = 1e3
 """Ratio of the loss to its first value above which the training has diverged."""
+UNREAD = 100
+"""Epochs on a GPU between two times that the losses are read, for which it must stop."""
+WARM_UP = 3
+"""Epochs on a GPU before one is captured: the first ones allocate and initialise."""
 
 
 class Training:
@@ -40,10 +44,17 @@ class Training:
         self.parameters = initial
         self.columns = ("epoch", *loss.factors, "total", "energy", "seconds")
         self._loss, self._area, self._store = loss, area, store
-        self._stepper = torch.optim.Adam([initial], lr=learning_rate)
+        initial.grad = self._gradient = torch.zeros_like(initial)
+        self._stepper = torch.optim.Adam([initial], lr=learning_rate, capturable=initial.is_cuda)
+        self._together = UNREAD if initial.is_cuda else 1
+        self._losses = initial.new_zeros(UNREAD, len(loss.factors) + 1, dtype=torch.float64)
+        self._unread = torch.zeros(1, dtype=torch.int64, device=initial.device)
+        self._warm, self._advance = 0, self._eagerly_on_a_gpu if initial.is_cuda else self._step
         self._rows: list[tuple[float, ...]] = []
         if store and (saved := store.load()):
             self.parameters.copy_(saved["parameters"])
+            for group in saved["optimiser"]["param_groups"]:
+                group["capturable"] = initial.is_cuda  # another device's training may go on here
             self._stepper.load_state_dict(saved["optimiser"])
             self._rows = [tuple(row) for row in saved["history"].tolist()]
         self._started = time.perf_counter() - (self._rows[-1][-1] if self._rows else 0.0)
@@ -59,7 +70,7 @@ class Training:
         return np.array(self._rows).reshape(-1, len(self.columns))
 
     def run(self, epochs: int, checkpoint_every: int, progress: Progress) -> None:
-        """Train, and report the terms of the loss and the energy after each epoch.
+        """Train, and report the terms of the loss and the energy: on a GPU after `UNREAD` epochs, else each.
 
         Args:
             epochs: In all, those of a checkpoint included.
@@ -72,7 +83,8 @@ class Training:
         last = self._state()
         try:
             while self.epoch < epochs:
-                terms = self._step()
+                left = checkpoint_every - self.epoch % checkpoint_every if checkpoint_every else epochs
+                terms = self._epochs(min(self._together, epochs - self.epoch, left))
                 last = self._state()
                 if checkpoint_every and self.epoch % checkpoint_every == 0:
                     self._save(last)
@@ -82,14 +94,44 @@ class Training:
             raise
         self._save(last)
 
-    def _step(self) -> Mapping[str, float]:
-        """One step of the optimiser; the terms of the loss before it."""
-        terms, total, self.parameters.grad = self._loss(self.parameters)
-        self._check(total)
-        self._stepper.step()
-        seconds = time.perf_counter() - self._started
-        self._rows.append((self.epoch + 1, *terms.values(), total, self._area * terms["PDE"], seconds))
+    def _epochs(self, count: int) -> Mapping[str, float]:
+        """Some epochs, whose losses are then read; the terms of the last one before its step."""
+        self._unread.zero_()
+        for _ in range(count):
+            self._advance()
+        read = self._losses[:count].tolist()
+        before = self._rows[-1][-1] if self._rows else 0.0
+        clock = np.linspace(before, time.perf_counter() - self._started, count + 1)[1:]
+        for values, seconds in zip(read, clock.tolist(), strict=True):
+            terms = dict(zip(self._loss.factors, values[:-1], strict=True))
+            self._check(values[-1])
+            self._rows.append((self.epoch + 1, *values, self._area * terms["PDE"], seconds))
         return terms
+
+    def _step(self) -> None:
+        """One step of the optimiser; the loss before it stays on the device."""
+        found = self._loss(self.parameters)
+        self._losses.index_copy_(0, self._unread, found.values[None])
+        self._unread += 1
+        self._gradient.copy_(found.gradient)
+        self._stepper.step()
+
+    def _eagerly_on_a_gpu(self) -> None:
+        """A step beside the default stream, as a graph needs; those after `WARM_UP` repeat one graph.
+
+        Launched one by one, the kernels of an epoch take far longer to start than to run.
+        """
+        beside = torch.cuda.Stream()
+        beside.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(beside):
+            self._step()
+        torch.cuda.current_stream().wait_stream(beside)
+        self._warm += 1
+        if self._warm == WARM_UP:
+            graph = torch.cuda.CUDAGraph()
+            with torch.cuda.graph(graph):
+                self._step()
+            self._advance = graph.replay
 
     def _said(self, terms: Mapping[str, float]) -> str:
         values = ", ".join(f"{name} {value:.3g}" for name, value in terms.items())

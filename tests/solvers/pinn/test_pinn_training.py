@@ -11,6 +11,7 @@ import torch
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.pinn.paper.checkpoint import CheckpointStore
 from pinnray.solvers.pinn.paper.solver import PaperPinnSolver
+from pinnray.solvers.pinn.paper.training import UNREAD, Training
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import TrainingContext, TrainingDiverged
@@ -140,6 +141,21 @@ def test_progress_is_told_after_every_epoch(problem):
     assert told[9][1].startswith("epoch 10 of 40: PDE ")
 
 
+def test_losses_that_are_read_together_are_the_same_to_the_bit(problem, straight, monkeypatch):
+    """As on a GPU, up to each checkpoint; the clock runs on between them."""
+    begin, told = Training.__init__, []
+
+    def together(self, *given):
+        begin(self, *given)
+        self._together = UNREAD
+
+    monkeypatch.setattr(Training, "__init__", together)
+    found = SMALL.solve(problem, lambda fraction, text: told.append(text.partition(":")[0]))
+    assert_identical(found, straight)
+    assert told == [f"epoch {epoch} of 40" for epoch in (7, 14, 21, 28, 35, 40)]
+    assert (np.diff(found.history["seconds"]) > 0).all()
+
+
 def test_a_loss_that_is_no_number_stops_the_training(problem, tmp_path):
     """The last checkpoint before it stays."""
     solver = replace(SMALL, learning_rate=1e300, precision="double", checkpoint_every=1)
@@ -159,6 +175,7 @@ def test_a_gpu_trains_as_the_processor_does(problem):
     settings = {"precision": "double", "epochs": 15}
     cpu, gpu = (replace(SMALL, device=device, **settings).solve(problem) for device in ("cpu", "cuda"))
     torch.testing.assert_close(gpu.field.parameters, cpu.field.parameters, rtol=1e-9, atol=1e-12)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(gpu.history["total"], cpu.history["total"], rtol=1e-9)
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="a CUDA device is there")
