@@ -267,13 +267,13 @@ def estimate(
     inflation = 1.0  # a larger one from the start could leave the search where the priors are
     kept = np.ones(len(observed), dtype=bool) if kept is None else kept
     for _ in range(rounds):
-        used, weight = inflation, kept[:, None] / inflation
+        used = inflation
         fit = least_squares(
-            lambda z, weight=weight: np.concatenate(
-                [weight[:, 0] * whitened(z)[0], known.root @ (z - known.mean), [expected]]
+            lambda z, used=used, kept=kept: np.concatenate(
+                [whitened(z)[0][kept] / used, known.root @ (z - known.mean), [expected]]
             ),
             z,
-            lambda z, weight=weight: np.concatenate([weight * whitened(z)[1], known.root, [flat]]),
+            lambda z, used=used, kept=kept: np.concatenate([whitened(z)[1][kept] / used, known.root, [flat]]),
             bounds=bounds,
             xtol=1e-6,
             ftol=cost_change,

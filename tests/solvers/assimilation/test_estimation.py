@@ -252,6 +252,12 @@ def test_the_search_begins_at_a_place_with_a_prediction_and_finds_the_value(star
     assert min(calls) < limits.get("low", np.inf)
 
 
+def test_a_search_without_an_observation_may_meet_places_without_a_prediction() -> None:
+    """There the residual of what is left out is infinite, and no number times nothing."""
+    found = searched([], low=1.5, start=np.array([0.3]), kept=np.arange(4) > 0)
+    assert found.values == pytest.approx([2.0], abs=0.01)
+
+
 def test_a_search_that_ends_early_says_so() -> None:
     for settings in ({"steps": 1}, {"steps": 2, "rounds": 1}):
         assert not searched([], **settings).converged
