@@ -213,6 +213,13 @@ _TRUTHS = (
     Truth(
         "3d", f"neo-Hookean finger in three dimensions, of which the side face is seen, {_SLIDES}", solid=True
     ),
+    Truth(
+        "3d-cylinder",
+        f"neo-Hookean finger in three dimensions, of which the side face is seen, {_CYLINDER.format(10)}",
+        radius=10.0,
+        slope=0.0,
+        solid=True,
+    ),
     Truth("wide", f"neo-Hookean, {_ROUGH.format(25, 0.9)}", radius=25.0, friction=0.9, slope=0.0),
     Truth(
         "limit",
