@@ -148,7 +148,10 @@ class FoldRunner:
             force, _ = indenter_forces(self.problem.load, solution.reaction, identified)
             found["force_error"] = float(force / truth.force - 1)
         if identified:
-            found["force_within_stated"] = identified.force.low <= truth.force <= identified.force.high
+            (_, low, high), (_, left, right) = identified.force, identified.tangential_force
+            found["force_half_width"] = float((high - low) / (2 * abs(truth.force)))
+            found["force_within_stated"] = low <= truth.force <= high
+            found["tangential_within_stated"] = left <= truth.tangential <= right
             if place := identified.position:
                 found["position_error_mm"] = place.value - truth.position
                 found["position_within_stated"] = place.low <= truth.position <= place.high

@@ -36,7 +36,11 @@ def write_results(result: CrossvalResult, provenance: Mapping[str, Any]) -> None
     content = {
         **provenance,
         "contacts": {
-            name: {"true_force_N_mm": truth.force, "true_position_mm": truth.position}
+            name: {
+                "true_force_N_mm": truth.force,
+                "true_tangential_force_N_mm": truth.tangential,
+                "true_position_mm": truth.position,
+            }
             for name, truth in result.truths.items()
         },
         "failed": dict(result.failed),

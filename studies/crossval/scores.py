@@ -15,7 +15,12 @@ LEVEL = 0.95
 """Confidence level of every interval; `within_stated` is the share of errors inside the stated interval."""
 
 FIELDS = ("displacement", "strain", "von_mises", "von_mises_true_law")
-STATED = ("von_mises_within_stated", "force_within_stated", "position_within_stated")
+STATED = (
+    "von_mises_within_stated",
+    "force_within_stated",
+    "tangential_within_stated",
+    "position_within_stated",
+)
 HELD_OUT = "held_out_mae_sum_mm"
 COMPARED = (HELD_OUT, *FIELDS[:3], "force_error")
 """Scores of which differences from the baselines are computed."""
@@ -24,7 +29,7 @@ BASELINES = ("fem", "gp", "fem-asm")
 
 CASE, SCORED = ["truth", "layout"], ["truth", "layout", "solver", "scheme"]
 ERRORS = ["error_u_mm", "error_v_mm"]
-ONCE = [*FIELDS, "force_error", "position_error_mm", *STATED, "converged"]
+ONCE = [*FIELDS, "force_error", "force_half_width", "position_error_mm", *STATED, "converged"]
 """Columns of which a fold has one number, equal in the rows of all its markers."""
 
 

@@ -57,8 +57,10 @@ FIELDS: Mapping[str, tuple[str, Format]] = {
 TRUTHS: Mapping[str, tuple[str, Format]] = {
     "v.\nMises": ("von_mises", _percent),
     "force": ("force_error", _percent),
+    "±": ("force_half_width", _percent),
     "within:\nv. Mises": ("von_mises_within_stated", _percent),
     "\nforce": ("force_within_stated", _percent),
+    "tan-\ngent.": ("tangential_within_stated", _percent),
     "\nplace": ("position_within_stated", _percent),
 }
 CAPTION = (
@@ -96,7 +98,8 @@ def truth_tables(result: CrossvalResult) -> list[TextTable]:
             f"Held-out error in {result.main_scheme}, mm; stress and force with every marker given, %",
             *_grid(result, [ALL], TRUTHS, held_out=result.main_scheme),
             f"Truths are solutions of {', '.join(simulations)}. von Mises: relative L2 distance over the "
-            "body, at points that move with the walls. Force: along the stroke, against the truth's. "
+            "body, at points that move with the walls. Force: along the stroke, against the truth's; ±: half "
+            "of its interval; tangent.: that across the stroke. "
             f"Within: how often the truth lies in the interval of {LEVEL:.0%} that the solver states.",
         ),
     ]

@@ -145,6 +145,7 @@ class TrueField:
 
     sampled: SampledField
     force: float  # along the stroke, N/mm
+    tangential: float  # across it, N/mm
     position: float  # abscissa where it acts, before the load, mm
 
 
@@ -194,7 +195,8 @@ def simulate_truth(task: TruthTask, _: object = None) -> dict[str, TrueField]:
         if found.contact is None:  # the cylinder has slipped off
             raise UserError(f"the virtual experiment: {found.status.message}")
         field = sampler.of_solution(found, shared, truth.changes(drawn))
-        return TrueField(field, float(stroke_axes(study.load)[0] @ found.reaction), found.contact[0])
+        force, tangential = (stroke_axes(study.load) @ found.reaction).tolist()
+        return TrueField(field, force, tangential, found.contact[0])
 
     return {
         layout: cached(

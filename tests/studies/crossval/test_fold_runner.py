@@ -35,7 +35,8 @@ SETTINGS: dict[str, dict[str, object]] = {"gp": {}, "fem-id": QUICK}
 def task(coarse_mesh, truth, observations) -> SolverTask:
     """`gp` and one fold of each kind, at the full load and half of it."""
     sampled = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8).of_solution(truth, coarse_mesh)
-    truths = [TrueField(sampled * share, share * float(-truth.reaction[1]), 35.0) for share in (1.0, 0.5)]
+    force = float(-truth.reaction[1])
+    truths = [TrueField(sampled * share, share * force, 0.0, 35.0) for share in (1.0, 0.5)]
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
         name="gp, sliding, joints",
@@ -229,7 +230,9 @@ def test_force_place_and_stated_intervals_are_judged_by_the_truth(task, coarse_m
     full, one, _ = judged(task)
     assert full["force_error"] == pytest.approx(1.0)
     assert full["position_error_mm"] == pytest.approx(1.5)
+    assert full["force_half_width"] == pytest.approx(0.6)
     assert full["force_within_stated"] is True
+    assert full["tangential_within_stated"] is False
     assert full["position_within_stated"] is False
     rule = body_quadrature(coarse_mesh)
     beyond = rule.location.points[:, 0] >= 30.0  # the linear stress is nowhere exactly the neo-Hookean one

@@ -170,7 +170,7 @@ def result(
     ]
     study = CrossvalStudy(design=Design(), solvers=[], out=Path(), truths=[case[0] for case in cases])
     none = np.zeros((0, 2))
-    true = TrueField(SampledField(none, none, np.zeros((0, 2, 2))), 1.0, 35.0)
+    true = TrueField(SampledField(none, none, np.zeros((0, 2, 2))), 1.0, 0.0, 35.0)
     truths = {truth: true for truth, _ in cases}
     return CrossvalResult(study, left_out_table(samples), dict.fromkeys(truths, "a test"), truths, {})
 
