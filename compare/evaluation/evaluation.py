@@ -21,10 +21,14 @@ from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_arrays
+from pinnray.runtime.content_hash import content_hash, sources_digest
+from pinnray.runtime.machine import package_versions
 from pinnray.runtime.notebook import brief
 from pinnray.solvers.finger_figures import FingerFigures, figures_of
 from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import IdentifiedForce, SolidField, Solution
+from pinnray.solvers.solver import Solver
 
 QUADRATURE_DEGREE = 2
 FORCE, FIGURES = TypeAdapter(IdentifiedForce | None), TypeAdapter(FingerFigures | None)
@@ -224,6 +228,13 @@ class Evaluation:
                 f"{path} is damaged ({type(error).__name__}) and is made again", RuntimeWarning, stacklevel=2
             )
             return None
+
+
+def solution_key(solver: Solver, problem: Problem, *more: object) -> str:
+    """Hash of all that a solution depends on: solver, problem, versions, sources, and more."""
+    code = sources_digest(__name__, type(solver).__module__)
+    made_by = [solver.name, type(solver).__qualname__, solver.settings(), package_versions(), code]
+    return content_hash([*made_by, problem.digest, *more])
 
 
 def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> Evaluation:

@@ -62,11 +62,7 @@ QUANTITIES = (
 
 
 DISPLACEMENT = FieldQuantity(
-    "displacement",
-    "Displacement magnitude",
-    "mm",
-    False,
-    lambda evaluation: np.hypot(*evaluation.displacement.T),
+    "displacement", "Displacement magnitude", "mm", False, lambda each: np.hypot(*each.displacement.T)
 )
 
 VIEWED = (DISPLACEMENT, *QUANTITIES)

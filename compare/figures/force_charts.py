@@ -69,14 +69,9 @@ def draw_force_displacement(
             value, low, high = found[number][1]
             # Beside each other: the intervals of several solvers would hide each other.
             x, interval = reach * (1 - apart * (place + 1)), [[value - low], [high - value]]
-            style: dict[str, Any] = {
-                "ms": 4.5,
-                "capsize": 2.5,
-                "lw": 1.2,
-                "color": solver_look(found[number][0].solver).colour,
-                "zorder": 5,
-            }
-            axes.errorbar([x], [value], yerr=interval, fmt="s", label=label, **style)
+            colour = solver_look(found[number][0].solver).colour
+            style: dict[str, Any] = {"ms": 4.5, "capsize": 2.5, "lw": 1.2, "zorder": 5}
+            axes.errorbar([x], [value], yerr=interval, fmt="s", label=label, color=colour, **style)
         every = [*curves, truth] if truth else curves
         axes.set_xlim(0, (1 + apart) * max(curve.stroke[-1] for curve in every))
         forces = np.concatenate(
@@ -142,9 +137,8 @@ def draw_force_track(
                 axes.plot(along, value, color=colour, linewidth=1.2, linestyle=style, label=name)
             axes.set_ylabel(label)
             axes.grid()
-            axes.set_xlim(
-                float(np.nanmin(along)), max(float(np.nanmax(along)), float(np.nanmin(along)) + 1e-3)
-            )
+            first, last = float(np.nanmin(along)), float(np.nanmax(along))
+            axes.set_xlim(first, max(last, first + 1e-3))
             if values is forces:
                 top = float(forces[known, 2].max(initial=0.0)) or 1.0
                 axes.set_ylim(1.05 * min(forces[known, 1].min(initial=0.0), 0.0), 1.05 * top)

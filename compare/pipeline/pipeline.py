@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -82,16 +81,7 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
     """
     given = job.measurements if isinstance(job.measurements, Observations) else None
     solvers, unsupported = supported_solvers(job.solvers, job.spare, job.material, job.load)
-    mesh, adaptation = shared_mesh(
-        job.design,
-        job.mesh,
-        stages,
-        tolerance=job.adapt,
-        material=job.material,
-        load=job.load,
-        solvers=solvers,
-        check=partial(check_positions, given) if given else None,
-    )
+    mesh, adaptation = shared_mesh(job, solvers, stages)
     learned = job.learned if given else None  # a simulated finger is as it is drawn
     problem = Problem(mesh, job.material, job.load, finger=job.design, learned=learned)
     if presses := [each for each in job.presses if isinstance(each, Observations)]:
