@@ -176,14 +176,8 @@ def _error_vectors(
     room = 0.1 * float(np.ptp(axes.get_xlim()))
     factor = max((each for each in FACTORS if each * longest <= room), default=1)
     style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": MEASURED, "zorder": 6}
-    shape: dict[str, Any] = {
-        "units": "inches",
-        "width": 0.014,
-        "headwidth": 4,
-        "headlength": 4.5,
-        "headaxislength": 4,
-    }
-    axes.quiver(*observed.T, *(factor * error).T, **style, **shape, minlength=0.1)
+    head: dict[str, Any] = {"headwidth": 4, "headlength": 4.5, "headaxislength": 4, "minlength": 0.1}
+    axes.quiver(*observed.T, *(factor * error).T, units="inches", width=0.014, **style, **head)
     axes.set_title(f"×{factor}", loc="right", size=SMALL, pad=3, y=1.0, color=MEASURED)
 
 

@@ -59,11 +59,8 @@ class CheckedModel(BaseModel):
             values = by_parameter_name(given, type(self))
             for name, value in values.items():
                 field = type(self).model_fields.get(name)
-                if (
-                    isinstance(value, bool)
-                    and field
-                    and field.annotation in (int, float, int | None, float | None)
-                ):
+                numeric = field and field.annotation in (int, float, int | None, float | None)
+                if numeric and isinstance(value, bool):
                     values[name] = str(value).lower()  # no number, though Python has it as 0 or 1
             try:
                 super().__init__(**values)

@@ -81,16 +81,14 @@ def slot_fits(p: Parameters) -> RuleResult:
     """A slot lies in the foot, between lips, and is open."""
     if p.slot_width == 0:
         return RuleResult(np.inf, "")
+    beside, above = (p.base_width - p.slot_width) / 2, p.foot_height - p.lip_thickness - p.slot_height
     margins = {
         "slot_opening must be above 0 mm": p.slot_opening - MIN_STRAIGHT,
         "slot_height must be above 0 mm": p.slot_height - MIN_STRAIGHT,
         f"lip_thickness must be at least {MIN_WALL} mm": p.lip_thickness - MIN_WALL,
         "slot_opening must be at most slot_width": p.slot_width - p.slot_opening,
-        f"slot_width must leave walls of {MIN_WALL} mm in base_width": (p.base_width - p.slot_width) / 2
-        - MIN_WALL,
-        "lip_thickness and slot_height must be less than foot_height": p.foot_height
-        - p.lip_thickness
-        - p.slot_height,
+        f"slot_width must leave walls of {MIN_WALL} mm in base_width": beside - MIN_WALL,
+        "lip_thickness and slot_height must be less than foot_height": above,
     }
     worst = min(margins, key=margins.__getitem__)
     return RuleResult(float(margins[worst]), f"the slot does not fit into the foot: {worst}")

@@ -32,7 +32,7 @@ class Triangulation(NamedTuple):
     edges: Mapping[str, IntArray]
 
 
-def build_mesh(finger: Finger, settings: MeshSettings, across: int = MIN_ELEMENTS) -> TriangleMesh:
+def build_mesh(finger: Finger, settings: MeshSettings, across: int | None = None) -> TriangleMesh:
     """Mesh the section of a finger.
 
     The contact's ends and middle are nodes of the front face and every marker is a node. Boundary edges have
@@ -42,6 +42,7 @@ def build_mesh(finger: Finger, settings: MeshSettings, across: int = MIN_ELEMENT
     Returns:
         The mesh with the boundaries `base`, `front`, `contact` and every other name of the outline's pieces.
     """
+    across = MIN_ELEMENTS if across is None else across
     for elements in TRIES:
         mesh = _named(finger, _triangulation(finger, settings, elements * across / MIN_ELEMENTS))
         if (least := elements_through_thickness(mesh)) >= across:

@@ -235,12 +235,9 @@ class TriangleMesh:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> "TriangleMesh":
         """The mesh of the arrays that `arrays` gave."""
-        values = {name: arrays[name] for name in arrays if not name.startswith(BOUNDARY_PREFIX)}
-        edges = {
-            name.removeprefix(BOUNDARY_PREFIX): arrays[name]
-            for name in arrays
-            if name.startswith(BOUNDARY_PREFIX)
-        }
+        values = dict(arrays)
+        names = [name for name in arrays if name.startswith(BOUNDARY_PREFIX)]
+        edges = {name.removeprefix(BOUNDARY_PREFIX): values.pop(name) for name in names}
         return cls(**values, boundaries=edges)  # type: ignore[arg-type]
 
     def arrays(self) -> dict[str, FloatArray | IntArray]:

@@ -78,7 +78,7 @@ class Loop:
         start, end = self.ends[:, 0], self.ends[:, 1]
         origin = self.points[0]
         a, b = start - origin, end - origin
-        polygon = float(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+        polygon = float(0.5 * cross(a, b).sum())
         if not self.bulges.any():
             return polygon
         return float(polygon + (((end - start) ** 2).sum(axis=1) / 8 * _segment(self.bulges)).sum())
@@ -220,6 +220,16 @@ class Places(NamedTuple):
     pieces: IntArray  # (k,)
     shares: FloatArray  # fractions of the pieces' lengths, (k,)
     distances: FloatArray  # of the points to which they are nearest, (k,), mm
+
+
+def cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Cross products of plane vectors, shape (..., 2) each."""
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+
+
+def turns(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Angles from plane vectors to others, shape (..., 2) each, radians, positive to the left."""
+    return np.asarray(np.arctan2(cross(first, second), (first * second).sum(axis=-1)))
 
 
 def _following(values: FloatArray) -> FloatArray:

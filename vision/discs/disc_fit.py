@@ -100,13 +100,9 @@ def _fit(
 def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs:
     """The fitted discs, with NaN for those that fail a check."""
     parameters = fit.parameters
-    shade, blur, radii = (
-        parameters[:, [model.SHADE_X, model.SHADE_Y]],
-        parameters[:, model.BLUR],
-        parameters[:, model.RADIUS],
-    )
+    shade, radii = parameters[:, [model.SHADE_X, model.SHADE_Y]], parameters[:, model.RADIUS]
     # The gradient of the light is blurred as well, which shifts the image of the disc.
-    centres = fit.origins + parameters[:, [model.X, model.Y]] + blur[:, None] ** 2 * shade
+    centres = fit.origins + parameters[:, [model.X, model.Y]] + parameters[:, [model.BLUR]] ** 2 * shade
     deviations = np.sqrt(np.linalg.eigvalsh(fit.covariances)[:, 1])
     contrast = parameters[:, model.CONTRAST]
     ratio = radii / guesses[:, 2]

@@ -115,10 +115,8 @@ def prior_and_limits(
         deviations[:, HALO], limits[:, HALO] = HALO_DEVIATION, HALO_STEP
     clipped = start[:, LIGHT] >= LIGHTEST
     deviations[clipped, LIGHT] = CLIPPED
-    for column, shade, deviation in zip(
-        (SHADE_X, SHADE_Y), known.shade.T, known.shade_deviation.T, strict=True
-    ):
-        mean[clipped, column], deviations[clipped, column] = shade[clipped], deviation[clipped]
+    shades = np.ix_(np.flatnonzero(clipped), np.array([SHADE_X, SHADE_Y]))
+    mean[shades], deviations[shades] = known.shade[clipped], known.shade_deviation[clipped]
     deviations[:, RADIUS] = np.minimum(known.tolerance * radii, 1e3)
     edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
     deviations[:, first_edge:] = edges.reshape(len(start), -1)
