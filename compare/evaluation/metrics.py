@@ -55,14 +55,8 @@ def marker_errors(displacement: FloatArray, observations: Observations) -> Marke
     error = np.abs(displacement - observations.displacements)
     error[~observations.visible] = nan
     mae_u, mae_v = error[observations.visible].mean(axis=0).tolist() if observations.known else (nan, nan)
-    return MarkerErrors(
-        ae_u=error[:, 0].tolist(),
-        ae_v=error[:, 1].tolist(),
-        mae_u=mae_u,
-        mae_v=mae_v,
-        mae_sum=mae_u + mae_v,
-        mae_rss=float(np.hypot(mae_u, mae_v)),
-    )
+    means = {"mae_u": mae_u, "mae_v": mae_v, "mae_sum": mae_u + mae_v, "mae_rss": np.hypot(mae_u, mae_v)}
+    return MarkerErrors(ae_u=error[:, 0].tolist(), ae_v=error[:, 1].tolist(), **means)
 
 
 def _held_out(evaluation: Evaluation, observations: Observations) -> MarkerErrors | None:

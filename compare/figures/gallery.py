@@ -71,7 +71,7 @@ def _force_displacement(comparison: Results, page: float) -> Illustration | None
     if comparison.truth is not None:
         truth = ForceCurve.of(comparison.truth, comparison.load)
         cross = " Pink: the truth."
-    found = {n: each for n, each in enumerate(comparison.evaluations) if each.identified}
+    found = [each for each in comparison.evaluations if each.identified]
     squares = " Squares: forces found from the markers, with intervals of 95 %." if found else ""
     return Illustration(
         draw_force_displacement(curves, depth=depth, truth=truth, identified=found, page=page),

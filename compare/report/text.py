@@ -84,7 +84,8 @@ def in_words(value: object) -> str:
 def symbol(name: str) -> Markup:
     """A symbol of the paper, such as `L_tip`, with its index set as one."""
     letter, _, index = name.partition("_")
-    return Markup("<i>{}</i><sub>{}</sub>" if index else "<i>{}</i>").format(letter, index)
+    form = Markup("<i>{}</i><sub>{}</sub>") if index else Markup("<i>{}</i>")
+    return form.format(letter, index)
 
 
 ASPECTS = ("", "_deviation", "_low", "_high", "_resolution")

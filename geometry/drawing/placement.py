@@ -153,13 +153,8 @@ def with_back(loop: Loop) -> Loop:
     """The outline with the name `back` for its longest straight piece opposite to the front, if long."""
     front = [loop.ends[which][:, 0] for which in loop.pieces("front")]
     reach = np.ptp(np.concatenate(front))
-    free = [
-        which
-        for which in loop.straight.tolist()
-        if loop.names[which] == ""
-        and inner_normals(loop, which, 0.5)[0, 1] > 0.5
-        and loop.lengths[which] > 0.5 * reach
-    ]
+    long = [which for which in loop.straight.tolist() if loop.lengths[which] > 0.5 * reach]
+    free = [which for which in long if not loop.names[which] and inner_normals(loop, which, 0.5)[0, 1] > 0.5]
     return loop.named(max(free, key=lambda which: loop.lengths[which]), "back") if free else loop
 
 

@@ -202,11 +202,8 @@ def _base_side(p: Parameters) -> tuple[list[FloatArray], list[str]]:
 
 def _without_steps(points: list[FloatArray], names: list[str]) -> tuple[list[FloatArray], list[str]]:
     """The corners without pieces of no length: a slot as wide as its opening has such."""
-    kept = [
-        which
-        for which in range(len(points))
-        if which + 1 == len(points) or np.linalg.norm(points[which + 1] - points[which]) > 1e-9
-    ]
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    kept = [*np.flatnonzero(steps > 1e-9).tolist(), len(points) - 1]
     return [points[which] for which in kept], [names[which] for which in kept]
 
 

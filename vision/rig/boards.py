@@ -85,9 +85,8 @@ def board_poses(board: Board, camera: Camera, count: int, *, seed: int = 0) -> l
 def _drawn(board: Board, camera: Camera, rng: np.random.Generator) -> Pose | None:
     """A random pose; None if part of the board is outside the image."""
     axis, tilt, turn = rng.uniform(0, 2 * np.pi), np.deg2rad(rng.uniform(*TILT)), rng.uniform(-0.3, 0.3)
-    rotation = Rotation.from_rotvec([tilt * np.cos(axis), tilt * np.sin(axis), 0.0]) * Rotation.from_rotvec(
-        [0.0, 0.0, turn]
-    )
+    tilted = Rotation.from_rotvec([tilt * np.cos(axis), tilt * np.sin(axis), 0.0])
+    rotation = tilted * Rotation.from_rotvec([0.0, 0.0, turn])
     rim = _rim(board, MARGIN)
     longer = np.ptp(rim, axis=0).max()
     distance = camera.fx * longer / (rng.uniform(*SIZE) * camera.width)

@@ -110,15 +110,13 @@ def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Im
 
 def _settings(recording: Recording) -> dict[str, object]:
     """Settings of the frames that are in no other file."""
+    bench, (rotation, translation) = recording.bench, recording.pose
     return {
-        "design": recording.bench.finger.definition(),
-        "mesh_sha256": recording.bench.mesh.digest,
-        "paint": recording.bench.paint,
-        "irregular": recording.bench.irregular,
-        "pose": {
-            "rotation": recording.pose.rotation.tolist(),
-            "translation_mm": recording.pose.translation.tolist(),
-        },
+        "design": bench.finger.definition(),
+        "mesh_sha256": bench.mesh.digest,
+        "paint": bench.paint,
+        "irregular": bench.irregular,
+        "pose": {"rotation": rotation.tolist(), "translation_mm": translation.tolist()},
         "exposure": recording.exposure.model_dump(),
         "motion": recording.motion.model_dump(),
         "seed": recording.seed,
