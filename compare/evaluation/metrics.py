@@ -111,14 +111,9 @@ def _uncertainty(evaluation: Evaluation) -> UncertaintyScores | None:
     own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
     if own is None or markers is None:
         return None
-    return UncertaintyScores(
-        energy_norm=float(np.sqrt(abs(own.rel_energy))),
-        rel_l2_displacement=own.rel_l2_displacement,
-        rel_l2_von_mises=own.rel_l2_von_mises,
-        mae_markers=own.mae_markers,
-        markers_u=markers[:, 0].tolist(),
-        markers_v=markers[:, 1].tolist(),
-    )
+    shared = own.model_dump(include={"rel_l2_displacement", "rel_l2_von_mises", "mae_markers"})
+    energy, (u, v) = float(np.sqrt(abs(own.rel_energy))), markers.T.tolist()
+    return UncertaintyScores(energy_norm=energy, markers_u=u, markers_v=v, **shared)
 
 
 def truth_scores(truth: Evaluation | None, load: Load) -> FigureScores | None:

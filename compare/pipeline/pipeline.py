@@ -58,15 +58,14 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Comparison:
     check_output(job.out)
     kept = job.names if job.resume else ()
     with replaced_folder(job.out, keep=kept) as folder:
-        if not isinstance(job.measurements, MarkerSource):
-            comparison = _with_files(compute(job, stages, folder, pool))
-            _write(folder, job, comparison, stages)
-            return comparison
-        measured = job.measurements.measured(job.design, folder, stages)
-        given = replace(job, measurements=measured.observations)
+        given, measured, photographs = job, None, list[Picture]()
+        if isinstance(job.measurements, MarkerSource):
+            measured = job.measurements.measured(job.design, folder, stages)
+            given = replace(job, measurements=measured.observations)
         comparison = _with_files(compute(given, stages, folder, pool))
-        comparison = replace(comparison, warnings=[*measured.warnings, *comparison.warnings])
-        photographs = [*measured.pictures, *measured.compared(comparison)]
+        if measured is not None:
+            comparison = replace(comparison, warnings=[*measured.warnings, *comparison.warnings])
+            photographs = [*measured.pictures, *measured.compared(comparison)]
         _write(folder, job, comparison, stages, photographs)
     return comparison
 

@@ -64,14 +64,11 @@ def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str,
     """Provenance as groups of lines; single values come first, in a group without a title."""
     groups = {"": {key: value for key, value in provenance.items() if not isinstance(value, Mapping)}}
     groups |= {key: dict(value) for key, value in provenance.items() if isinstance(value, Mapping)}
-    return [
-        (
-            title.replace("_", " "),
-            [(str(key).replace("_", " "), in_words(value)) for key, value in lines.items()],
-        )
+    named = {
+        title: [(str(key).replace("_", " "), in_words(value)) for key, value in lines.items()]
         for title, lines in groups.items()
-        if lines
-    ]
+    }
+    return [(title.replace("_", " "), lines) for title, lines in named.items() if lines]
 
 
 def in_words(value: object) -> str:
