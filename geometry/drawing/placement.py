@@ -86,10 +86,8 @@ def placed(section: Section, which: int, fraction: float) -> tuple[Section, Plac
     touched = turned(contact[None])[0]
     outline = with_back(with_front(section.outline, touched))
     placement = Placement(turned.matrix, turned.shift - (base_start(outline)[0], 0.0))
-    shift = placement.shift - turned.shift
-    outline = _rounded(outline.transformed(np.eye(2), shift))
-    cavities = tuple(_rounded(cavity.transformed(np.eye(2), shift)) for cavity in section.cavities)
-    return Section(outline, cavities), placement
+    shifted = Placement(np.eye(2), placement.shift - turned.shift)
+    return shifted.section(Section(outline, section.cavities)), placement
 
 
 def _rounded(loop: Loop) -> Loop:
