@@ -81,9 +81,8 @@ def draw_marker_errors(comparison: Results, page: float = WIDTH) -> Figure:
         layout.legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
         for row, (evaluation, own) in enumerate(zip(evaluations, scores, strict=True)):
             for column, symbol in enumerate("uv"):
-                axes = layout.axes_at(
-                    drawn, (left + column * page / 2, head + title + row * step, width, height)
-                )
+                box = (left + column * page / 2, head + title + row * step, width, height)
+                axes = layout.axes_at(drawn, box)
                 said = _draw_errors(axes, symbol, own, solver_look(evaluation.solver).colour, span[0])
                 _set_scales(axes, observations.visible, span)
                 axes.set_ylabel(rf"$|\Delta {symbol}|$", size=SMALL)
