@@ -84,9 +84,8 @@ def truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDiffere
     """Differences from the simulated truth."""
 
     def differ(name: str) -> FieldDifference:
-        values, true = (
-            np.reshape(getattr(each, name), (len(truth.weights), -1)) for each in (evaluation, truth)
-        )
+        fields = (getattr(each, name) for each in (evaluation, truth))
+        values, true = (field.reshape(len(truth.weights), -1) for field in fields)
         return FieldDifference.of(values, true, truth.weights)
 
     return TruthDifferences(**{name: differ(name) for name in TruthDifferences.model_fields})

@@ -54,9 +54,8 @@ def with_clamp(outline: Loop) -> Loop:
         (end for end in ends if end.width >= 0.8 * widest),
         key=lambda end: (len(end.pieces), round(end.width * abs(float(end.normal @ axis)), 6), -end.x),
     )
-    return outline.renamed(
-        "base" if number in best.pieces else name for number, name in enumerate(outline.names)
-    )
+    names = ("base" if number in best.pieces else name for number, name in enumerate(outline.names))
+    return outline.renamed(names)
 
 
 def contact_point(section: Section) -> FloatArray:

@@ -15,10 +15,8 @@ CORNER_ANGLE = np.radians(10.0)
 
 def are_among(edges: IntArray, others: IntArray) -> BoolArray:
     """Mask of the edges (k, 2) that are among others (m, 2), whichever way both run."""
-    first, second = (
-        each[:, 0] * 2**32 + each[:, 1]
-        for each in (np.sort(edges.astype(np.int64), axis=1), np.sort(others, axis=1))
-    )
+    ordered = (np.sort(each.astype(np.int64), axis=1) for each in (edges, others))
+    first, second = (each[:, 0] * 2**32 + each[:, 1] for each in ordered)
     return np.isin(first, second)
 
 

@@ -110,11 +110,8 @@ class Loop:
             return np.asarray(start + share[:, None] * (end - start))
         centre, _ = self.circle(which)
         angles = share * 4 * np.arctan(self.bulges[which])
-        x, y = start - centre
-        turned = np.stack(
-            [x * np.cos(angles) - y * np.sin(angles), x * np.sin(angles) + y * np.cos(angles)], axis=1
-        )
-        points = np.asarray(centre + turned)
+        (x, y), cosine, sine = start - centre, np.cos(angles), np.sin(angles)
+        points = np.asarray(centre + np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=1))
         points[share == 0], points[share == 1] = start, end
         return points
 

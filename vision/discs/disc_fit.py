@@ -81,9 +81,8 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
     known = Known.of(len(guesses), np.inf if radii is None else KNOWN_RADIUS)
     _fit(fit, grey, guesses, sizes, known, np.ones(len(guesses), dtype=bool))
     if (clipped := fit.parameters[:, model.LIGHT] >= LIGHTEST).any():
-        _fit(
-            fit, grey, guesses, sizes, known.lit(fit, fit.settled & (fit.seen >= LEAST_SEEN_UNKNOWN)), clipped
-        )
+        known = known.lit(fit, fit.settled & (fit.seen >= LEAST_SEEN_UNKNOWN))
+        _fit(fit, grey, guesses, sizes, known, clipped)
     return _accepted(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
 
 

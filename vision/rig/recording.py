@@ -112,9 +112,8 @@ class Recording:
     @cached_property
     def _path(self) -> float:
         """The longest displacement of a marker in the image, pixels."""
-        start, end = (
-            self.camera.project(self.bench.markers(self.displaced(load)), self.pose) for load in (0, 1)
-        )
+        marks = (self.bench.markers(self.displaced(load)) for load in (0, 1))
+        start, end = (self.camera.project(each, self.pose) for each in marks)
         return float(np.linalg.norm(end - start, axis=1).max())
 
     def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, FrameTruth]:
