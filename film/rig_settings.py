@@ -24,19 +24,19 @@ class RigSettings(CheckedModel):
 
     frame: str = Field(default="1280x720", description="Width and height of the frames, pixels")
     camera: Path | None = Field(default=None, description="Camera file; none: a camera of that size")
-    tilt: float = bounded(0.0, -30, 30, "deg", "", "Angle between the optical axis and the finger's z axis")
+    tilt: float = bounded(0.0, -30, 30, "Angle between the optical axis and the finger's z axis", "deg")
     tilt_direction: float = bounded(
-        60.0, -360, 360, "deg", "", "Direction of the tilt axis in the image, from right to down"
+        60.0, -360, 360, "Direction of the tilt axis in the image, from right to down", "deg"
     )
-    turn: float = bounded(0.0, -360, 360, "deg", "", "Rotation of the camera about its optical axis")
+    turn: float = bounded(0.0, -360, 360, "Rotation of the camera about its optical axis", "deg")
     paint: Literal["dark", "red", "green", "blue"] = Field(
         default="dark", description="Colour of the markers"
     )
     irregular: float = bounded(
-        0.0, 0, 0.1, "", "", "Deviation of the markers' outlines from circles, rms over the radius"
+        0.0, 0, 0.1, "Deviation of the markers' outlines from circles, rms over the radius"
     )
-    marker_plane: float = bounded(0.0, -1000, 1000, "mm", "", "Height of the markers above the fiducials")
-    boards: int = bounded(0, 0, 1000, "", "", "Number of photographs of a calibration board")
+    marker_plane: float = bounded(0.0, -1000, 1000, "Height of the markers above the fiducials", "mm")
+    boards: int = bounded(0, 0, 1000, "Number of photographs of a calibration board")
     board: str = Field(default="9x6", description="Board as for `pinnray calibrate`: 9x6, charuco:8x6")
     square: float = Field(default=8.0, description="Side of a square of the board [mm]")
     marker: float | None = Field(default=None, description="Side of a marker of a ChArUco board [mm]")

@@ -1,9 +1,8 @@
 """Cache of meshes and drawings, keyed by a hash of everything they depend on."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from pinnray.geometry.drawing.description import Description
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
@@ -44,9 +43,8 @@ def finger_mesh(
     if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings is None:
         return replace(finger.mesh, depth=finger.depth)
     settings = settings or MeshSettings()
-    sizes = settings.model_dump()
-    task = ChildCall(f"meshing design {finger.name!r}", _mesher, (finger.definition(), sizes, across))
-    entry = cache_folder() / f"mesh-{cache_key(finger.digest, (sizes, across))}.npz"
+    task = ChildCall(f"meshing design {finger.name!r}", _mesher, (finger, settings, across))
+    entry = cache_folder() / f"mesh-{cache_key(finger.digest, (settings.model_dump(), across))}.npz"
     save = TriangleMesh.save if keep else None
     mesh: TriangleMesh = cached(entry, task.what, lambda: run_task(task, TIMEOUT_S), TriangleMesh.load, save)
     return mesh
@@ -106,8 +104,7 @@ def cad_files(finger: Finger, folder: Path, *, formats: Sequence[str] = CAD_FORM
     unknown = sorted(set(formats) - set(CAD_FORMATS))
     if unknown:
         raise UserError(f"unknown CAD format {unknown[0]!r}; there are {', '.join(CAD_FORMATS)}")
-    wanted = sorted(set(formats))
-    task = ChildCall(f"CAD of design {finger.name!r}", _cad_writer, (finger.definition(), wanted))
+    task = ChildCall(f"CAD of design {finger.name!r}", _cad_writer, (finger, sorted(set(formats))))
     contents: dict[str, bytes] = run_task(task, TIMEOUT_S)
     for name, content in contents.items():
         write_bytes(folder / name, content)
@@ -122,15 +119,9 @@ def cache_key(digest: str, asked: object) -> str:
 
 
 def _mesher() -> Callable[..., TriangleMesh]:
-    from pinnray.geometry.drawing.drawn_finger import finger_from
-    from pinnray.geometry.mesh.mesher import MIN_ELEMENTS, build_mesh
+    from pinnray.geometry.mesh.mesher import build_mesh
 
-    def mesh(definition: Mapping[str, Any], sizes: Mapping[str, Any], across: int | None) -> TriangleMesh:
-        return build_mesh(
-            finger_from(definition), MeshSettings(**sizes), MIN_ELEMENTS if across is None else across
-        )
-
-    return mesh
+    return build_mesh
 
 
 def _reader() -> Callable[..., DrawnFinger]:
@@ -141,6 +132,5 @@ def _reader() -> Callable[..., DrawnFinger]:
 
 def _cad_writer() -> Callable[..., dict[str, bytes]]:
     from pinnray.geometry.cad import cad_contents
-    from pinnray.geometry.drawing.drawn_finger import finger_from
 
-    return lambda definition, formats: cad_contents(finger_from(definition), formats)
+    return cad_contents

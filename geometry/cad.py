@@ -4,7 +4,7 @@ The only module that imports CadQuery; import it where it is used.
 """
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from errno import EIO
 from pathlib import Path
 
@@ -24,15 +24,12 @@ def solids(finger: Finger) -> tuple[cq.Shape, tuple[cq.Solid, ...]]:
 
     The section lies in z = 0 to `depth`; markers are inlaid `marker_height` deep into the face z = `depth`.
     """
-    p = finger
-    outer, cavities = _wires(p)
+    outer, cavities = _wires(finger)
+    radius, height, bottom = finger.marker_radius, finger.marker_height, finger.depth - finger.marker_height
     markers = tuple(
-        cq.Solid.makeCylinder(
-            p.marker_radius, p.marker_height, pnt=cq.Vector(x, y, p.depth - p.marker_height)
-        )
-        for x, y in p.markers
+        cq.Solid.makeCylinder(radius, height, pnt=cq.Vector(x, y, bottom)) for x, y in finger.markers
     )
-    body = cq.Solid.extrudeLinear(outer, cavities, cq.Vector(0, 0, p.depth)).cut(*markers)
+    body = cq.Solid.extrudeLinear(outer, cavities, cq.Vector(0, 0, finger.depth)).cut(*markers)
     return body, markers
 
 
@@ -87,11 +84,7 @@ def write_dxf(finger: Finger, folder: Path) -> list[Path]:
     return [path]
 
 
-WRITERS: Mapping[str, Callable[[Finger, Path], list[Path]]] = {
-    "step": write_step,
-    "stl": write_stl,
-    "dxf": write_dxf,
-}
+WRITERS = {"step": write_step, "stl": write_stl, "dxf": write_dxf}
 """The writer of each format, into a folder."""
 
 

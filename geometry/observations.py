@@ -72,15 +72,8 @@ class Observations:
             ("visible", np.ones(count) if visible is None else visible, np.bool_, (count,)),
         ):
             object.__setattr__(self, name, frozen_array(values, dtype=dtype, shape=shape, name=name))
-        self.__dict__.update(
-            source=source,
-            simulated=simulated,
-            solid=solid,
-            weighed=weighed,
-            marker_radius=marker_radius,
-            pressed=pressed,
-            drawn=drawn,
-        )
+        self.__dict__.update(source=source, simulated=simulated, solid=solid, weighed=weighed)
+        self.__dict__.update(marker_radius=marker_radius, pressed=pressed, drawn=drawn)
         self._check()
 
     def __repr__(self) -> str:

@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Iterable, Mapping
-from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
@@ -15,7 +14,7 @@ from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.measurements import load_measurements
-from pinnray.runtime.text_files import as_path
+from pinnray.runtime.text_files import as_path, output_folder
 from pinnray.solvers.load import Load, LoadKind
 from pinnray.solvers.material import Material
 from pinnray.solvers.solver import Solver
@@ -94,11 +93,7 @@ def track(
     from pinnray.runtime.stages import shown_stages
 
     opened, finger = FilmSettings(**film).of(str(source)), read_finger(design)
-    with (
-        TemporaryDirectory() if out is None else nullcontext(as_path(out, "out")) as folder,
-        shown_stages(progress) as stages,
-        stages.stage("track") as report,
-    ):
+    with output_folder(out) as folder, shown_stages(progress) as stages, stages.stage("track") as report:
         Path(folder).mkdir(parents=True, exist_ok=True)
         _, found, _ = track_film(opened, finger, Path(folder), report, video=out is not None)
     return found

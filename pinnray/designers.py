@@ -5,10 +5,8 @@ under `if __name__ == "__main__":`.
 """
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
@@ -17,7 +15,7 @@ from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS, Parameters, by_parameter_name, unknown_parameter
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import process_count
-from pinnray.runtime.text_files import as_path
+from pinnray.runtime.text_files import as_path, output_folder
 from pinnray.solvers.load import Physics
 
 if TYPE_CHECKING:
@@ -86,8 +84,8 @@ def sweep(
             said = next(iter(fixed), "samples" if samples is not None else "sampling")
             raise UserError(f"{said} is said by the study in {file}; change it there")
         read, folder = Study.load(file), file.parent
-    with _kept(out) as where, shown_stages(progress) as stages:
-        job = StudyJob(read, folder, where, process_count(processes, "processes ="), finger=finger)
+    with output_folder(out) as where, shown_stages(progress) as stages:
+        job = StudyJob(read, folder, Path(where), process_count(processes, "processes ="), finger=finger)
         done = run_sweep(job, stages)
     for remark in done.remarks:
         warnings.warn(remark, stacklevel=2)
@@ -175,8 +173,9 @@ def optimise(
     else:
         file = as_path(question, "the question")
         read, folder = Question.load(file), file.parent
-    with _kept(out) as where, shown_stages(progress) as stages:
-        return search_front(StudyJob(read, folder, where, process_count(processes, "processes =")), stages)
+    with output_folder(out) as where, shown_stages(progress) as stages:
+        job = StudyJob(read, folder, Path(where), process_count(processes, "processes ="))
+        return search_front(job, stages)
 
 
 def _study(
@@ -212,13 +211,3 @@ def _range(name: str, values: object) -> Mapping[str, Any]:
             f"{name}: give a list of values, such as [4, 6], or {{'from': LOW, 'to': HIGH}}, not {values!r}"
         )
     return {"values": [each.item() if hasattr(each, "item") else each for each in values]}
-
-
-@contextmanager
-def _kept(out: str | Path | None) -> Iterator[Path]:
-    """The folder of a study; one that is removed afterwards if None."""
-    if out is not None:
-        yield as_path(out, "out")
-        return
-    with TemporaryDirectory() as folder:
-        yield Path(folder) / "study"

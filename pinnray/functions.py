@@ -30,7 +30,7 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.text_files import as_path
+from pinnray.runtime.text_files import as_path, output_folder
 from pinnray.solution import Solution
 from pinnray.solvers.identification.settings import taught
 from pinnray.solvers.load import Load, LoadKind
@@ -364,10 +364,10 @@ def benchmark(
     from pinnray.studies.benchmark.benchmark import BenchmarkJob, run_benchmark
     from pinnray.studies.benchmark.page import write_benchmark
 
-    with TemporaryDirectory() as folder, shown_stages(progress) as stages:
+    with output_folder(out) as folder, shown_stages(progress) as stages:
         job = BenchmarkJob(
             solvers=read_solvers(solvers, preset),
-            out=Path(folder) if out is None else as_path(out, "out"),
+            out=Path(folder),
             which=problems,
             time_limit=time_limit,
             others=None if entries is None else as_path(entries, "entries"),

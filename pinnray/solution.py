@@ -104,9 +104,7 @@ class Solution(solution.Solution):
         columns: dict[str, Any] = dict(zip(("x_mm", "y_mm"), places.T, strict=True))
         columns |= dict(zip(("u_mm", "v_mm"), moved.T, strict=True))
         if at == "triangles":
-            strain, stress = (
-                evaluation.per_triangle(each) for each in (evaluation.strain, evaluation.stress)
-            )
+            strain, stress = map(evaluation.per_triangle, (evaluation.strain, evaluation.stress))
             for name, (row, column) in {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}.items():
                 columns[f"strain_{name}"] = strain[:, row, column]
                 columns[f"stress_{name}_MPa"] = stress[:, row, column]

@@ -1,4 +1,4 @@
-"""Checked, read-only arrays."""
+"""Checked, read-only arrays; and the percentiles of weighted ones."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -48,3 +48,10 @@ def frozen_array(
         raise UserError(f"{name} holds a value that is not finite")
     array.setflags(write=False)
     return array
+
+
+def weighted_percentile(values: FloatArray, weights: FloatArray, percent: float) -> float:
+    """The value below which `percent` of the total weight lies."""
+    order = np.argsort(values)
+    share = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(share, percent / 100 * share[-1])])

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile, mkdtemp
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pinnray.runtime.atomic import remove_partials, write_bytes
 
@@ -74,20 +74,12 @@ def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
         )
 
 
-def _unpickled(entry: Path) -> Any:
-    return pickle.loads(entry.read_bytes())
-
-
-def _pickled(made: object, entry: Path) -> None:
-    write_bytes(entry, pickle.dumps(made))
-
-
 def cached(
     entry: Path,
     what: str,
     make: Callable[[], Result],
-    load: Callable[[Path], Result] = _unpickled,
-    save: Callable[[Result, Path], None] | None = _pickled,
+    load: Callable[[Path], Result] = lambda entry: pickle.loads(entry.read_bytes()),
+    save: Callable[[Result, Path], None] | None = lambda made, entry: write_bytes(entry, pickle.dumps(made)),
 ) -> Result:
     """Load a result; make it first if it is missing or cannot be read.
 

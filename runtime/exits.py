@@ -51,20 +51,17 @@ def interruptible(*, at_once: bool = False) -> Iterator[None]:
         raise KeyboardInterrupt
 
     _signals.clear()
-    asking = (
-        (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        if threading.current_thread() is threading.main_thread()
-        else ()
-    )
+    able = threading.current_thread() is threading.main_thread()
+    asking = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if able else ()
     before = {each: signal.getsignal(each) for each in asking}
-    ours = [number for number, former in before.items() if former is not signal.SIG_IGN]
-    for number in ours:
+    before = {number: former for number, former in before.items() if former is not signal.SIG_IGN}
+    for number in before:
         signal.signal(number, end)
     try:
         yield
     finally:
-        for number in ours:
-            signal.signal(number, before[number])
+        for number, former in before.items():
+            signal.signal(number, former)
 
 
 @contextmanager

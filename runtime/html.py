@@ -108,16 +108,13 @@ class Packed:
     """Arrays in one piece of memory; `add` gives the place and type by which the browser reads one."""
 
     def __init__(self) -> None:
-        self._pieces: list[bytes] = []
-        self._length = 0
+        self._data = bytearray()
 
     def add(self, values: NDArray[Any]) -> dict[str, Any]:
         """Append an array of float64, float32, uint32, uint16 or uint8."""
-        data = values.tobytes()
-        place = {"kind": str(values.dtype), "offset": self._length, "length": values.size}
-        data += bytes(-len(data) % 8)
-        self._pieces.append(data)
-        self._length += len(data)
+        place = {"kind": str(values.dtype), "offset": len(self._data), "length": values.size}
+        self._data += values.tobytes()
+        self._data += bytes(-len(self._data) % 8)
         return place
 
     def add_steps(self, values: FloatArray, least: float = 0.0) -> dict[str, Any]:
@@ -131,10 +128,5 @@ class Packed:
         return self.add(steps.view(np.uint8).reshape(-1, 2).T) | {"low": low, "step": step}
 
     def text(self) -> str:
-        """All of it, compressed, in Base64."""
-        return base64_text(b"".join(self._pieces))
-
-
-def base64_text(data: bytes) -> str:
-    """Data compressed by gzip, in Base64."""
-    return base64.b64encode(gzip.compress(data, compresslevel=6, mtime=0)).decode("ascii")
+        """All of it, compressed by gzip, in Base64."""
+        return base64.b64encode(gzip.compress(self._data, compresslevel=6, mtime=0)).decode("ascii")

@@ -26,16 +26,13 @@ def _in_short(value: object) -> str:
     return f"<{' x '.join(map(str, shape))}>" if shape else reprlib.repr(value)
 
 
-def fact_table(title: str, facts: Mapping[str, object], picture: str = "") -> str:
-    """A heading, a picture as HTML, and a table with a row for each fact."""
+def fact_table(title: str, facts: Mapping[str, object], png: bytes = b"") -> str:
+    """A heading, a picture if there is one, and a table with a row for each fact, as HTML."""
+    data = base64.b64encode(png).decode("ascii")
+    picture = f'<img style="max-width:100%" src="data:image/png;base64,{data}">' if png else ""
     left = 'style="text-align:left"'
     rows = "".join(
         f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(str(fact))}</td></tr>"
         for name, fact in facts.items()
     )
     return f"<div><strong>{escape(title)}</strong><div>{picture}</div><table>{rows}</table></div>"
-
-
-def png_image(png: bytes) -> str:
-    """A PNG picture as an HTML element that holds it."""
-    return f'<img style="max-width:100%" src="data:image/png;base64,{base64.b64encode(png).decode("ascii")}">'

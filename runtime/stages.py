@@ -37,14 +37,9 @@ def quiet_stages() -> Iterator[None]:
         _quiet.reset(token)
 
 
-def in_notebook() -> bool:
-    """Whether this process serves a notebook, which can show a line and change it."""
-    return Console().is_jupyter
-
-
 def shown_stages(shown: bool | None) -> "Stages":
-    """Stages that are shown or not; if None, in a notebook only."""
-    return Stages(quiet=not (in_notebook() if shown is None else shown))
+    """Stages that are shown or not; if None, in a notebook only, which can show a line and change it."""
+    return Stages(quiet=not (Console().is_jupyter if shown is None else shown))
 
 
 class NotebookLine:

@@ -316,9 +316,7 @@ def percent(share: float, digits: int = 3, *, sign: bool = True, plus: bool = Fa
     if value == 0:
         text = "0"
     elif abs(value) < LEAST_PERCENT:
-        text = f"{'>' if value < 0 else '<'} {'−' * (value < 0)}{LEAST_PERCENT}".replace(
-            " ", "\N{NO-BREAK SPACE}"
-        )
+        text = f"{'>' if value < 0 else '<'}\N{NO-BREAK SPACE}{'−' * (value < 0)}{LEAST_PERCENT}"
     else:
         text = f"{value:.0f}".replace("-", "−") if abs(value) >= 10**digits else number(value, digits)
     return f"{ahead}{text}\N{NO-BREAK SPACE}%" if sign else f"{ahead}{text}"

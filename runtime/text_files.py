@@ -1,9 +1,11 @@
-"""Reads TOML and JSON files of users; a file that cannot be read is a `UserError` of one line."""
+"""Reads TOML and JSON files and paths of users; what cannot be read is a `UserError` of one line."""
 
 import json
 import tomllib
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from pinnray.runtime.errors import UserError
@@ -19,8 +21,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     Raises:
         UserError: If it cannot be read.
     """
-    content: dict[str, Any] = _read(path, what, tomllib.loads)
-    return content
+    return dict(_read(path, what, tomllib.loads))
 
 
 def read_json(path: Path, what: str) -> Any:
@@ -57,3 +58,8 @@ def as_path(given: object, what: str) -> Path:
     if isinstance(given, str | Path):
         return Path(given)
     raise UserError(f"{what} is {given!r}; give a path")
+
+
+def output_folder(out: str | Path | None) -> AbstractContextManager[str | Path]:
+    """The folder that is given; if None, one that is removed at the end."""
+    return TemporaryDirectory() if out is None else nullcontext(as_path(out, "out"))

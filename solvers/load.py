@@ -32,9 +32,9 @@ class Travel(CheckedModel):
         UserError: If it does not press, or slides and has a direction.
     """
 
-    stroke: float = bounded(10.0, 1e-6, 1e4, "mm", "", "Stroke of the indenter")
+    stroke: float = bounded(10.0, 1e-6, 1e4, "Stroke of the indenter", "mm")
     direction: float = bounded(
-        0.0, -89, 89, "deg", "", "Direction of the stroke: 0 into the finger, 90 along it to the tip"
+        0.0, -89, 89, "Direction of the stroke: 0 into the finger, 90 along it to the tip", "deg"
     )
     slide: bool = Field(default=False, description="Let the contact slide along the finger: u is free")
 
@@ -51,8 +51,8 @@ class Travel(CheckedModel):
         return None if self.slide else self.stroke * along, -self.stroke * into
 
 
-RADIUS: Any = bounded(None, 1e-6, 1e4, "mm", "", "Radius of a cylinder; none means 5 mm")
-FRICTION: Any = bounded(0.0, 0.0, ROUGHEST, "", "", "Coefficient of friction of a cylinder")
+RADIUS: Any = bounded(None, 1e-6, 1e4, "Radius of a cylinder; none means 5 mm", "mm")
+FRICTION: Any = bounded(0.0, 0.0, ROUGHEST, "Coefficient of friction of a cylinder")
 
 
 class Load(CheckedModel):

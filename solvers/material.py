@@ -65,17 +65,12 @@ class Material(CheckedModel):
     """
 
     #: From a thousandth of the softest gels' to eight times diamond's
-    young: float = bounded(11.4, 1e-6, 1e7, "MPa", "E", "Young's modulus")
+    young: float = bounded(11.4, 1e-6, 1e7, "Young's modulus", "MPa", "E")
     #: Zero: known exactly. `Material(young="11.4±1.2")` has 1.2 MPa
     young_deviation: float = bounded(
-        0.0,
-        0,
-        1e7,
-        "MPa",
-        "",
-        "Standard deviation of Young's modulus, which widens a force found from markers",
+        0.0, 0, 1e7, "Standard deviation of Young's modulus, which widens a force found from markers", "MPa"
     )
-    poisson: float = bounded(0.45, -0.99, 0.4999, "", "nu", "Poisson's ratio", gt=-1, lt=0.5)
+    poisson: float = bounded(0.45, -0.99, 0.4999, "Poisson's ratio", "", "nu", gt=-1, lt=0.5)
     plane: Literal["strain", "stress"] = Field(
         default="strain",
         description="Plane strain (a thick finger), or plane stress, whose equations the paper prints",
@@ -87,8 +82,6 @@ class Material(CheckedModel):
         0.0,
         0,
         0.9,
-        "",
-        "",
         "Share of the loading work that a cycle of loading and unloading loses; it is in the intervals of "
         "forces in films and in films of the rig, and in no equilibrium",
     )

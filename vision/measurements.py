@@ -55,16 +55,10 @@ def write_measurements(path: Path, observations: Observations) -> None:
                 file.write(f"{mark}{known}\n")
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["marker", *REQUIRED, *OPTIONAL])
-        columns = zip(
-            observations.points.tolist(),
-            observations.displacements.tolist(),
-            observations.standard_deviations.tolist(),
-            observations.visible.tolist(),
-            strict=True,
-        )
-        for number, (point, displacement, deviation, visible) in enumerate(columns, start=1):
-            seen = (*displacement, *deviation) if visible else ("",) * 4
-            writer.writerow([number, *point, *seen, int(visible)])
+        known = np.hstack([observations.displacements, observations.standard_deviations]).tolist()
+        rows = zip(observations.points.tolist(), known, observations.visible.tolist(), strict=True)
+        for number, (point, numbers, visible) in enumerate(rows, start=1):
+            writer.writerow([number, *point, *(numbers if visible else [""] * 4), int(visible)])
 
 
 def read_measurements(path: Path, *, marker_radius: float) -> Observations:

@@ -7,7 +7,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
-from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray, weighted_percentile
 
 COMPONENTS: dict[str, tuple[int, int]] = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}
 """Components of a symmetric tensor in the plane."""
@@ -56,13 +56,6 @@ def relative_l2(values: FloatArray, reference: FloatArray, weights: FloatArray) 
 
 def _magnitude(values: FloatArray) -> FloatArray:
     return np.abs(values) if values.ndim == 1 else np.asarray(np.linalg.norm(values, axis=1))
-
-
-def weighted_percentile(values: FloatArray, weights: FloatArray, percent: float) -> float:
-    """The value below which `percent` of the total weight lies."""
-    order = np.argsort(values)
-    share = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(share, percent / 100 * share[-1])])
 
 
 class Differences(Numbers):

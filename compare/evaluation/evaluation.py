@@ -7,7 +7,7 @@ import json
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,22 @@ from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_arrays
+from pinnray.runtime.content_hash import content_hash, sources_digest
+from pinnray.runtime.machine import package_versions
 from pinnray.runtime.notebook import brief
 from pinnray.solvers.finger_figures import FingerFigures, figures_of
 from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import IdentifiedForce, SolidField, Solution
+from pinnray.solvers.solver import Solver
 
 QUADRATURE_DEGREE = 2
-FORCE, FIGURES = TypeAdapter(IdentifiedForce | None), TypeAdapter(FingerFigures | None)
+ADAPTERS: dict[str, TypeAdapter[Any]] = {
+    "identified": TypeAdapter(IdentifiedForce | None),
+    "figures": TypeAdapter(FingerFigures | None),
+    "uncertainty": TypeAdapter(Differences | None),
+}
+"""Of attributes that the archive keeps as JSON, to and from its values."""
 IN_SAMPLE = "† was given these markers: its errors there are training errors"
 """Meaning of the mark in `Evaluation.label_at_markers`."""
 
@@ -194,9 +203,7 @@ class Evaluation:
                 arrays[entry.name] = value
             elif entry.name not in ("history", "certificate"):
                 header[entry.name] = dict(value) if isinstance(value, Mapping) else value
-        header["identified"] = FORCE.dump_python(self.identified, mode="json")
-        header["figures"] = self.figures and asdict(self.figures)
-        header["uncertainty"] = self.uncertainty and self.uncertainty.model_dump()
+        header |= {name: adapter.dump_python(header[name]) for name, adapter in ADAPTERS.items()}
         arrays |= {f"history_{name}": column for name, column in self.history.items()}
         write_arrays(path, {"header": np.array(json.dumps(header)), **arrays})
 
@@ -214,16 +221,20 @@ class Evaluation:
             prefix = "history_"
             columns = [name for name in arrays if name.startswith(prefix)]
             header["history"] = {name.removeprefix(prefix): arrays.pop(name) for name in columns}
-            own = header["uncertainty"]
-            header["uncertainty"] = own and Differences.model_validate(own)
-            header["identified"] = FORCE.validate_python(header["identified"])
-            header["figures"] = FIGURES.validate_python(header["figures"])
+            header |= {name: adapter.validate_python(header[name]) for name, adapter in ADAPTERS.items()}
             return cls(**header, **arrays)
         except Exception as error:  # a damaged file can make the reader raise anything
             warnings.warn(
                 f"{path} is damaged ({type(error).__name__}) and is made again", RuntimeWarning, stacklevel=2
             )
             return None
+
+
+def solution_key(solver: Solver, problem: Problem, *more: object) -> str:
+    """Hash of all that a solution depends on: solver, problem, versions, sources, and more."""
+    code = sources_digest(__name__, type(solver).__module__)
+    made_by = [solver.name, type(solver).__qualname__, solver.settings(), package_versions(), code]
+    return content_hash([*made_by, problem.digest, *more])
 
 
 def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> Evaluation:

@@ -55,14 +55,8 @@ def marker_errors(displacement: FloatArray, observations: Observations) -> Marke
     error = np.abs(displacement - observations.displacements)
     error[~observations.visible] = nan
     mae_u, mae_v = error[observations.visible].mean(axis=0).tolist() if observations.known else (nan, nan)
-    return MarkerErrors(
-        ae_u=error[:, 0].tolist(),
-        ae_v=error[:, 1].tolist(),
-        mae_u=mae_u,
-        mae_v=mae_v,
-        mae_sum=mae_u + mae_v,
-        mae_rss=float(np.hypot(mae_u, mae_v)),
-    )
+    means = {"mae_u": mae_u, "mae_v": mae_v, "mae_sum": mae_u + mae_v, "mae_rss": np.hypot(mae_u, mae_v)}
+    return MarkerErrors(ae_u=error[:, 0].tolist(), ae_v=error[:, 1].tolist(), **means)
 
 
 def _held_out(evaluation: Evaluation, observations: Observations) -> MarkerErrors | None:
@@ -90,9 +84,8 @@ def truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDiffere
     """Differences from the simulated truth."""
 
     def differ(name: str) -> FieldDifference:
-        values, true = (
-            np.reshape(getattr(each, name), (len(truth.weights), -1)) for each in (evaluation, truth)
-        )
+        fields = (getattr(each, name) for each in (evaluation, truth))
+        values, true = (field.reshape(len(truth.weights), -1) for field in fields)
         return FieldDifference.of(values, true, truth.weights)
 
     return TruthDifferences(**{name: differ(name) for name in TruthDifferences.model_fields})
@@ -117,14 +110,9 @@ def _uncertainty(evaluation: Evaluation) -> UncertaintyScores | None:
     own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
     if own is None or markers is None:
         return None
-    return UncertaintyScores(
-        energy_norm=float(np.sqrt(abs(own.rel_energy))),
-        rel_l2_displacement=own.rel_l2_displacement,
-        rel_l2_von_mises=own.rel_l2_von_mises,
-        mae_markers=own.mae_markers,
-        markers_u=markers[:, 0].tolist(),
-        markers_v=markers[:, 1].tolist(),
-    )
+    shared = own.model_dump(include={"rel_l2_displacement", "rel_l2_von_mises", "mae_markers"})
+    energy, (u, v) = float(np.sqrt(abs(own.rel_energy))), markers.T.tolist()
+    return UncertaintyScores(energy_norm=energy, markers_u=u, markers_v=v, **shared)
 
 
 def truth_scores(truth: Evaluation | None, load: Load) -> FigureScores | None:

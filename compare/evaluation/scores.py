@@ -234,12 +234,9 @@ class Scores(Numbers):
         return found + [none | {"solver": name, "converged": False, "status": said} for name, said in failed]
 
     def _row(self, name: str, own: SolverScores) -> dict[str, Cell]:
-        row: dict[str, Cell] = {
-            "solver": name,
-            "converged": own.converged,
-            "in_sample": own.markers.in_sample,
-        }
-        row |= {"observations": self.measurements.source, "reference": self.reference}
+        row: dict[str, Cell] = {"solver": name, "converged": own.converged}
+        row |= {"in_sample": own.markers.in_sample, "observations": self.measurements.source}
+        row |= {"reference": self.reference}
         for kind, errors in (("", own.markers), ("in_sample_", own.given), ("held_out_", own.held_out)):
             row |= {f"{kind}{mean}_mm": getattr(errors, mean, nan) for mean in MEANS}
         to = own.to_reference

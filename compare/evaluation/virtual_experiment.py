@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated
+from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated, solution_key
 from pinnray.comparison.evaluation.truths import SLIDING, Truth, check_walls
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.cache import cache_folder, kept_if_possible
-from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.machine import package_versions
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import MissingLibraryError, make_solver
 from pinnray.solvers.solution import Solution
@@ -52,13 +50,11 @@ def virtual_experiment(
         true = _true_fields(problem, progress, truth)
     except UserError as error:
         raise type(error)(f"{error}; or give measurements") from None
-    known = replace(
-        no_displacements(problem, marker_radius, experiment_source(problem, truth)),
-        simulated=True,
-        solid=truth.solid,
+    markers, moved, source = problem.mesh.markers, true.marker_displacement, experiment_source(problem, truth)
+    known = Observations(
+        markers, moved, source=source, simulated=True, solid=truth.solid, marker_radius=marker_radius
     )
-    seen = np.ones_like(known.visible)
-    return replace(known, displacements=true.marker_displacement, visible=seen), true
+    return known, true
 
 
 def _true_fields(problem: Problem, progress: Progress, truth: Truth) -> Evaluation:
@@ -70,17 +66,7 @@ def _true_fields(problem: Problem, progress: Progress, truth: Truth) -> Evaluati
             raise UserError(f"truth {truth.name}: the problem has to know its finger, which is meshed anew")
         own = replace(problem, mesh=finger_mesh(problem.finger, settings=MeshSettings(size=SOLID_SIZE)))
     solver, richer = _richer(own, truth)
-    key = content_hash(
-        [
-            problem.mesh.digest,
-            solver.name,
-            richer.digest,
-            solver.settings(),
-            package_versions(),
-            sources_digest(__name__, type(solver).__module__),
-            SOURCE,
-        ]
-    )
+    key = solution_key(solver, richer, problem.mesh.digest, SOURCE)
     entry = cache_folder() / f"experiment-{key}.npz"
     if (kept := Evaluation.load(entry, key)) is not None:
         progress(1.0, "from the cache")

@@ -17,10 +17,9 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from pinnray.comparison.evaluation.differences import weighted_percentile
 from pinnray.comparison.figures.canvas import Canvas, Extent, Pixels
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray, weighted_percentile
 from pinnray.runtime.figure import INK, MUTED, SMALL
 
 PERCENT = 99.5

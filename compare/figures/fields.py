@@ -62,11 +62,7 @@ QUANTITIES = (
 
 
 DISPLACEMENT = FieldQuantity(
-    "displacement",
-    "Displacement magnitude",
-    "mm",
-    False,
-    lambda evaluation: np.hypot(*evaluation.displacement.T),
+    "displacement", "Displacement magnitude", "mm", False, lambda each: np.hypot(*each.displacement.T)
 )
 
 VIEWED = (DISPLACEMENT, *QUANTITIES)
@@ -107,9 +103,8 @@ def drawn_solvers(
     columns, width = _columns(comparison, page)
     extent = body.field_extent(comparison.mesh, width)
     panels = int((TALLEST - HEAD - FOOT) / (PANEL_TITLE + width * extent.height / extent.width)) * columns
-    chosen = fitting(
-        known, comparison.reference, (panels - 1) // 2 if columns == 1 else panels // 2 - 1, solvers
-    )
+    room = (panels - 1) // 2 if columns == 1 else panels // 2 - 1
+    chosen = fitting(known, comparison.reference, room, solvers)
     chosen.sort(key=lambda each: (each.solver != comparison.reference.solver, not each.converged))
     return [base, *chosen]
 

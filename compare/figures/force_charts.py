@@ -1,6 +1,6 @@
 """Charts of the indenter's force: over its stroke by every solver, over time by the markers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,23 +22,19 @@ def draw_force_displacement(
     *,
     depth: float,
     truth: ForceCurve | None = None,
-    identified: Mapping[int, Evaluation] | None = None,
+    identified: Sequence[Evaluation] = (),
     page: float = WIDTH,
 ) -> Figure:
     """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
 
     A solver has its mark at each of its equilibria, a linear one a dashed line. The
-    simulated finger's curve ends in a cross. A force that was identified from the markers, by the number of
-    its solver in the run, is a square with its interval of 95 % at the end of the stroke.
+    simulated finger's curve ends in a cross. A force that was identified from the markers is a square with
+    its interval of 95 % at the end of the stroke.
     """
     labels = [_end_label(curve.evaluation.label, curve.force[-1] * depth) for curve in curves]
     true_label = [_end_label("truth, simulated", truth.force[-1] * depth)] if truth else []
-    found = {
-        number: (each, each.identified.force)
-        for number, each in (identified or {}).items()
-        if each.identified is not None
-    }
-    more = [f"{_end_label(each.label, force.value * depth)}, identified" for each, force in found.values()]
+    found = [(each, each.identified.force) for each in identified if each.identified is not None]
+    more = [f"{_end_label(each.label, force.value * depth)}, identified" for each, force in found]
     top, height, left = 0.3 + legend_height([*labels, *true_label, *more], page), 2.4, 0.75  # inches
     apart = 0.08 / (page - left - 0.65)  # the room of a mark, as a share of the axes' width
     with figure(top + height + 0.45, page) as drawn:
@@ -65,23 +61,15 @@ def draw_force_displacement(
             axes.plot(*end, "x", ms=7, mew=1.8, color=MEASURED, label=true_label[0], zorder=4)
             axes.plot(truth.stroke, truth.force, color=MEASURED, lw=1.3, zorder=3)
         reach = (truth or curves[0]).stroke[-1]
-        for place, (number, label) in enumerate(zip(found, more, strict=True)):
-            value, low, high = found[number][1]
+        style: dict[str, Any] = {"ms": 4.5, "capsize": 2.5, "lw": 1.2, "zorder": 5}
+        for place, ((each, (value, low, high)), label) in enumerate(zip(found, more, strict=True)):
             # Beside each other: the intervals of several solvers would hide each other.
             x, interval = reach * (1 - apart * (place + 1)), [[value - low], [high - value]]
-            style: dict[str, Any] = {
-                "ms": 4.5,
-                "capsize": 2.5,
-                "lw": 1.2,
-                "color": solver_look(found[number][0].solver).colour,
-                "zorder": 5,
-            }
-            axes.errorbar([x], [value], yerr=interval, fmt="s", label=label, **style)
+            colour = solver_look(each.solver).colour
+            axes.errorbar([x], [value], yerr=interval, fmt="s", label=label, color=colour, **style)
         every = [*curves, truth] if truth else curves
         axes.set_xlim(0, (1 + apart) * max(curve.stroke[-1] for curve in every))
-        forces = np.concatenate(
-            [curve.force for curve in every] + [np.array(force) for _, force in found.values()]
-        )
+        forces = np.concatenate([curve.force for curve in every] + [np.array(force) for _, force in found])
         axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
         axes.set_xlabel("stroke of the indenter, mm")
         axes.set_ylabel("force, N per mm of depth")
@@ -142,9 +130,8 @@ def draw_force_track(
                 axes.plot(along, value, color=colour, linewidth=1.2, linestyle=style, label=name)
             axes.set_ylabel(label)
             axes.grid()
-            axes.set_xlim(
-                float(np.nanmin(along)), max(float(np.nanmax(along)), float(np.nanmin(along)) + 1e-3)
-            )
+            first, last = float(np.nanmin(along)), float(np.nanmax(along))
+            axes.set_xlim(first, max(last, first + 1e-3))
             if values is forces:
                 top = float(forces[known, 2].max(initial=0.0)) or 1.0
                 axes.set_ylim(1.05 * min(forces[known, 1].min(initial=0.0), 0.0), 1.05 * top)

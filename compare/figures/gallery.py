@@ -25,12 +25,9 @@ class Illustration(NamedTuple):
 
 
 def _overlay(comparison: Results, page: float) -> Illustration:
-    return Illustration(
-        draw_overlay(comparison, page),
-        "Deformed finger",
-        "Displacement magnitude on one scale, not exaggerated."
-        f"{_absent(comparison.evaluations, Panels.on(comparison, page).solvers)}",
-    )
+    absent = _absent(comparison.evaluations, Panels.on(comparison, page).solvers)
+    said = f"Displacement magnitude on one scale, not exaggerated.{absent}"
+    return Illustration(draw_overlay(comparison, page), "Deformed finger", said)
 
 
 def _marker_errors(comparison: Results, page: float) -> Illustration | None:
@@ -38,11 +35,8 @@ def _marker_errors(comparison: Results, page: float) -> Illustration | None:
     if not observations.known:
         return None
     unseen = "" if observations.visible.all() else " ×: a marker that was not seen."
-    return Illustration(
-        draw_marker_errors(comparison, page),
-        "Errors at the markers",
-        f"On one logarithmic scale, numbered as in the design.{unseen}",
-    )
+    said = f"On one logarithmic scale, numbered as in the design.{unseen}"
+    return Illustration(draw_marker_errors(comparison, page), "Errors at the markers", said)
 
 
 def _field(
@@ -64,21 +58,17 @@ def _field(
 
 
 def _force_displacement(comparison: Results, page: float) -> Illustration | None:
-    depth = comparison.design.depth
+    depth, truth = comparison.design.depth, None
     if not (curves := force_curves(comparison.evaluations, comparison.load)):
         return None
-    truth, cross = None, ""
+    said = "Points: equilibria that a solver found as the load grew. Dashed: straight by the linear law."
     if comparison.truth is not None:
         truth = ForceCurve.of(comparison.truth, comparison.load)
-        cross = " Pink: the truth."
-    found = {n: each for n, each in enumerate(comparison.evaluations) if each.identified}
-    squares = " Squares: forces found from the markers, with intervals of 95 %." if found else ""
-    return Illustration(
-        draw_force_displacement(curves, depth=depth, truth=truth, identified=found, page=page),
-        "Force over displacement",
-        "Points: equilibria that a solver found as the load grew. Dashed: straight by the linear law."
-        f"{cross}{squares}",
-    )
+        said += " Pink: the truth."
+    if found := [each for each in comparison.evaluations if each.identified]:
+        said += " Squares: forces found from the markers, with intervals of 95 %."
+    figure = draw_force_displacement(curves, depth=depth, truth=truth, identified=found, page=page)
+    return Illustration(figure, "Force over displacement", said)
 
 
 def _losses(comparison: Results, page: float) -> Illustration | None:

@@ -11,19 +11,9 @@ from matplotlib.patches import Circle
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.evaluation.scores import SolverScores
-from pinnray.comparison.figures import body
+from pinnray.comparison.figures import body, layout
 from pinnray.comparison.figures.body import SEQUENTIAL, ColourScale
 from pinnray.comparison.figures.canvas import Canvas, Extent
-from pinnray.comparison.figures.layout import (
-    TALLEST,
-    arrow,
-    axes_at,
-    fitting,
-    head_height,
-    legend_below_heading,
-    wrapped,
-    write_heading,
-)
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.arrays import FloatArray
@@ -51,11 +41,11 @@ class Panels(NamedTuple):
             width = (page - MARGIN * (columns + 1)) / columns
             extent = overlay_extent(comparison, width)
             row = PANEL_TITLE + width * extent.height / extent.width
-            room = int((TALLEST - _head(comparison, page) - FOOT) / row) * columns
+            room = int((layout.TALLEST - _head(comparison, page) - FOOT) / row) * columns
             if columns == min(2, count) or page < NARROW or count <= min(3, room):
                 break
             columns = 2
-        return cls(columns, width, extent, fitting(comparison.evaluations, comparison.reference, room))
+        return cls(columns, width, extent, layout.fitting(comparison.evaluations, comparison.reference, room))
 
 
 def draw_overlay(comparison: Results, page: float = WIDTH) -> Figure:
@@ -70,24 +60,24 @@ def draw_overlay(comparison: Results, page: float = WIDTH) -> Figure:
     total = head + rows * (PANEL_TITLE + height) + FOOT
     canvas = Canvas(mesh, extent, width=body.PIXELS // columns)
     with figure(total, page) as drawn:
-        write_heading(drawn, "Deformed finger, true scale")
+        layout.write_heading(drawn, "Deformed finger, true scale")
         for number, evaluation in enumerate(evaluations):
             row, column = divmod(number, columns)
             left = MARGIN + column * (width + MARGIN)
             top = head + PANEL_TITLE + row * (PANEL_TITLE + height)
-            axes = axes_at(drawn, (left, top, width, height))
+            axes = layout.axes_at(drawn, (left, top, width, height))
             _panel(axes, canvas, scale, comparison, evaluation)
             _motion(axes, comparison, evaluation)
             body.scale_bar(axes, extent)
-        bar = axes_at(drawn, (0.25 * page, total - FOOT + 0.06, 0.5 * page, 0.09))
+        bar = layout.axes_at(drawn, (0.25 * page, total - FOOT + 0.06, 0.5 * page, 0.09))
         body.colour_bar(bar, scale, "displacement magnitude, mm")
-        legend_below_heading(drawn, _handles(comparison), length=1.6, note=_note(comparison, page))
+        layout.legend_below_heading(drawn, _handles(comparison), length=1.6, note=_note(comparison, page))
     return drawn
 
 
 def _head(comparison: Results, page: float) -> float:
     """Height of heading, legend and notes, inches."""
-    return head_height(page, len(_handles(comparison)), _note(comparison, page))
+    return layout.head_height(page, len(_handles(comparison)), _note(comparison, page))
 
 
 def _handles(comparison: Results) -> list[Line2D]:
@@ -110,7 +100,7 @@ def _note(comparison: Results, page: float) -> str:
         notes.append("† was given these markers and meets them; held out: each predicted from the others")
     if comparison.observations.known:
         notes.append("pink arrows: errors at the markers, held out if known, × the factor above the panel")
-    return "\n".join(wrapped(note, page) for note in notes)
+    return "\n".join(layout.wrapped(note, page) for note in notes)
 
 
 def overlay_extent(comparison: Results, width: float) -> Extent:
@@ -176,14 +166,8 @@ def _error_vectors(
     room = 0.1 * float(np.ptp(axes.get_xlim()))
     factor = max((each for each in FACTORS if each * longest <= room), default=1)
     style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": MEASURED, "zorder": 6}
-    shape: dict[str, Any] = {
-        "units": "inches",
-        "width": 0.014,
-        "headwidth": 4,
-        "headlength": 4.5,
-        "headaxislength": 4,
-    }
-    axes.quiver(*observed.T, *(factor * error).T, **style, **shape, minlength=0.1)
+    head: dict[str, Any] = {"headwidth": 4, "headlength": 4.5, "headaxislength": 4, "minlength": 0.1}
+    axes.quiver(*observed.T, *(factor * error).T, units="inches", width=0.014, **style, **head)
     axes.set_title(f"×{factor}", loc="right", size=SMALL, pad=3, y=1.0, color=MEASURED)
 
 
@@ -212,4 +196,4 @@ def _motion(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
     if radius is not None:
         centre = (end[0], end[1] + radius)  # it can lie outside the picture
         axes.add_patch(Circle(centre, radius, fill=False, color=MUTED, lw=0.8, zorder=3))
-    arrow(axes, start, end)
+    layout.arrow(axes, start, end)

@@ -11,14 +11,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.scores import SolverScores
-from pinnray.comparison.figures.layout import (
-    axes_at,
-    head_height,
-    legend_above,
-    legend_below_heading,
-    legend_height,
-    write_heading,
-)
+from pinnray.comparison.figures import layout
 from pinnray.comparison.figures.solver_colours import solver_look
 from pinnray.runtime.arrays import BoolArray
 from pinnray.runtime.figure import INK, MUTED, NARROW, SMALL, WIDTH, Figure, figure
@@ -37,12 +30,12 @@ def draw_losses(comparison: Results, page: float = WIDTH) -> Figure | None:
         return None
     units = {"PDE": "MPa", "BC": "mm²", "ASM": "mm²"}
     terms = [name for name in units if any(name in each.history for each in trained)]
-    head = HEAD + legend_height([evaluation.label_at_markers for evaluation in trained], page)
+    head = HEAD + layout.legend_height([evaluation.label_at_markers for evaluation in trained], page)
     height, gap, foot, left = 1.15, 0.15, 0.42, 0.85  # inches
     with figure(head + len(terms) * (height + gap) + foot, page) as drawn:
-        write_heading(drawn, "Losses, without their weights")
+        layout.write_heading(drawn, "Losses, without their weights")
         for row, term in enumerate(terms):
-            axes = axes_at(drawn, (left, head + row * (height + gap), page - left - 0.15, height))
+            axes = layout.axes_at(drawn, (left, head + row * (height + gap), page - left - 0.15, height))
             for evaluation in trained:
                 if term in evaluation.history:
                     epochs, losses = evaluation.history["epoch"], evaluation.history[term]
@@ -54,7 +47,7 @@ def draw_losses(comparison: Results, page: float = WIDTH) -> Figure | None:
             axes.set_ylabel(f"{term} loss, {units[term]}")
             axes.grid()
             if row == 0:
-                legend_above(axes, page)
+                layout.legend_above(axes, page)
             if row < len(terms) - 1:
                 axes.tick_params(labelbottom=False)
         axes.set_xlabel("epoch")
@@ -77,18 +70,19 @@ def draw_marker_errors(comparison: Results, page: float = WIDTH) -> Figure:
     width = page / 2 - left - (1.02 if page > NARROW else 0.1)  # where the means stand
     scores = [comparison.scores[evaluation.solver] for evaluation in evaluations]
     span = _span(scores)
-    head = head_height(page, 2) + 0.05
+    head = layout.head_height(page, 2) + 0.05
     with figure(head + len(evaluations) * step + foot, page) as drawn:
-        write_heading(drawn, f"Absolute error at {observations.label} markers, mm")
+        layout.write_heading(drawn, f"Absolute error at {observations.label} markers, mm")
         fitted = any(evaluation.in_sample for evaluation in evaluations)
         handles = [
             Patch(facecolor=MUTED, edgecolor=MUTED, label="held out: not given"),
             Line2D([], [], **CIRCLE, color=MUTED, label="training: given (†)"),
         ]
-        legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
+        layout.legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
         for row, (evaluation, own) in enumerate(zip(evaluations, scores, strict=True)):
             for column, symbol in enumerate("uv"):
-                axes = axes_at(drawn, (left + column * page / 2, head + title + row * step, width, height))
+                box = (left + column * page / 2, head + title + row * step, width, height)
+                axes = layout.axes_at(drawn, box)
                 said = _draw_errors(axes, symbol, own, solver_look(evaluation.solver).colour, span[0])
                 _set_scales(axes, observations.visible, span)
                 axes.set_ylabel(rf"$|\Delta {symbol}|$", size=SMALL)

@@ -17,12 +17,10 @@ def draw_tensile_test(test: TensileTest, fits: Sequence[TensileFit]) -> Figure:
     with figure(top + height + 0.45, COLUMN) as drawn:
         write_heading(drawn, "Tensile test and the laws fitted to it")
         axes = axes_at(drawn, (left, top, COLUMN - left - 0.2, height))
-        order = np.argsort(test.strain)
-        axes.plot(
-            100 * test.strain, test.stress, "o", ms=3, mew=0, color=MEASURED, label="measured", zorder=3
-        )
+        strain, order = 100 * test.strain, np.argsort(test.strain)
+        axes.plot(strain, test.stress, "o", ms=3, mew=0, color=MEASURED, label="measured", zorder=3)
         for fit, label, line in zip(fits, labels, ("-", "--", "-.", ":"), strict=False):
-            axes.plot(100 * test.strain[order], fit.stress[order], color=INK, ls=line, label=label)
+            axes.plot(strain[order], fit.stress[order], color=INK, ls=line, label=label)
         axes.set(xlim=(0, None), ylim=(0, None), xlabel="nominal strain, %", ylabel="nominal stress, MPa")
         axes.grid()
         legend_above(axes, COLUMN)

@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -59,15 +58,14 @@ def run(job: Job, stages: Stages, pool: Pool | None = None) -> Comparison:
     check_output(job.out)
     kept = job.names if job.resume else ()
     with replaced_folder(job.out, keep=kept) as folder:
-        if not isinstance(job.measurements, MarkerSource):
-            comparison = _with_files(compute(job, stages, folder, pool))
-            _write(folder, job, comparison, stages)
-            return comparison
-        measured = job.measurements.measured(job.design, folder, stages)
-        given = replace(job, measurements=measured.observations)
+        given, measured, photographs = job, None, list[Picture]()
+        if isinstance(job.measurements, MarkerSource):
+            measured = job.measurements.measured(job.design, folder, stages)
+            given = replace(job, measurements=measured.observations)
         comparison = _with_files(compute(given, stages, folder, pool))
-        comparison = replace(comparison, warnings=[*measured.warnings, *comparison.warnings])
-        photographs = [*measured.pictures, *measured.compared(comparison)]
+        if measured is not None:
+            comparison = replace(comparison, warnings=[*measured.warnings, *comparison.warnings])
+            photographs = [*measured.pictures, *measured.compared(comparison)]
         _write(folder, job, comparison, stages, photographs)
     return comparison
 
@@ -82,16 +80,7 @@ def compute(job: Job, stages: Stages, folder: Path, pool: Pool | None = None) ->
     """
     given = job.measurements if isinstance(job.measurements, Observations) else None
     solvers, unsupported = supported_solvers(job.solvers, job.spare, job.material, job.load)
-    mesh, adaptation = shared_mesh(
-        job.design,
-        job.mesh,
-        stages,
-        tolerance=job.adapt,
-        material=job.material,
-        load=job.load,
-        solvers=solvers,
-        check=partial(check_positions, given) if given else None,
-    )
+    mesh, adaptation = shared_mesh(job, solvers, stages)
     learned = job.learned if given else None  # a simulated finger is as it is drawn
     problem = Problem(mesh, job.material, job.load, finger=job.design, learned=learned)
     if presses := [each for each in job.presses if isinstance(each, Observations)]:

@@ -12,16 +12,15 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from pinnray.comparison.evaluation.certifier import with_certificates
-from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated
+from pinnray.comparison.evaluation.evaluation import Evaluation, evaluated, solution_key
 from pinnray.comparison.pipeline.job import Job
 from pinnray.geometry.cache import expected_triangles
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.atomic import write_text
-from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.machine import cores, package_versions
+from pinnray.runtime.machine import cores
 from pinnray.runtime.output_folder import SOLUTIONS, TRAINING, take_training
 from pinnray.runtime.processes.child import ProcessFailed, end_with_parent
 from pinnray.runtime.processes.pool import Pool, known_to_children
@@ -248,16 +247,8 @@ class _Part:
         job, traits = self.job, Traits.of(solver)
         given = self.observations if traits.assimilates else None
         own = replace(self.problem, material=with_law(job.material, solver), observations=given)
-        depends_on = [
-            solver.name,
-            type(solver).__qualname__,
-            solver.settings(),
-            package_versions(),
-            sources_digest(__name__, type(solver).__module__),
-            own.digest,
-            self.observations.points,
-        ]
-        key, file = content_hash(depends_on), Path(SOLUTIONS) / f"{solver.name}.npz"
+        key = solution_key(solver, own, self.observations.points)
+        file = Path(SOLUTIONS) / f"{solver.name}.npz"
         with stage(solver.name) as progress:
             for place in (self.folder, job.out) if job.resume else ():
                 if (evaluation := Evaluation.load(place / file, key)) is not None:

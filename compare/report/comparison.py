@@ -58,18 +58,13 @@ class Comparison(Results):
         from pinnray.comparison.report.html_report import write_report
         from pinnray.runtime.machine import machine, package_versions
 
-        provenance = {
-            "design_sha256": self.design.digest,
-            "mesh_sha256": self.mesh.digest,
-            "solvers": self.settings,
-            "versions": package_versions(),
-            "machine": machine(),
-        }
+        facts: dict[str, object] = {"design_sha256": self.design.digest, "mesh_sha256": self.mesh.digest}
+        facts |= {"solvers": self.settings, "versions": package_versions(), "machine": machine()}
         file = as_path(path, "the report")
         if file.is_dir():
             raise UserError(f"the report {file} is a folder; name a file, such as report.html")
         with TemporaryDirectory() as folder:
-            write_report(file, self, draw_all(Path(folder), self), provenance)
+            write_report(file, self, draw_all(Path(folder), self), facts)
         return file
 
     def _repr_html_(self) -> str:

@@ -135,15 +135,6 @@ def report_html(comparison: Results, pictures: Sequence[Picture], provenance: Ma
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
     """
     design, scores = comparison.design, comparison.scores
-    entries: list[dict[str, Any]] = [
-        {
-            "label": each.label,
-            "evaluation": each,
-            "own": (own := scores[each.solver]),
-            "seconds": seconds(own),
-        }
-        for each in comparison.evaluations
-    ]
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
@@ -152,10 +143,6 @@ def report_html(comparison: Results, pictures: Sequence[Picture], provenance: Ma
         own=scores[scores.reference].to_reference.reference_uncertainty,
         table_one=table_one(scores),
         printed=printed_rows(design),
-        entries=entries,
-        certified=[
-            entry for entry in entries if (found := entry["evaluation"].certificate) and found.has_excess
-        ],
         missing=[said for each in comparison.evaluations if (said := text.missed_energy(each))],
         has_symbols=any(symbol for _, symbol, _ in design.facts()),
         text=text,
@@ -170,6 +157,6 @@ def report_html(comparison: Results, pictures: Sequence[Picture], provenance: Ma
 @cache  # compiling takes a fifth of a second
 def _template() -> Template:
     environment = template_environment("pinnray.comparison")
-    filters = (number, distance, share)
+    filters = (number, distance, share, seconds)
     environment.filters |= {each.__name__: each for each in filters}
     return environment.get_template("report.html.j2")

@@ -44,9 +44,7 @@ def field_grid(mesh: TriangleMesh, evaluation: Evaluation) -> pyvista.Unstructur
     strain = evaluation.per_triangle(evaluation.strain)
     for name, (row, column) in COMPONENTS.items():
         grid.cell_data[f"strain_{name}"] = strain[:, row, column]
-    stress, stress_zz = (
-        evaluation.per_triangle(values) for values in (evaluation.stress, evaluation.stress_zz)
-    )
+    stress, stress_zz = map(evaluation.per_triangle, (evaluation.stress, evaluation.stress_zz))
     components = [stress[:, 0, 0], stress[:, 1, 1], stress_zz, stress[:, 0, 1]]
     grid.cell_data["stress_MPa"] = np.pad(np.column_stack(components), ((0, 0), (0, 2)))
     for number, name in enumerate(SYMMETRIC):

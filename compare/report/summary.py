@@ -4,7 +4,6 @@ A question that they cannot answer is not asked.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from math import hypot, isfinite, nan
 from typing import NamedTuple
 
@@ -91,20 +90,11 @@ def _figures(scores: Scores) -> RunAnswer | None:
     breaks = values.get("strain_over_break", nan)
     if isfinite(breaks):
         sentences.append(break_answer(breaks, values.get("peak_radius_mm", nan)))
-    intervals = "In brackets: 95 % intervals. "
     shown = [row for row in rows if any(cell not in (NONE, "0.00") for cell in row[1:])]
-    return RunAnswer(
-        "What does the finger do?",
-        f"By {scores.label(name)} {said}." if said != NONE else f"{scores.label(name)} does not tell.",
-        sentences,
-        TextTable(
-            "",
-            ["", *columns],
-            shown,
-            intervals * any("(" in cell for row in shown for cell in row[1:]) + FIGURES_NOTE,
-            left=[""],
-        ),
-    )
+    intervals = "In brackets: 95 % intervals. " * any("(" in cell for row in shown for cell in row[1:])
+    table = TextTable("", ["", *columns], shown, intervals + FIGURES_NOTE, left=[""])
+    verdict = f"By {scores.label(name)} {said}." if said != NONE else f"{scores.label(name)} does not tell."
+    return RunAnswer("What does the finger do?", verdict, sentences, table)
 
 
 def _beside(words: str, said: str, truth: float) -> str:
@@ -156,24 +146,18 @@ def _trust(scores: Scores) -> RunAnswer | None:
     judged = [name for name in networks if name in plain]
     reference = scores.label(scores.reference)
     listed = {scores.reference: scores[scores.reference], **plain}
+    title = f"Relative L² distance over the body from {reference}"
     heads = ["Solver", f"{reference}:\ndisplacement", f"{reference}:\nvon Mises"]
-    table = TextTable(
-        f"Relative L² distance over the body from {reference}",
-        heads,
-        [
-            [scores.label(name), *_from_reference(name, scores), *_to_truth(own)]
-            for name, own in listed.items()
-        ],
-        f"±: error of {reference}, as it estimates it." if scores[scores.reference].uncertainty else "",
-    )
     if scores[scores.reference].to_truth:
-        title = f"{table.title} and from the truth, and error of the force"
-        table = replace(table, title=title, headings=[*heads, *TRUTH_HEADS])
+        title += " and from the truth, and error of the force"
+        heads += TRUTH_HEADS
+    rows = [[scores.label(name), *_from_reference(name, scores), *_to_truth(listed[name])] for name in listed]
+    own = f"±: error of {reference}, as it estimates it." if scores[scores.reference].uncertainty else ""
     return RunAnswer(
         "May the network be trusted here?",
         " ".join(_verdict(name, scores) for name in judged),
         [said for name in judged if (said := _model_error(name, scores))],
-        table if judged else None,
+        TextTable(title, heads, rows, own) if judged else None,
     )
 
 
@@ -241,12 +225,9 @@ def _markers(scores: Scores) -> RunAnswer | None:
     else:
         sentences.append("Whether stress and force are nearer is unknown: no camera tells them.")
     sentences += _loads_found(scores)
-    table = TextTable(
-        "", heads, rows, "Held out: mean |Δu| + |Δv| at each marker, predicted from the others."
-    )
-    return RunAnswer(
-        "Did the markers help?", _nearer(plain, given, measures, scores.reference), sentences, table
-    )
+    caption = "Held out: mean |Δu| + |Δv| at each marker, predicted from the others."
+    verdict = _nearer(plain, given, measures, scores.reference)
+    return RunAnswer("Did the markers help?", verdict, sentences, TextTable("", heads, rows, caption))
 
 
 TRUTH_MEASURES: Mapping[str, Callable[[SolverScores], float]] = {

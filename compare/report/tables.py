@@ -12,7 +12,7 @@ from typing import NamedTuple
 from rich.table import Table
 
 from pinnray.comparison.evaluation.comparison import Results
-from pinnray.comparison.evaluation.scores import MEANS, Means, Scores, SolverScores
+from pinnray.comparison.evaluation.scores import MEANS, Means, Scores
 from pinnray.comparison.report.numbers import at_markers, error, seconds, share
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
@@ -181,7 +181,8 @@ def body_table(comparison: Results) -> Table:
     rows = []
     for name, own in scores.solvers.items():
         away = own.to_reference.rel_l2_displacement
-        cells = [NONE if name == scores.reference else share(away), _above_fem(own)]
+        above = share(own.certificate.excess_beyond_rounding) if own.certificate else NONE
+        cells = [NONE if name == scores.reference else share(away), above]
         if found := own.to_truth:
             cells += [share(found.displacement.rel_l2), share(found.von_mises.rel_l2)]
             cells.append(error(own.force_to_truth_rel))
@@ -199,10 +200,3 @@ def _table(title: str, headings: list[str], rows: list[tuple[str, bool, list[str
         style = None if converged else "yellow"
         table.add_row(label.replace(" (", "\n(").replace(", ", ",\n"), *cells, style=style)
     return table
-
-
-def _above_fem(own: SolverScores) -> str:
-    """Excess energy over the least of finite elements; a dash without a certificate."""
-    if own.certificate is None:
-        return NONE
-    return share(own.certificate.excess_beyond_rounding)

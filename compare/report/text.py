@@ -44,13 +44,9 @@ def load_sentence(load: Load, design: Finger) -> str:
         "cylinder": f"A rigid cylinder of radius {load.radius or 0:g} mm presses {friction} where it "
         "touches the front, and moves by the prescribed displacement",
     }[load.kind]
-    parts = [
-        f"{name} is free"
-        if value is None
-        else f"{name} = {value:g} mm".replace("-", "−").replace(" ", "\N{NO-BREAK SPACE}")
-        for name, value in zip("uv", load.displacement, strict=True)
-    ]
-    moved = ", ".join(parts).replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
+    given = zip("uv", load.displacement, strict=True)
+    parts = [f"{name} is free" if value is None else f"{name} = {value:g} mm" for name, value in given]
+    moved = ", ".join(part.replace("-", "−").replace(" ", "\N{NO-BREAK SPACE}") for part in parts)
     middle = design.contact_abscissa if load.position is None else load.position
     about = f"{'from' if load.kind == 'cylinder' else 'about'} x = {middle:g} mm on the front"
     return f"{where}: {moved}, {about} (load “{load.kind}”)."
@@ -68,14 +64,11 @@ def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str,
     """Provenance as groups of lines; single values come first, in a group without a title."""
     groups = {"": {key: value for key, value in provenance.items() if not isinstance(value, Mapping)}}
     groups |= {key: dict(value) for key, value in provenance.items() if isinstance(value, Mapping)}
-    return [
-        (
-            title.replace("_", " "),
-            [(str(key).replace("_", " "), in_words(value)) for key, value in lines.items()],
-        )
+    named = {
+        title: [(str(key).replace("_", " "), in_words(value)) for key, value in lines.items()]
         for title, lines in groups.items()
-        if lines
-    ]
+    }
+    return [(title.replace("_", " "), lines) for title, lines in named.items() if lines]
 
 
 def in_words(value: object) -> str:
@@ -88,11 +81,8 @@ def in_words(value: object) -> str:
 def symbol(name: str) -> Markup:
     """A symbol of the paper, such as `L_tip`, with its index set as one."""
     letter, _, index = name.partition("_")
-    return (
-        Markup("<i>{}</i><sub>{}</sub>").format(letter, index)
-        if index
-        else Markup("<i>{}</i>").format(letter)
-    )
+    form = Markup("<i>{}</i><sub>{}</sub>") if index else Markup("<i>{}</i>")
+    return form.format(letter, index)
 
 
 ASPECTS = ("", "_deviation", "_low", "_high", "_resolution")

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from pinnray.geometry.drawing.formats.closed_loops import straightened
 from pinnray.geometry.drawing.formats.drawing import place
 from pinnray.geometry.drawing.placement import on_curve
-from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.loop import Loop, turns
 from pinnray.geometry.section.section import DEVIATION, Section
 from pinnray.geometry.section.thickness import inner_normals, wall_thickness
 from pinnray.runtime.arrays import FloatArray
@@ -89,7 +89,7 @@ def check_markers(section: Section, markers: FloatArray, diameter: float) -> Non
 def _bend(outline: Loop, corner: int) -> float:
     """Turn of the outline at a corner, radians."""
     into, out = inner_normals(outline, corner - 1, 1.0)[0], inner_normals(outline, corner, 0.0)[0]
-    return float(np.arctan2(into[0] * out[1] - into[1] * out[0], into @ out))
+    return float(turns(into, out))
 
 
 def _check_sound(rings: Sequence[shapely.LinearRing]) -> None:

@@ -40,7 +40,7 @@ class Description(CheckedModel):
         default=None, description="Unit of the file's coordinates; none means the file's own, or mm"
     )
     tolerance: float | None = bounded(
-        None, 1e-6, 0.5, "", "mm", "Largest gap between two ends of curves that is closed; none means 0.001"
+        None, 1e-6, 0.5, "Largest gap between two ends of curves that is closed; none means 0.001", "", "mm"
     )
     plane: str | None = Field(default=None, description="Plane in which a solid is cut, such as z = 6")
     clamp: Annotated[tuple[tuple[Coordinates, Coordinates], ...], Field(min_length=1)] | None = Field(
@@ -52,18 +52,14 @@ class Description(CheckedModel):
         default=None, description="A point of the outline, where the indenter touches"
     )
     contact_width: float | None = bounded(
-        None, 1e-6, 2000, "", "", "Length of front face that the indenter touches, in the file's unit"
+        None, 1e-6, 2000, "Length of front face that the indenter touches, in the file's unit"
     )
     markers: Points | Annotated[int, Field(strict=True, ge=1, le=200)] | None = Field(
         default=None, description="Centres of the markers, or their number"
     )
-    marker_diameter: float | None = bounded(
-        None, 1e-6, 2000, "", "", "Diameter of a marker, in the file's unit"
-    )
-    marker_height: float | None = bounded(
-        None, 1e-6, 2000, "", "", "How deep a marker is inlaid, in the file's unit"
-    )
-    depth: float | None = bounded(None, 1e-6, 2000, "", "", "Depth of the extrusion, in the file's unit")
+    marker_diameter: float | None = bounded(None, 1e-6, 2000, "Diameter of a marker, in the file's unit")
+    marker_height: float | None = bounded(None, 1e-6, 2000, "How deep a marker is inlaid, in the file's unit")
+    depth: float | None = bounded(None, 1e-6, 2000, "Depth of the extrusion, in the file's unit")
 
     @field_validator("clamp", mode="before")
     @classmethod

@@ -19,7 +19,7 @@ from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray, frozen_array
 from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.notebook import brief, fact_table, png_image
+from pinnray.runtime.notebook import brief, fact_table
 
 if TYPE_CHECKING:
     from pinnray.runtime.figure import Figure
@@ -201,7 +201,7 @@ class DrawnFinger:
     def _repr_html_(self) -> str:
         """The section and the facts, in a notebook."""
         facts = {meaning: value for meaning, _, value in self.facts()}
-        return fact_table(f"Finger “{self.name}”", facts, png_image(self.plot()._repr_png_()))
+        return fact_table(f"Finger “{self.name}”", facts, self.plot()._repr_png_())
 
 
 def description_lines(finger: Finger) -> str:

@@ -48,13 +48,8 @@ def finger_from_file(path: str | Path, description: Description | None = None) -
     path = Path(path)
     if description is None:
         description = load_description(description_beside(path))
-    drawing = read_drawing(
-        path,
-        description.units,
-        description.plane,
-        description.tolerance,
-        depth_known=description.depth is not None,
-    )
+    wanted = description.units, description.plane, description.tolerance
+    drawing = read_drawing(path, *wanted, depth_known=description.depth is not None)
     try:
         return finger_of(drawing, description)
     except UserError as error:

@@ -86,10 +86,8 @@ def placed(section: Section, which: int, fraction: float) -> tuple[Section, Plac
     touched = turned(contact[None])[0]
     outline = with_back(with_front(section.outline, touched))
     placement = Placement(turned.matrix, turned.shift - (base_start(outline)[0], 0.0))
-    shift = placement.shift - turned.shift
-    outline = _rounded(outline.transformed(np.eye(2), shift))
-    cavities = tuple(_rounded(cavity.transformed(np.eye(2), shift)) for cavity in section.cavities)
-    return Section(outline, cavities), placement
+    shifted = Placement(np.eye(2), placement.shift - turned.shift)
+    return shifted.section(Section(outline, section.cavities)), placement
 
 
 def _rounded(loop: Loop) -> Loop:
@@ -153,13 +151,8 @@ def with_back(loop: Loop) -> Loop:
     """The outline with the name `back` for its longest straight piece opposite to the front, if long."""
     front = [loop.ends[which][:, 0] for which in loop.pieces("front")]
     reach = np.ptp(np.concatenate(front))
-    free = [
-        which
-        for which in loop.straight.tolist()
-        if loop.names[which] == ""
-        and inner_normals(loop, which, 0.5)[0, 1] > 0.5
-        and loop.lengths[which] > 0.5 * reach
-    ]
+    long = [which for which in loop.straight.tolist() if loop.lengths[which] > 0.5 * reach]
+    free = [which for which in long if not loop.names[which] and inner_normals(loop, which, 0.5)[0, 1] > 0.5]
     return loop.named(max(free, key=lambda which: loop.lengths[which]), "back") if free else loop
 
 

@@ -54,23 +54,18 @@ def with_clamp(outline: Loop) -> Loop:
         (end for end in ends if end.width >= 0.8 * widest),
         key=lambda end: (len(end.pieces), round(end.width * abs(float(end.normal @ axis)), 6), -end.x),
     )
-    return outline.renamed(
-        "base" if number in best.pieces else name for number, name in enumerate(outline.names)
-    )
+    names = ("base" if number in best.pieces else name for number, name in enumerate(outline.names))
+    return outline.renamed(names)
 
 
 def contact_point(section: Section) -> FloatArray:
     """A proposed middle of the contact, shape (2,), mm, on a section with a clamp."""
     outline = section.outline
     middle, normal = _clamp_frame(outline)
-    sides = [
-        end.pieces[0]
-        for end in _flat_sides(outline)
-        if abs(end.normal @ normal) <= SIDEWAYS and len(end.pieces) == 1
-    ]
-    free = [which for which in sides if outline.names[which] != "base"]
-    extent = float(np.ptp(section.bounds, axis=0).max())
-    free = [which for which in free if outline.lengths[which] >= 0.3 * extent]
+    flat = [side for side in _flat_sides(outline) if abs(side.normal @ normal) <= SIDEWAYS]
+    sides = [side.pieces[0] for side in flat if len(side.pieces) == 1]
+    least = 0.3 * float(np.ptp(section.bounds, axis=0).max())
+    free = [which for which in sides if outline.names[which] != "base" and outline.lengths[which] >= least]
     if not free:
         raise UserError(
             "it has no straight side to be touched; give contact = [x, y], a point of the outline"

@@ -20,7 +20,7 @@ from pinnray.geometry.finger.section import finger_section
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.notebook import fact_table, png_image
+from pinnray.runtime.notebook import fact_table
 
 if TYPE_CHECKING:
     from pinnray.runtime.figure import Figure
@@ -96,7 +96,7 @@ class Design(Parameters):
         }
         if self.small_markers:
             facts["markers"] = f"of {self.marker_diameter:g} mm: {self.small_markers}"
-        return fact_table(f"Design “{self.name}”", facts, png_image(self.plot()._repr_png_()))
+        return fact_table(f"Design “{self.name}”", facts, self.plot()._repr_png_())
 
     def __repr__(self) -> str:
         """The name, the paper's nine parameters and what else differs from its default, in one line."""

@@ -18,7 +18,7 @@ from pinnray.runtime.errors import UserError
 
 
 def bounded(
-    default: Any, low: float, high: float, unit: str, symbol: str, meaning: str, **limits: float
+    default: Any, low: float, high: float, meaning: str, unit: str = "", symbol: str = "", **limits: float
 ) -> Any:
     """A bounded number of a model, with its description for messages and help texts.
 
@@ -59,11 +59,8 @@ class CheckedModel(BaseModel):
             values = by_parameter_name(given, type(self))
             for name, value in values.items():
                 field = type(self).model_fields.get(name)
-                if (
-                    isinstance(value, bool)
-                    and field
-                    and field.annotation in (int, float, int | None, float | None)
-                ):
+                numeric = field and field.annotation in (int, float, int | None, float | None)
+                if numeric and isinstance(value, bool):
                     values[name] = str(value).lower()  # no number, though Python has it as 0 or 1
             try:
                 super().__init__(**values)
@@ -90,27 +87,27 @@ class Parameters(CheckedModel):
         pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$",
         description="What files and reports call the design; no part of the geometry",
     )
-    height: float = bounded(90.0, 10, 500, "mm", "H", "Length from the base to the tip")
-    base_width: float = bounded(30.0, 3, 200, "mm", "L", "Width of the base, in the plane")
-    depth: float = bounded(20.0, 1, 200, "mm", "W", "Depth of the extrusion, out of the plane")
+    height: float = bounded(90.0, 10, 500, "Length from the base to the tip", "mm", "H")
+    base_width: float = bounded(30.0, 3, 200, "Width of the base, in the plane", "mm", "L")
+    depth: float = bounded(20.0, 1, 200, "Depth of the extrusion, out of the plane", "mm", "W")
     rib_angle: float = bounded(
         20.0,
         -60,
         60,
+        "Slope of the ribs from the line of `rib_reference`, positive toward the tip",
         "deg",
         "L_angle",
-        "Slope of the ribs from the line of `rib_reference`, positive toward the tip",
     )
-    tip_length: float = bounded(20.0, 1, 300, "mm", "L_tip", "Length of the solid tip, along the front face")
-    rib_count: int = bounded(4, 0, 60, "", "N", "Number of ribs")
-    rib_thickness: float = bounded(2.0, 0.2, 30, "mm", "t_rib", "Rib thickness, normal to the rib")
-    front_thickness: float = bounded(2.0, 0.2, 30, "mm", "t_flex", "Thickness of the front (contact) wall")
+    tip_length: float = bounded(20.0, 1, 300, "Length of the solid tip, along the front face", "mm", "L_tip")
+    rib_count: int = bounded(4, 0, 60, "Number of ribs", "", "N")
+    rib_thickness: float = bounded(2.0, 0.2, 30, "Rib thickness, normal to the rib", "mm", "t_rib")
+    front_thickness: float = bounded(2.0, 0.2, 30, "Thickness of the front (contact) wall", "mm", "t_flex")
     back_thickness: float = bounded(
-        2.0, 0.2, 30, "mm", "t_back", "Thickness of the back wall, normal to the back face"
+        2.0, 0.2, 30, "Thickness of the back wall, normal to the back face", "mm", "t_back"
     )
-    base_thickness: float = bounded(2.0, 0, 100, "mm", "", "Thickness of the wall inside the base line")
+    base_thickness: float = bounded(2.0, 0, 100, "Thickness of the wall inside the base line", "mm")
     base_tilt: float = bounded(
-        0.0, -45, 45, "deg", "", "Tilt of the base line from the front's normal, toward the tip at the back"
+        0.0, -45, 45, "Tilt of the base line from the front's normal, toward the tip at the back", "deg"
     )
     rib_reference: Literal["front", "base"] = Field(
         default="front",
@@ -120,33 +117,30 @@ class Parameters(CheckedModel):
         None,
         0,
         500,
-        "mm",
-        "",
         "Abscissa of the first rib's axis on the front wall's inner face; none: a pitch from the base wall",
+        "mm",
     )
     rib_pitch: float | None = bounded(
-        None, 0.2, 500, "mm", "", "Distance of the rib axes along the front wall; none spaces them evenly"
+        None, 0.2, 500, "Distance of the rib axes along the front wall; none spaces them evenly", "mm"
     )
-    tip_radius: float = bounded(0.0, 0, 100, "mm", "", "Radius of the tip's rounding; 0 leaves it sharp")
-    foot_height: float = bounded(0.0, 0, 200, "mm", "", "Height of the foot below the base line; 0: no foot")
-    slot_width: float = bounded(0.0, 0, 200, "mm", "", "Width of the T-slot in the foot; 0: no slot")
-    slot_opening: float = bounded(0.0, 0, 200, "mm", "", "Width of the slot's opening, between the two lips")
-    slot_height: float = bounded(0.0, 0, 200, "mm", "", "Height of the slot's wide part")
-    lip_thickness: float = bounded(0.0, 0, 200, "mm", "", "Thickness of the lips beside the slot's opening")
-    fillet_radius: float = bounded(
-        0.0, 0, 20, "mm", "", "Radius of the cavities' corners; 0 leaves them sharp"
-    )
+    tip_radius: float = bounded(0.0, 0, 100, "Radius of the tip's rounding; 0 leaves it sharp", "mm")
+    foot_height: float = bounded(0.0, 0, 200, "Height of the foot below the base line; 0: no foot", "mm")
+    slot_width: float = bounded(0.0, 0, 200, "Width of the T-slot in the foot; 0: no slot", "mm")
+    slot_opening: float = bounded(0.0, 0, 200, "Width of the slot's opening, between the two lips", "mm")
+    slot_height: float = bounded(0.0, 0, 200, "Height of the slot's wide part", "mm")
+    lip_thickness: float = bounded(0.0, 0, 200, "Thickness of the lips beside the slot's opening", "mm")
+    fillet_radius: float = bounded(0.0, 0, 20, "Radius of the cavities' corners; 0 leaves them sharp", "mm")
     contact_position: float | None = bounded(
-        None, 0, 500, "mm", "", "Middle of the contact, from the base; none means (height - tip_length) / 2"
+        None, 0, 500, "Middle of the contact, from the base; none means (height - tip_length) / 2", "mm"
     )
-    contact_width: float = bounded(2.0, 0.1, 100, "mm", "", "Length of front face that the indenter touches")
+    contact_width: float = bounded(2.0, 0.1, 100, "Length of front face that the indenter touches", "mm")
     marker_layout: Literal["front", "joints"] = Field(
         default="joints",
         description="Markers on the centre line of the front wall, or at the rib-wall joints and in the tip",
     )
-    marker_count: int = bounded(9, 1, 60, "", "", "Number of markers of the layout `front`")
-    marker_diameter: float = bounded(MARKER, 0.1, 20, "mm", "", "Diameter of a marker")
-    marker_height: float = bounded(0.6, 0.05, 50, "mm", "", "How deep a marker is inlaid into the side face")
+    marker_count: int = bounded(9, 1, 60, "Number of markers of the layout `front`")
+    marker_diameter: float = bounded(MARKER, 0.1, 20, "Diameter of a marker", "mm")
+    marker_height: float = bounded(0.6, 0.05, 50, "How deep a marker is inlaid into the side face", "mm")
 
     @field_validator("tip_radius", "fillet_radius", "foot_height")
     @classmethod

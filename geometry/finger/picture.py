@@ -61,13 +61,8 @@ def plot_finger(
         touched = place(np.array([finger.section.front_point(x) for x in front]))
         axes.plot(*touched.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=4)
         axes.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 1.4}, zorder=5)
-        text: dict[str, Any] = {
-            "textcoords": "offset points",
-            "fontsize": SMALL,
-            "color": MEASURED,
-            "zorder": 6,
-            "path_effects": [patheffects.withStroke(linewidth=2, foreground="white")],
-        }
+        text: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALL, "color": MEASURED}
+        text |= {"zorder": 6, "path_effects": [patheffects.withStroke(linewidth=2, foreground="white")]}
         for number, centre in enumerate(place(finger.markers), start=1):
             axes.add_patch(Circle(tuple(centre), finger.marker_radius, fc=MEASURED, ec="none", zorder=4))
             # Not over the arrow's head: left of a marker that lies just before it.

@@ -7,18 +7,9 @@ import numpy as np
 import shapely
 from scipy.spatial.distance import pdist
 
+from pinnray.geometry.finger import section
 from pinnray.geometry.finger.markers import marker_positions
 from pinnray.geometry.finger.parameters import MARKER, Parameters, parameter_info
-from pinnray.geometry.finger.section import (
-    back_line,
-    cells,
-    corner_angles,
-    finger_outline,
-    rib_pitch,
-    rib_slope,
-    tip_line,
-    tip_tangent,
-)
 
 # Least lengths, mm.
 MIN_CAVITY = 0.5  # clear width of a cavity, for printing and meshing
@@ -47,7 +38,7 @@ def broken_rule(p: Parameters) -> str | None:
 
 def cavities_open(p: Parameters) -> RuleResult:
     """Walls, ribs and tip leave every cavity open."""
-    first, last = cells(p)[0], cells(p)[-1]
+    first, last = section.cells(p)[0], section.cells(p)[-1]
     near, far = ("first rib", "last rib") if p.rib_count else ("tip block", "base wall")
     gaps = {
         "front and back wall at the tip block": last[3, 1] - last[2, 1],
@@ -55,7 +46,8 @@ def cavities_open(p: Parameters) -> RuleResult:
         f"{far} and tip block": (last[[3, 2]] - last[[0, 1]])[:, 0].min(),
     }
     if p.rib_count > 1:
-        gaps["neighbouring ribs"] = rib_pitch(p) * np.cos(np.radians(rib_slope(p))) - p.rib_thickness
+        slope = np.radians(section.rib_slope(p))
+        gaps["neighbouring ribs"] = section.rib_pitch(p) * np.cos(slope) - p.rib_thickness
     where = min(gaps, key=gaps.__getitem__)
     return RuleResult(
         float(gaps[where]) - MIN_CAVITY,
@@ -81,16 +73,14 @@ def slot_fits(p: Parameters) -> RuleResult:
     """A slot lies in the foot, between lips, and is open."""
     if p.slot_width == 0:
         return RuleResult(np.inf, "")
+    beside, above = (p.base_width - p.slot_width) / 2, p.foot_height - p.lip_thickness - p.slot_height
     margins = {
         "slot_opening must be above 0 mm": p.slot_opening - MIN_STRAIGHT,
         "slot_height must be above 0 mm": p.slot_height - MIN_STRAIGHT,
         f"lip_thickness must be at least {MIN_WALL} mm": p.lip_thickness - MIN_WALL,
         "slot_opening must be at most slot_width": p.slot_width - p.slot_opening,
-        f"slot_width must leave walls of {MIN_WALL} mm in base_width": (p.base_width - p.slot_width) / 2
-        - MIN_WALL,
-        "lip_thickness and slot_height must be less than foot_height": p.foot_height
-        - p.lip_thickness
-        - p.slot_height,
+        f"slot_width must leave walls of {MIN_WALL} mm in base_width": beside - MIN_WALL,
+        "lip_thickness and slot_height must be less than foot_height": above,
     }
     worst = min(margins, key=margins.__getitem__)
     return RuleResult(float(margins[worst]), f"the slot does not fit into the foot: {worst}")
@@ -99,11 +89,11 @@ def slot_fits(p: Parameters) -> RuleResult:
 def tip_rounded(p: Parameters) -> RuleResult:
     """The tip's rounding stays within the solid tip."""
     apex = np.array([p.height, 0.0])
-    behind = float(np.linalg.norm(apex - back_line(p, 0.0).meets(tip_line(p))))
-    room = min(p.tip_length, behind) - tip_tangent(p)
+    behind = float(np.linalg.norm(apex - section.back_line(p, 0.0).meets(section.tip_line(p))))
+    tangent = section.tip_tangent(p)
     return RuleResult(
-        room - MIN_STRAIGHT,
-        f"tip_radius too large: {p.tip_radius:g} mm rounds {tip_tangent(p):.4g} mm of front and back face, "
+        min(p.tip_length, behind) - tangent - MIN_STRAIGHT,
+        f"tip_radius too large: {p.tip_radius:g} mm rounds {tangent:.4g} mm of front and back face, "
         f"the solid tip has {min(p.tip_length, behind):.4g} mm",
     )
 
@@ -111,7 +101,7 @@ def tip_rounded(p: Parameters) -> RuleResult:
 def contact_on_front(p: Parameters) -> RuleResult:
     """The contact lies on the front face, clear of base and apex."""
     low, high = p.contact_ends
-    end = p.height - tip_tangent(p) - MIN_CONTACT_MARGIN
+    end = p.height - section.tip_tangent(p) - MIN_CONTACT_MARGIN
     return RuleResult(
         min(low - MIN_CONTACT_MARGIN, end - high),
         f"contact outside the front face: at contact_position {p.contact_abscissa:.6g} mm it reaches from "
@@ -122,8 +112,8 @@ def contact_on_front(p: Parameters) -> RuleResult:
 def fillets_fit(p: Parameters) -> RuleResult:
     """Two fillets fit on every side of every cell."""
     room = np.inf
-    for cell in cells(p) if p.fillet_radius > 0 else ():
-        tangents = p.fillet_radius / np.tan(corner_angles(cell) / 2)
+    for cell in section.cells(p) if p.fillet_radius > 0 else ():
+        tangents = p.fillet_radius / np.tan(section.corner_angles(cell) / 2)
         sides = np.linalg.norm(np.roll(cell, -1, axis=0) - cell, axis=1)
         room = min(room, float((sides - tangents - np.roll(tangents, -1)).min()))
     return RuleResult(
@@ -182,7 +172,7 @@ def _marker_words(p: Parameters) -> str:
 def _marker_room(p: Parameters) -> tuple[int, float]:
     """The marker that has the least room around it, and the largest diameter that fits there, mm."""
     centres = marker_positions(p)
-    body = shapely.Polygon(finger_outline(p).flattened(), list(cells(p)))
+    body = shapely.Polygon(section.finger_outline(p).flattened(), list(section.cells(p)))
     away = shapely.distance(body.boundary, shapely.points(centres))
     margins = np.where(shapely.contains_xy(body, *centres.T), away, -away)
     worst = int(margins.argmin())

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from pinnray.geometry.finger.parameters import Parameters
-from pinnray.geometry.section.loop import Loop
+from pinnray.geometry.section.loop import Loop, turns
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
 
@@ -147,8 +147,7 @@ def tip_tangent(p: Parameters) -> float:
 def corner_angles(corners: FloatArray) -> FloatArray:
     """Interior angle at every corner of a convex polygon of shape (n, 2), shape (n,), radians."""
     ahead, behind = np.roll(corners, -1, axis=0) - corners, np.roll(corners, 1, axis=0) - corners
-    cross = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
-    return np.asarray(np.arctan2(cross, (ahead * behind).sum(axis=1)), dtype=np.float64)
+    return turns(ahead, behind)
 
 
 @lru_cache(maxsize=64)
@@ -198,17 +197,13 @@ def _base_side(p: Parameters) -> tuple[list[FloatArray], list[str]]:
         slot += [(edges[3], top), (edges[3], lip), (edges[1], lip), (edges[1], p.foot_height)]
         ends = [ends[0], *slot, ends[1]]
         names = ["foot", "base", *["slot"] * 7, "base", "foot"]
-        return _without_steps([front, *(share * along - out * inward for share, out in ends)], names)
-    return [front, *(share * along - out * inward for share, out in ends)], names
+    return _without_steps([front, *(share * along - out * inward for share, out in ends)], names)
 
 
 def _without_steps(points: list[FloatArray], names: list[str]) -> tuple[list[FloatArray], list[str]]:
     """The corners without pieces of no length: a slot as wide as its opening has such."""
-    kept = [
-        which
-        for which in range(len(points))
-        if which + 1 == len(points) or np.linalg.norm(points[which + 1] - points[which]) > 1e-9
-    ]
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    kept = [*np.flatnonzero(steps > 1e-9).tolist(), len(points) - 1]
     return [points[which] for which in kept], [names[which] for which in kept]
 
 

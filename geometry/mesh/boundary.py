@@ -6,6 +6,7 @@ from scipy.sparse.csgraph import connected_components, depth_first_order, dijkst
 from scipy.spatial import cKDTree
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from pinnray.geometry.section.loop import cross, turns
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
 CORNER_ANGLE = np.radians(10.0)
@@ -14,10 +15,8 @@ CORNER_ANGLE = np.radians(10.0)
 
 def are_among(edges: IntArray, others: IntArray) -> BoolArray:
     """Mask of the edges (k, 2) that are among others (m, 2), whichever way both run."""
-    first, second = (
-        each[:, 0] * 2**32 + each[:, 1]
-        for each in (np.sort(edges.astype(np.int64), axis=1), np.sort(others, axis=1))
-    )
+    ordered = (np.sort(each.astype(np.int64), axis=1) for each in (edges, others))
+    first, second = (each[:, 0] * 2**32 + each[:, 1] for each in ordered)
     return np.isin(first, second)
 
 
@@ -39,7 +38,7 @@ def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
             while (after := follows.pop(loop[-1])) != start:
                 loop.append(after)
             loops.append(np.array(loop))
-    outline = max(loops, key=lambda loop: _cross(mesh.points[loop], mesh.points[np.roll(loop, -1)]).sum())
+    outline = max(loops, key=lambda loop: cross(mesh.points[loop], mesh.points[np.roll(loop, -1)]).sum())
     return sorted(loops, key=lambda loop: (loop is not outline, mesh.points[loop, 0].min()))
 
 
@@ -88,18 +87,14 @@ def _facing_distance(edges: FloatArray, loop_of: IntArray, reach: float) -> Floa
     one, other, cosine = one[kept], other[kept], cosine[kept]
     # middle + t normal = start + s along
     offset = start[other] - middles[one]
-    determinant = _cross(normals[one], along[other])
-    t = _cross(offset, along[other]) / determinant
-    s = _cross(offset, normals[one]) / determinant
+    determinant = cross(normals[one], along[other])
+    t = cross(offset, along[other]) / determinant
+    s = cross(offset, normals[one]) / determinant
     through_body = (t < -1e-9) & (cosine < -np.cos(np.radians(15.0)))  # the sides of a taper are no wall
     hit = (s >= 0) & (s <= 1) & ((t > 1e-9) | through_body)
     found = np.full(len(edges), np.inf)
     np.minimum.at(found, one[hit], np.abs(t[hit]))
     return np.where(found <= reach, found, np.inf)
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def singular_points(mesh: TriangleMesh) -> FloatArray:
@@ -121,7 +116,7 @@ def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, Float
     after, before = (np.array([step[node] for node in follows]) for step in (follows, comes_before))
     into, out = mesh.points[nodes] - mesh.points[before], mesh.points[after] - mesh.points[nodes]
     # The body is on the left of its boundary: a right turn opens it beyond a straight angle.
-    turn = -np.arctan2(_cross(into, out), (into * out).sum(axis=1))
+    turn = -turns(into, out)
     row = dict(zip(nodes.tolist(), range(len(nodes)), strict=True))
     beside = np.array([[row[a], row[b]] for a, b in zip(after.tolist(), before.tolist(), strict=True)])
     lengths = 0.5 * (np.linalg.norm(into, axis=1) + np.linalg.norm(out, axis=1))
@@ -189,9 +184,9 @@ def _distance(mesh: TriangleMesh, face: str, points: FloatArray) -> FloatArray:
     nodes = mesh.points[mesh.boundary(face).ravel()]
     start, end = nodes[nodes[:, 0].argmin()], nodes[nodes[:, 0].argmax()]
     along = (end - start) / np.linalg.norm(end - start)
-    if np.abs(_cross(along, nodes - start)).max() > 1e-6 * np.linalg.norm(end - start):
+    if np.abs(cross(along, nodes - start)).max() > 1e-6 * np.linalg.norm(end - start):
         return np.asarray(cKDTree(nodes).query(points)[0])
-    return np.asarray(np.abs(_cross(along, points - start)))
+    return np.asarray(np.abs(cross(along, points - start)))
 
 
 def evenly_spaced_points(mesh: TriangleMesh, name: str, count: int) -> FloatArray:

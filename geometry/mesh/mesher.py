@@ -32,7 +32,7 @@ class Triangulation(NamedTuple):
     edges: Mapping[str, IntArray]
 
 
-def build_mesh(finger: Finger, settings: MeshSettings, across: int = MIN_ELEMENTS) -> TriangleMesh:
+def build_mesh(finger: Finger, settings: MeshSettings, across: int | None = None) -> TriangleMesh:
     """Mesh the section of a finger.
 
     The contact's ends and middle are nodes of the front face and every marker is a node. Boundary edges have
@@ -42,6 +42,7 @@ def build_mesh(finger: Finger, settings: MeshSettings, across: int = MIN_ELEMENT
     Returns:
         The mesh with the boundaries `base`, `front`, `contact` and every other name of the outline's pieces.
     """
+    across = MIN_ELEMENTS if across is None else across
     for elements in TRIES:
         mesh = _named(finger, _triangulation(finger, settings, elements * across / MIN_ELEMENTS))
         if (least := elements_through_thickness(mesh)) >= across:
@@ -135,14 +136,11 @@ def _set_sizes(
         gmsh.model.geo.synchronize()
         distance, threshold = model.add("Distance"), model.add("Threshold")
         model.setNumbers(distance, "PointsList", tags)
-        for option, value in (
-            ("InField", distance),
-            ("SizeMin", fine),
-            ("SizeMax", largest),
-            ("DistMin", 0.0),
-            ("DistMax", max(largest - fine, 1e-9) / settings.growth),
-        ):
-            model.setNumber(threshold, option, value)
+        model.setNumber(threshold, "InField", distance)
+        model.setNumber(threshold, "SizeMin", fine)
+        model.setNumber(threshold, "SizeMax", largest)
+        model.setNumber(threshold, "DistMin", 0.0)
+        model.setNumber(threshold, "DistMax", max(largest - fine, 1e-9) / settings.growth)
         fields.append(threshold)
     smallest = model.add("Min")
     model.setNumbers(smallest, "FieldsList", fields)
@@ -158,18 +156,15 @@ def session() -> Iterator[None]:
     """
     gmsh.initialize(argv=["gmsh", "-v", "0", "-skip_petscrc"], readConfigFiles=False, interruptible=False)
     try:
-        for option, value in (
-            ("General.Verbosity", 5),
-            ("General.Terminal", 0),
-            ("General.NumThreads", 1),
-            ("Mesh.Algorithm", 6),
-            ("Mesh.RandomSeed", 1),
-            ("Mesh.Smoothing", 1),
-            ("Mesh.MeshSizeExtendFromBoundary", 0),
-            ("Mesh.MeshSizeFromPoints", 0),
-            ("Mesh.MeshSizeFromCurvature", 0),
-        ):
-            gmsh.option.setNumber(option, value)
+        gmsh.option.setNumber("General.Verbosity", 5)
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("General.NumThreads", 1)
+        gmsh.option.setNumber("Mesh.Algorithm", 6)
+        gmsh.option.setNumber("Mesh.RandomSeed", 1)
+        gmsh.option.setNumber("Mesh.Smoothing", 1)
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+        gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 0)
         yield
     finally:
         gmsh.finalize()

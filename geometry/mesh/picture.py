@@ -6,7 +6,7 @@ from matplotlib.colors import Normalize
 from matplotlib.tri import Triangulation
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.arrays import FloatArray
+from pinnray.runtime.arrays import FloatArray, weighted_percentile
 from pinnray.runtime.figure import INK, MUTED, Figure, body_figure
 
 
@@ -29,11 +29,8 @@ def plot_field(
         label: Quantity and unit, for the colour bar.
         signed: Whether the colour scale is symmetric about zero; else it starts there.
     """
-    sizes = np.abs(values)
-    order = np.argsort(sizes)
-    area = np.cumsum(mesh.areas[order])
     # The colour scale holds 99.5 % of the area, because stress has no bound at sharp corners.
-    high = float(sizes[order][np.searchsorted(area, 0.995 * area[-1])])
+    high = weighted_percentile(np.abs(values), mesh.areas, 99.5)
     points, edges = mesh.points + displacement, mesh.boundary_edges
     with body_figure(np.concatenate([mesh.points, points]), title, foot=0.56) as (drawn, axes):
         axes.add_collection(LineCollection(list(mesh.points[edges]), colors=MUTED, linewidths=0.5))

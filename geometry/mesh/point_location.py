@@ -36,9 +36,7 @@ class Locator:
         across = corners - np.roll(corners, -1, axis=1)  # the sides beside corners 2, 0 and 1
         double = np.abs(across[:, 0, 0] * across[:, 1, 1] - across[:, 0, 1] * across[:, 1, 0])
         self._heights = double[:, None] / np.roll(np.linalg.norm(across, axis=2), -1, axis=1)
-        self._inverse = np.linalg.inv(
-            np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
-        )
+        self._inverse = np.linalg.inv((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))
 
     def locate(self, points: ArrayLike, slack: float = 0.0) -> LocatedPoints:
         """Locate points.
@@ -60,9 +58,8 @@ class Locator:
             count = min(neighbours, self._centroids.n)
             distance, candidates = self._centroids.query(where[todo], k=count)
             distance, candidates = distance.reshape(-1, count), candidates.reshape(-1, count)
-            local = np.einsum(
-                "nkij,nkj->nki", self._inverse[candidates], where[todo][:, None] - self._origin[candidates]
-            )
+            away = where[todo][:, None] - self._origin[candidates]
+            local = np.einsum("nkij,nkj->nki", self._inverse[candidates], away)
             all_three = np.concatenate([1 - local.sum(axis=2, keepdims=True), local], axis=2)
             rows, best = np.arange(len(todo)), all_three.min(axis=2).argmax(axis=1)
             found = all_three[rows, best].min(axis=1) >= -1e-9  # rounding on edges

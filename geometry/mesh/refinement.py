@@ -26,7 +26,7 @@ def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = Non
         marked: Mask of shape (t,).
         section: The section onto whose arcs new boundary nodes are moved; None leaves them on the chord.
     """
-    count, lengths = len(mesh.points), np.linalg.norm(np.diff(mesh.points[mesh.edges], axis=1)[:, 0], axis=1)
+    count, lengths = len(mesh.points), mesh.edge_lengths
     rank = np.empty(len(lengths), dtype=np.int64)
     rank[np.lexsort((np.arange(len(lengths)), lengths))] = np.arange(len(lengths))
     sides = mesh.edge_numbers(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]])

@@ -15,7 +15,7 @@ from pinnray.runtime.arrays import FloatArray, IntArray, frozen_array
 from pinnray.runtime.atomic import write_arrays
 from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
-from pinnray.runtime.notebook import fact_table, png_image
+from pinnray.runtime.notebook import fact_table
 
 if TYPE_CHECKING:
     from pinnray.runtime.figure import Figure
@@ -220,7 +220,7 @@ class TriangleMesh:
             "edges": f"{lengths.min():.3g} to {lengths.max():.3g} mm",
             "area": f"{self.areas.sum():.5g} mm²",
         }
-        return fact_table("Triangle mesh", facts, png_image(self.plot()._repr_png_()))
+        return fact_table("Triangle mesh", facts, self.plot()._repr_png_())
 
     def save(self, path: Path) -> None:
         """Write the mesh as a NumPy archive, atomically."""
@@ -235,12 +235,9 @@ class TriangleMesh:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> "TriangleMesh":
         """The mesh of the arrays that `arrays` gave."""
-        values = {name: arrays[name] for name in arrays if not name.startswith(BOUNDARY_PREFIX)}
-        edges = {
-            name.removeprefix(BOUNDARY_PREFIX): arrays[name]
-            for name in arrays
-            if name.startswith(BOUNDARY_PREFIX)
-        }
+        values = dict(arrays)
+        names = [name for name in arrays if name.startswith(BOUNDARY_PREFIX)]
+        edges = {name.removeprefix(BOUNDARY_PREFIX): values.pop(name) for name in names}
         return cls(**values, boundaries=edges)  # type: ignore[arg-type]
 
     def arrays(self) -> dict[str, FloatArray | IntArray]:

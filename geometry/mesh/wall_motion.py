@@ -17,6 +17,7 @@ from pinnray.geometry.mesh.boundary import CORNER_ANGLE, boundary_loops, mean_th
 from pinnray.geometry.mesh.extension import Extension, barycentric_gradients
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.geometry.section.loop import cross, turns
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
 
@@ -122,10 +123,7 @@ def _beside(mesh: TriangleMesh, loop: IntArray, mask: BoolArray) -> FloatArray:
 
 def _breaks(along: FloatArray, lengths: FloatArray, thickness: float) -> BoolArray:
     """Mask of the nodes that are corners, or points of an arc tighter than a thickness, shape (n,)."""
-    before = np.roll(along, 1, axis=0)
-    turn = np.abs(
-        np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], (before * along).sum(axis=1))
-    )
+    turn = np.abs(turns(np.roll(along, 1, axis=0), along))
     mean_length = 0.5 * (lengths + np.roll(lengths, 1))
     tight = (turn > np.radians(1.0)) & (mean_length < turn * thickness)
     return np.asarray((turn > CORNER_ANGLE) | tight)
@@ -160,7 +158,7 @@ def _bend(last: int, first: int, count: int) -> IntArray:
 
 def _corner(one: FloatArray, other: FloatArray, speed: float, next_speed: float) -> FloatArray:
     """Motion of the corner of two faces with outer normals, each moved along its own: shape (2,)."""
-    if abs(one[0] * other[1] - one[1] * other[0]) < np.sin(np.radians(15.0)):  # almost parallel
+    if abs(cross(one, other)) < np.sin(np.radians(15.0)):  # almost parallel
         return np.asarray(0.5 * (speed * one + next_speed * other))
     return np.linalg.solve(np.stack([one, other]), np.array([speed, next_speed]))
 

@@ -78,7 +78,7 @@ class Loop:
         start, end = self.ends[:, 0], self.ends[:, 1]
         origin = self.points[0]
         a, b = start - origin, end - origin
-        polygon = float(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+        polygon = float(0.5 * cross(a, b).sum())
         if not self.bulges.any():
             return polygon
         return float(polygon + (((end - start) ** 2).sum(axis=1) / 8 * _segment(self.bulges)).sum())
@@ -110,11 +110,8 @@ class Loop:
             return np.asarray(start + share[:, None] * (end - start))
         centre, _ = self.circle(which)
         angles = share * 4 * np.arctan(self.bulges[which])
-        x, y = start - centre
-        turned = np.stack(
-            [x * np.cos(angles) - y * np.sin(angles), x * np.sin(angles) + y * np.cos(angles)], axis=1
-        )
-        points = np.asarray(centre + turned)
+        (x, y), cosine, sine = start - centre, np.cos(angles), np.sin(angles)
+        points = np.asarray(centre + np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=1))
         points[share == 0], points[share == 1] = start, end
         return points
 
@@ -220,6 +217,16 @@ class Places(NamedTuple):
     pieces: IntArray  # (k,)
     shares: FloatArray  # fractions of the pieces' lengths, (k,)
     distances: FloatArray  # of the points to which they are nearest, (k,), mm
+
+
+def cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Cross products of plane vectors, shape (..., 2) each."""
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+
+
+def turns(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Angles from plane vectors to others, shape (..., 2) each, radians, positive to the left."""
+    return np.asarray(np.arctan2(cross(first, second), (first * second).sum(axis=-1)))
 
 
 def _following(values: FloatArray) -> FloatArray:

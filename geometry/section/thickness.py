@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.section.loop import STRAIGHT, Loop
+from pinnray.geometry.section.loop import STRAIGHT, Loop, cross
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
@@ -153,7 +153,7 @@ def _to_arcs(pieces: _Pieces, curved: IntArray, start: FloatArray, ahead: FloatA
     best = np.full(middle.shape, np.inf)
     for length in (middle - half, middle + half):
         away = start[:, None] + length[..., None] * ahead[:, None] - first
-        beyond = -np.sign(pieces.bulges[curved]) * _cross(last - first, away)
+        beyond = -np.sign(pieces.bulges[curved]) * cross(last - first, away)
         hit = (length > TOUCH) & (beyond >= -1e-9 * radii)
         best = np.where(hit & (length < best), length, best)
     return best
@@ -169,7 +169,3 @@ def _beyond_corner(pieces: _Pieces, own: IntArray, met: IntArray) -> BoolArray:
     ahead = (met == pieces.following[own]) & sharp[own]
     behind = (met == previous[own]) & sharp[previous[own]]
     return np.asarray(ahead | behind)
-
-
-def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])

@@ -32,21 +32,18 @@ def launched(command: Callable[[], Any], *, quiet: bool = False) -> int:
     _write_any_letter()
     _drop_impossible_sizes()
     _leave_signals_alone()
-    return guarded(partial(_quietly if quiet else _loudly, command))
+    return guarded(partial(_run, command, quiet))
 
 
-def _loudly(command: Callable[[], Any]) -> Any:
-    """Run a command."""
+def _run(command: Callable[[], Any], quiet: bool) -> Any:
+    """Run a command, without its progress and its output if it is quiet."""
     share_cache()
-    return command()
-
-
-def _quietly(command: Callable[[], Any]) -> Any:
-    """Run a command without its progress and its output."""
+    if not quiet:
+        return command()
     from pinnray.runtime.stages import quiet_stages
 
     with redirect_stdout(StringIO()), quiet_stages():
-        return _loudly(command)
+        return command()
 
 
 def guarded(command: Callable[[], Any]) -> int:

@@ -216,9 +216,7 @@ class PhysicsOptions(MaterialOptions, Physics):
         return usual | self.model_dump(exclude_unset=True, exclude={"material"})
 
 
-@Parameter(
-    name="*", group=Group("Measured finger", sort_key=2, default_parameter=Parameter(show_default=False))
-)
+@Parameter(name="*", group=MEASURED)
 class PressOptions(CheckedModel):
     """Other pictures of the finger, and what they teach of it.
 

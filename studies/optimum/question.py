@@ -69,7 +69,7 @@ class Question(Study):
 
     objectives: dict[str, Sense] = Field(default_factory=dict)
     constraints: dict[str, Limit] = Field(default_factory=dict)
-    runs: int = bounded(120, FEWEST, 100_000, "", "", "Number of runs of the solver")
+    runs: int = bounded(120, FEWEST, 100_000, "Number of runs of the solver")
 
     @model_validator(mode="before")
     @classmethod

@@ -97,13 +97,13 @@ class Study(CheckedModel):
     design: str = "default"
     solver: str = "fem"
     settings: dict[str, Value] = Field(default_factory=dict)
-    mesh_size: float = bounded(0.5, 0.02, 20, "mm", "", "Largest element in the walls and ribs")
-    density: float = bounded(1.2, 1e-3, 30, "g/cm^3", "", "Density of the material")
-    time_limit: float | None = bounded(None, 0.1, 1e6, "s", "", "Longest time for a finger")
+    mesh_size: float = bounded(0.5, 0.02, 20, "Largest element in the walls and ribs", "mm")
+    density: float = bounded(1.2, 1e-3, 30, "Density of the material", "g/cm^3")
+    time_limit: float | None = bounded(None, 0.1, 1e6, "Longest time for a finger", "s")
     sampling: Literal["grid", "sobol"] = "sobol"
-    samples: int | None = bounded(None, 1, MOST, "", "", "Number of samples")
-    strokes: int | None = bounded(None, 2, 100, "", "", "Strokes at which a sample's field is kept")
-    seed: int = bounded(0, 0, 2**32 - 1, "", "", "Seed of the samples")
+    samples: int | None = bounded(None, 1, MOST, "Number of samples")
+    strokes: int | None = bounded(None, 2, 100, "Strokes at which a sample's field is kept")
+    seed: int = bounded(0, 0, 2**32 - 1, "Seed of the samples")
     fixed: dict[str, Value] = Field(default_factory=dict)
     varied: dict[str, Range]
 

@@ -138,10 +138,10 @@ def test_a_full_cache_is_a_warning_and_the_mesh_is_there(tmp_path: Path, monkeyp
 @pytest.mark.parametrize(
     ("task", "end"),
     [
-        (ChildCall("this", cache._mesher, ({}, COARSE.model_dump(), None)), ": File too large"),
+        (ChildCall("this", cache._mesher, (Design(), COARSE, None)), ": File too large"),
         # OpenCASCADE writes a part and says nothing
         pytest.param(
-            ChildCall("this", cache._cad_writer, ({}, ["step"])),
+            ChildCall("this", cache._cad_writer, (Design(), ["step"])),
             "/finger.step: a part was not written; is the disk full?",
             marks=pytest.mark.slow,
         ),

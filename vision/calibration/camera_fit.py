@@ -140,9 +140,8 @@ def _covariance(
         seen = np.isfinite(missed[:, 0])
         turned = board.corners[seen] @ np.asarray(cv2.Rodrigues(pose.rotation)[0]).T
         projection = camera.project_with_jacobians(turned + pose.translation)
-        by_turn = np.cross(
-            turned[:, None], projection.by_point
-        )  # ω x point: the gradient is point x gradient
+        # of ω x point: point x gradient
+        by_turn = np.cross(turned[:, None], projection.by_point)
         by_pose = np.concatenate([by_turn, projection.by_point], axis=2).reshape(-1, 6)
         own = projection.by_intrinsics[:, :, free].reshape(len(by_pose), -1)
         own = own - by_pose @ np.linalg.lstsq(by_pose, own, rcond=None)[0]

@@ -72,7 +72,7 @@ class CharucoBoard(Board):
         settings = cv2.aruco.CharucoParameters()
         settings.tryRefineMarkers = True  # looks for missing markers where the others say they are
         for negative, legacy in product((False, True), repeat=2):
-            board, shown = self._opencv(legacy=legacy), cv2.bitwise_not(image) if negative else image
+            board, shown = self.opencv(legacy=legacy), cv2.bitwise_not(image) if negative else image
             pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board, settings).detectBoard(shown)
             if numbers is not None and len(numbers):
                 break
@@ -82,13 +82,11 @@ class CharucoBoard(Board):
         corners[np.ravel(numbers)] = np.reshape(pixels, (-1, 2))
         return self.refine(image, corners, MARKER_FREE * (self.square - self.marker))
 
-    def _opencv(self, *, legacy: bool) -> cv2.aruco.CharucoBoard:
-        board = cv2.aruco.CharucoBoard(
-            (self.columns + 1, self.rows + 1),
-            self.square,
-            self.marker,
-            cv2.aruco.getPredefinedDictionary(DICTIONARIES[self.dictionary]),
-        )
+    def opencv(self, *, legacy: bool) -> cv2.aruco.CharucoBoard:
+        """OpenCV's object, with its layout before version 4.6 if it is `legacy`."""
+        size, dictionary = (self.columns + 1, self.rows + 1), DICTIONARIES[self.dictionary]
+        markers = cv2.aruco.getPredefinedDictionary(dictionary)
+        board = cv2.aruco.CharucoBoard(size, self.square, self.marker, markers)
         board.setLegacyPattern(legacy)
         return board
 

@@ -91,10 +91,10 @@ class Board:
 
     def _guesses(self, image: GreyImage, shrink: float) -> FloatArray | None:
         """Corners that OpenCV finds in an image shrunk by a factor, shape (n, 2), pixels of the image."""
-        small = _smaller(image, shrink)
-        found, corners = cv2.findChessboardCornersSB(
-            small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
-        )
+        width, height = (round(side / shrink) for side in image.shape[::-1])
+        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        size, flags = (self.columns, self.rows), cv2.CALIB_CB_ACCURACY
+        found, corners = cv2.findChessboardCornersSB(small, size, flags=flags)
         if not found:
             return None
         scale = np.divide(image.shape[::-1], small.shape[::-1])
@@ -138,14 +138,6 @@ class Board:
         equations = [[whole, none, -points[:, :1] * whole], [none, whole, -points[:, 1:] * whole]]
         values = np.linalg.svd(np.block(equations), compute_uv=False)
         return bool(values[7] >= LEAST_RANK * values[0])
-
-
-def _smaller(image: GreyImage, shrink: float) -> GreyImage:
-    """An image with its sides divided by `shrink`; unchanged if that is not above 1."""
-    if shrink <= 1:
-        return image
-    width, height = (round(side / shrink) for side in image.shape[::-1])
-    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def homography_jacobian(homography: FloatArray, points: FloatArray) -> FloatArray:

@@ -81,9 +81,8 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
     known = Known.of(len(guesses), np.inf if radii is None else KNOWN_RADIUS)
     _fit(fit, grey, guesses, sizes, known, np.ones(len(guesses), dtype=bool))
     if (clipped := fit.parameters[:, model.LIGHT] >= LIGHTEST).any():
-        _fit(
-            fit, grey, guesses, sizes, known.lit(fit, fit.settled & (fit.seen >= LEAST_SEEN_UNKNOWN)), clipped
-        )
+        known = known.lit(fit, fit.settled & (fit.seen >= LEAST_SEEN_UNKNOWN))
+        _fit(fit, grey, guesses, sizes, known, clipped)
     return _accepted(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
 
 
@@ -100,13 +99,9 @@ def _fit(
 def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs:
     """The fitted discs, with NaN for those that fail a check."""
     parameters = fit.parameters
-    shade, blur, radii = (
-        parameters[:, [model.SHADE_X, model.SHADE_Y]],
-        parameters[:, model.BLUR],
-        parameters[:, model.RADIUS],
-    )
+    shade, radii = parameters[:, [model.SHADE_X, model.SHADE_Y]], parameters[:, model.RADIUS]
     # The gradient of the light is blurred as well, which shifts the image of the disc.
-    centres = fit.origins + parameters[:, [model.X, model.Y]] + blur[:, None] ** 2 * shade
+    centres = fit.origins + parameters[:, [model.X, model.Y]] + parameters[:, [model.BLUR]] ** 2 * shade
     deviations = np.sqrt(np.linalg.eigvalsh(fit.covariances)[:, 1])
     contrast = parameters[:, model.CONTRAST]
     ratio = radii / guesses[:, 2]

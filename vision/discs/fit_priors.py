@@ -6,27 +6,15 @@ import numpy as np
 from scipy.special import softmax
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
-from pinnray.vision.discs.disc_image_model import (
-    BLUR,
-    CONTRAST,
-    EDGES,
-    HALO,
-    LIGHT,
-    RADIUS,
-    SHADE_X,
-    SHADE_Y,
-    SLANT,
-    STRETCH,
-    X,
-    Y,
-    irregular_columns,
-)
+from pinnray.vision.discs import disc_image_model as model
 from pinnray.vision.discs.least_squares import DiscFit, DiscPrior
 from pinnray.vision.discs.pixel_windows import LIGHTEST
 
-DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.05}
+ELLIPSE, SHADES = [model.STRETCH, model.SLANT], [model.SHADE_X, model.SHADE_Y]
+DEVIATIONS = dict.fromkeys([*ELLIPSE, *SHADES], 0.05) | {model.BLUR: 5.0}
 """Prior standard deviations, about zero but for the blur. They matter where little of the edge is seen."""
-STEPS = {X: 1.0, Y: 1.0, STRETCH: 0.3, SLANT: 0.3, BLUR: 0.7, SHADE_X: 0.02, SHADE_Y: 0.02}
+STEPS = {model.X: 1.0, model.Y: 1.0, model.BLUR: 0.7, **dict.fromkeys(ELLIPSE, 0.3)}
+STEPS |= dict.fromkeys(SHADES, 0.02)
 """Longest steps of an iteration."""
 EDGE_DEVIATIONS, EDGE_STEPS, MISSING = (0.5, 1.5, 100.0, 0.005), (0.3, 1.0, 1e3, 0.01), 1e-3
 """The same for edges beside the disc: rad, pixels, grey levels, 1/pixel; and the deviation of an absent
@@ -76,10 +64,10 @@ class Known(NamedTuple):
 
         Source: A. Gelman et al., Bayesian Data Analysis, third edition, 2013, section 5.4.
         """
-        within = np.maximum(fit.parameters[:, LIGHT] - fit.parameters[:, CONTRAST], 1.0)
+        within = np.maximum(fit.parameters[:, model.LIGHT] - fit.parameters[:, model.CONTRAST], 1.0)
         light = np.clip(within / np.median(within), 1 / BRIGHTER, BRIGHTER)[:, None]
         precision = np.where(trusted[:, None], np.maximum(fit.shade_precision, 1e-3), 1e-3)
-        fitted = light * fit.parameters[:, [SHADE_X, SHADE_Y]]
+        fitted = light * fit.parameters[:, SHADES]
         variances = light**2 / precision
         weights = 1 / (SCATTERS[:, None, None] ** 2 + variances)
         total = weights.sum(axis=1) + CLIPPED_SHADE**-2.0
@@ -106,23 +94,21 @@ def prior_and_limits(
         known: Of the discs.
     """
     mean, deviations, limits = start.copy(), np.full(start.shape, 1e3), np.full(start.shape, 1e3)
-    mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
-    mean[:, RADIUS] = radii
-    waves, first_edge = irregular_columns(start.shape[1])
+    mean[:, [*ELLIPSE, *SHADES]] = 0
+    mean[:, model.RADIUS] = radii
+    waves, first_edge = model.irregular_columns(start.shape[1])
     deviations[:, list(DEVIATIONS)] = list(DEVIATIONS.values())
     mean[:, waves], deviations[:, waves], limits[:, waves] = 0, OUTLINE_DEVIATION, OUTLINE_STEP
     if len(waves):
-        deviations[:, HALO], limits[:, HALO] = HALO_DEVIATION, HALO_STEP
-    clipped = start[:, LIGHT] >= LIGHTEST
-    deviations[clipped, LIGHT] = CLIPPED
-    for column, shade, deviation in zip(
-        (SHADE_X, SHADE_Y), known.shade.T, known.shade_deviation.T, strict=True
-    ):
-        mean[clipped, column], deviations[clipped, column] = shade[clipped], deviation[clipped]
-    deviations[:, RADIUS] = np.minimum(known.tolerance * radii, 1e3)
+        deviations[:, model.HALO], limits[:, model.HALO] = HALO_DEVIATION, HALO_STEP
+    clipped = start[:, model.LIGHT] >= LIGHTEST
+    deviations[clipped, model.LIGHT] = CLIPPED
+    shades = np.ix_(np.flatnonzero(clipped), np.array(SHADES))
+    mean[shades], deviations[shades] = known.shade[clipped], known.shade_deviation[clipped]
+    deviations[:, model.RADIUS] = np.minimum(known.tolerance * radii, 1e3)
     edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
     deviations[:, first_edge:] = edges.reshape(len(start), -1)
     limits[:, list(STEPS)] = list(STEPS.values())
-    limits[:, RADIUS] = np.maximum(0.5, 0.2 * radii)
-    limits[:, first_edge:] = EDGE_STEPS * EDGES
+    limits[:, model.RADIUS] = np.maximum(0.5, 0.2 * radii)
+    limits[:, first_edge:] = EDGE_STEPS * model.EDGES
     return DiscPrior(mean, deviations**-2.0), limits

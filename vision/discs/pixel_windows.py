@@ -59,15 +59,9 @@ class PixelWindows:
         inside = away < (inner + outer) / 2 - INSIDE
         counted = within & (ground[:, None, None] | inside)
         noise = median_where(*(part.reshape(len(origins), -1) for part in (second, counted[:, :, 1:-1])))
-        return cls(
-            origins=origins,
-            x=x[ring].astype(np.float32),
-            y=y[ring].astype(np.float32),
-            values=values[:, ring],
-            within=within[:, ring],
-            ring=ring,
-            noise=SCALE / 6**0.5 * noise,
-        )
+        near_x, near_y = (each[ring].astype(np.float32) for each in (x, y))
+        scatter = SCALE / 6**0.5 * noise
+        return cls(origins, near_x, near_y, values[:, ring], within[:, ring], ring, scatter)
 
     def at(self, places: IntArray) -> "PixelWindows":
         """The pixels of some discs."""

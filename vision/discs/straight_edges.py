@@ -44,9 +44,8 @@ def with_edges(
     levels, known = disc_image(parameters.astype(np.float32), x, y)
     known *= used[:, None]
     residuals = (window.values[:, some] - np.clip(levels, 0, 255)) * used
-    inverse = np.linalg.inv(known @ known.transpose(0, 2, 1) + 1e-3 * np.eye(parameters.shape[1])).astype(
-        np.float32
-    )
+    normal = known @ known.transpose(0, 2, 1) + 1e-3 * np.eye(parameters.shape[1])
+    inverse = np.linalg.inv(normal).astype(np.float32)
 
     def orthogonal(values: Array) -> Array:
         """Part of values at the pixels that is orthogonal to the disc's derivatives, shape (n, p)."""

@@ -3,8 +3,9 @@
 import re
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from glob import glob, has_magic
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -70,13 +71,7 @@ def is_picture(path: Path) -> bool:
 
 def images_of_files(paths: Sequence[Path], rate: float) -> ImageStream:
     """The images of picture files, decoded one by one to the same scale."""
-    decode = Decoder()
-    number = 0
-    for path in paths:
-        content = content_of(path)
-        for name, image in decode(content, f"the picture {path}", path.name):
-            yield CapturedImage(image, number / rate, name, is_marked(content))
-            number += 1
+    return _decoded(((content_of(path), f"the picture {path}", path.name) for path in paths), rate)
 
 
 def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> ImageStream:
@@ -85,13 +80,17 @@ def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> Imag
     The pipe is not read by PyAV: FFmpeg's reader of pictures takes several JPEGs for one, leaves out the last
     and is one or two behind a live source.
     """
-    decode = Decoder()
-    number = 0
-    for count, content in enumerate(split(read, name), start=1):
-        label = f"picture {count} of {name}"
-        for page, image in decode(content, label, label):
-            yield CapturedImage(image, number / rate, page, is_marked(content))
-            number += 1
+    pictures = enumerate(split(read, name), start=1)
+    labelled = ((content, f"picture {number} of {name}") for number, content in pictures)
+    return _decoded(((content, label, label) for content, label in labelled), rate)
+
+
+def _decoded(pictures: Iterable[tuple[bytes, str, str]], rate: float) -> ImageStream:
+    """The images of pictures: their contents, how a message calls each, and their names."""
+    decode, numbers = Decoder(), count()
+    for content, label, name in pictures:
+        for page, image in decode(content, label, name):
+            yield CapturedImage(image, next(numbers) / rate, page, is_marked(content))
 
 
 def write_picture(path: Path, image: Image, *, comment: str = "") -> None:

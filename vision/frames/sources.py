@@ -68,11 +68,9 @@ def open_frames(
     if not str(source) or not (path.is_file() or path.is_dir() or has_magic(str(source))):
         raise UserError(f"{str(source)!r}: there is no such video, picture or folder")
     paths = picture_paths(str(source))
-    single = len(paths) == 1
-    number = len(pages(content_of(paths[0]))) if single else len(paths)
-    return Frames(
-        str(source), images_of_files(paths, usual), rate=usual, count=number, timed=rate is not None
-    )
+    number = len(paths) if len(paths) > 1 else len(pages(content_of(paths[0])))
+    images = images_of_files(paths, usual)
+    return Frames(str(source), images, rate=usual, count=number, timed=rate is not None)
 
 
 def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = None) -> Frames:

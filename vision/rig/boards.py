@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator
 
-import cv2
 import numpy as np
+import shapely
 from scipy.spatial.transform import Rotation
 
-from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.vision.calibration.camera import Camera, Pose
-from pinnray.vision.calibration.charuco import DICTIONARIES, CharucoBoard
+from pinnray.vision.calibration.charuco import CharucoBoard
 from pinnray.vision.calibration.chessboard import Board
 from pinnray.vision.rig.shapes import Scene, Shape, rectangle
 
@@ -72,7 +72,8 @@ def board_poses(board: Board, camera: Camera, count: int, *, seed: int = 0) -> l
         drawn = [pose for pose in (_drawn(board, camera, rng) for _ in range(TRIES)) if pose is not None]
         if not drawn:
             raise UserError(f"a board of {board} does not fit into the image in any pose tried")
-        shown = [_inside(camera.project(_rim(board, 0.0), pose), pixels) for pose in drawn]
+        rims = [shapely.Polygon(camera.project(_rim(board, 0.0), pose)) for pose in drawn]
+        shown = [shapely.contains_xy(rim, pixels) for rim in rims]
         best = int(np.argmax([(fresh & inside).sum() for inside in shown]))
         poses.append(drawn[best])
         fresh &= ~shown[best]
@@ -84,9 +85,8 @@ def board_poses(board: Board, camera: Camera, count: int, *, seed: int = 0) -> l
 def _drawn(board: Board, camera: Camera, rng: np.random.Generator) -> Pose | None:
     """A random pose; None if part of the board is outside the image."""
     axis, tilt, turn = rng.uniform(0, 2 * np.pi), np.deg2rad(rng.uniform(*TILT)), rng.uniform(-0.3, 0.3)
-    rotation = Rotation.from_rotvec([tilt * np.cos(axis), tilt * np.sin(axis), 0.0]) * Rotation.from_rotvec(
-        [0.0, 0.0, turn]
-    )
+    tilted = Rotation.from_rotvec([tilt * np.cos(axis), tilt * np.sin(axis), 0.0])
+    rotation = tilted * Rotation.from_rotvec([0.0, 0.0, turn])
     rim = _rim(board, MARGIN)
     longer = np.ptp(rim, axis=0).max()
     distance = camera.fx * longer / (rng.uniform(*SIZE) * camera.width)
@@ -105,20 +105,10 @@ def _rim(board: Board, margin: float) -> FloatArray:
     return np.asarray(board.square * np.stack([x, y, np.zeros(4)], axis=1))
 
 
-def _inside(corners: FloatArray, points: FloatArray) -> BoolArray:
-    """Mask of the points, shape (n, 2), in a convex polygon."""
-    side = np.roll(corners, -1, axis=0) - corners
-    to = points[:, None] - corners
-    turn = side[:, 0] * to[:, :, 1] - side[:, 1] * to[:, :, 0]
-    return np.asarray((turn > 0).all(axis=1) | (turn < 0).all(axis=1))
-
-
 def _cells(board: CharucoBoard) -> Iterator[FloatArray]:
     """The edges of the black cells of the board's markers, as OpenCV lays them out."""
-    dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[board.dictionary])
-    layout = cv2.aruco.CharucoBoard(
-        (board.columns + 1, board.rows + 1), board.square, board.marker, dictionary
-    )
+    layout = board.opencv(legacy=False)
+    dictionary = layout.getDictionary()
     side = dictionary.markerSize + 2
     cell = board.marker / side
     for number, corners in zip(np.ravel(layout.getIds()), layout.getObjPoints(), strict=True):

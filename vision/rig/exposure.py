@@ -25,26 +25,22 @@ Light = NDArray[np.float32]
 class Exposure(CheckedModel):
     """Light, lens and sensor of the camera."""
 
-    blur: float = bounded(0.8, 0, 20, "px", "", "Standard deviation of the blur of the lens")
-    noise: float = bounded(1.0, 0, 100, "grey levels", "", "Standard deviation of the read noise")
+    blur: float = bounded(0.8, 0, 20, "Standard deviation of the blur of the lens", "px")
+    noise: float = bounded(1.0, 0, 100, "Standard deviation of the read noise", "grey levels")
     full_well: float | None = bounded(
-        None, 100, 1e9, "electrons", "", "Electrons at grey level 255; none: no photon noise"
+        None, 100, 1e9, "Electrons at grey level 255; none: no photon noise", "electrons"
     )
-    white: float = bounded(
-        235.0, 10, 1000, "grey levels", "", "Grey level of white in the middle of the image"
-    )
+    white: float = bounded(235.0, 10, 1000, "Grey level of white in the middle of the image", "grey levels")
     gradient: float = bounded(
-        0.1, 0, 0.9, "", "", "Growth of the light from the middle of the image to its side, relative"
+        0.1, 0, 0.9, "Growth of the light from the middle of the image to its side, relative"
     )
     gradient_direction: float = bounded(
-        30.0, -360, 360, "deg", "", "Direction in which the light grows, from right to down"
+        30.0, -360, 360, "Direction in which the light grows, from right to down", "deg"
     )
     glare: float = bounded(
-        0.0, 0, 1000, "grey levels", "", "Reflection of a lamp right of the middle, in its brightest pixel"
+        0.0, 0, 1000, "Reflection of a lamp right of the middle, in its brightest pixel", "grey levels"
     )
-    sharpen: float = bounded(
-        0.0, 0, 10, "", "", "Unsharp mask: growth of differences from a blur of 1 px, relative"
-    )
+    sharpen: float = bounded(0.0, 0, 10, "Unsharp mask: growth of differences from a blur of 1 px, relative")
     monochrome: bool = Field(default=False, description="A camera without colours")
 
     def lamp(self, size: tuple[int, int]) -> Light:

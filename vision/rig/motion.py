@@ -21,16 +21,14 @@ class Motion(CheckedModel):
     shutter in the last frame at rest until its opening in the first frame held, and goes back likewise.
     """
 
-    rest: int = bounded(30, 1, 100_000, "frames", "", "Frames before the pressing")
-    moving: int = bounded(
-        30, 0, 100_000, "frames", "", "Frames of the pressing; 0: a jump between two frames"
-    )
-    held: int = bounded(30, 1, 100_000, "frames", "", "Frames held under full load")
+    rest: int = bounded(30, 1, 100_000, "Frames before the pressing", "frames")
+    moving: int = bounded(30, 0, 100_000, "Frames of the pressing; 0: a jump between two frames", "frames")
+    held: int = bounded(30, 1, 100_000, "Frames held under full load", "frames")
     back: int = bounded(
-        0, 0, 100_000, "frames", "", "Frames of the way back, after which the finger rests as long; 0: none"
+        0, 0, 100_000, "Frames of the way back, after which the finger rests as long; 0: none", "frames"
     )
-    rate: float = bounded(30.0, 0.1, 1000, "1/s", "", "Frames a second")
-    shutter: float = bounded(0.3, 0, 0.9, "", "", "Share of the time for which the shutter is open")
+    rate: float = bounded(30.0, 0.1, 1000, "Frames a second", "1/s")
+    shutter: float = bounded(0.3, 0, 0.9, "Share of the time for which the shutter is open")
 
     def __len__(self) -> int:
         """Number of frames."""

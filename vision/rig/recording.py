@@ -96,15 +96,8 @@ class Recording:
         moved = self.displacement[mesh.marker_nodes]
         if discs:
             moved = self._middles(self.displacement) - self._middles(np.zeros_like(self.displacement))
-        return Observations(
-            points=mesh.markers,
-            displacements=moved,
-            standard_deviations=np.zeros_like(moved),
-            visible=np.ones(len(moved), dtype=bool),
-            source=source,
-            simulated=True,
-            marker_radius=self.bench.finger.marker_radius,
-        )
+        radius = self.bench.finger.marker_radius
+        return Observations(mesh.markers, moved, source=source, simulated=True, marker_radius=radius)
 
     def _middles(self, displacement: FloatArray) -> FloatArray:
         """Centroids of the markers' discs, shape (m, 2), mm."""
@@ -119,9 +112,8 @@ class Recording:
     @cached_property
     def _path(self) -> float:
         """The longest displacement of a marker in the image, pixels."""
-        start, end = (
-            self.camera.project(self.bench.markers(self.displaced(load)), self.pose) for load in (0, 1)
-        )
+        marks = (self.bench.markers(self.displaced(load)) for load in (0, 1))
+        start, end = (self.camera.project(each, self.pose) for each in marks)
         return float(np.linalg.norm(end - start, axis=1).max())
 
     def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, FrameTruth]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pinnray.runtime.atomic import atomic_path, write_json, write_text
 from pinnray.runtime.errors import UserError
+from pinnray.runtime.progress import Progress, silent
 from pinnray.vision.calibration.camera import Pose
 from pinnray.vision.calibration.camera_file import save_camera
 from pinnray.vision.frames.frame import RIG_MARK, Image
@@ -30,12 +31,7 @@ TRUTH_COLUMNS = (
 
 
 def record(
-    recording: Recording,
-    folder: Path,
-    *,
-    source: str,
-    codec: str = "ffv1",
-    progress: Callable[[float, str], None] = lambda fraction, text: None,
+    recording: Recording, folder: Path, *, source: str, codec: str = "ffv1", progress: Progress = silent
 ) -> None:
     """Write a recording into a folder that exists.
 
@@ -76,8 +72,7 @@ def record(
     for name, simulated in (("workspace.json", True), ("fiducials.json", False)):
         workspace = bench.workspace.model_copy(update={"simulated": simulated})
         write_json(folder / name, workspace.model_dump(mode="json"))
-    sheet = workspace_svg(bench.workspace, bench.finger)
-    write_text(folder / "fiducials.svg", sheet)
+    write_text(folder / "fiducials.svg", workspace_svg(bench.workspace, bench.finger))
     write_json(folder / "truth.json", _settings(recording))
 
 
@@ -88,12 +83,7 @@ def check_codec(codec: str) -> None:
 
 
 def photograph(
-    scene: Scene,
-    poses: Sequence[Pose],
-    recording: Recording,
-    folder: Path,
-    *,
-    progress: Callable[[float, str], None] = lambda fraction, text: None,
+    scene: Scene, poses: Sequence[Pose], recording: Recording, folder: Path, *, progress: Progress = silent
 ) -> None:
     """Photograph a scene in some poses with the camera of a recording, as PNG pictures in a new folder.
 
@@ -102,9 +92,8 @@ def photograph(
     folder.mkdir()
     first = len(recording.motion)
     for number, pose in enumerate(poses):
-        image = render(
-            scene, recording.camera, pose, recording.exposure, seed=recording.seed, frame=first + number
-        )
+        place = {"seed": recording.seed, "frame": first + number}
+        image = render(scene, recording.camera, pose, recording.exposure, **place)
         write_picture(folder / f"{number:03d}.png", image, comment=RIG_MARK)
         progress((number + 1) / len(poses), f"{number + 1} of {len(poses)} photographs")
 
@@ -121,15 +110,13 @@ def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Im
 
 def _settings(recording: Recording) -> dict[str, object]:
     """Settings of the frames that are in no other file."""
+    bench, (rotation, translation) = recording.bench, recording.pose
     return {
-        "design": recording.bench.finger.definition(),
-        "mesh_sha256": recording.bench.mesh.digest,
-        "paint": recording.bench.paint,
-        "irregular": recording.bench.irregular,
-        "pose": {
-            "rotation": recording.pose.rotation.tolist(),
-            "translation_mm": recording.pose.translation.tolist(),
-        },
+        "design": bench.finger.definition(),
+        "mesh_sha256": bench.mesh.digest,
+        "paint": bench.paint,
+        "irregular": bench.irregular,
+        "pose": {"rotation": rotation.tolist(), "translation_mm": translation.tolist()},
         "exposure": recording.exposure.model_dump(),
         "motion": recording.motion.model_dump(),
         "seed": recording.seed,

@@ -75,12 +75,8 @@ def blot(centre: ArrayLike, radius: float, irregular: float, rng: np.random.Gene
     if not irregular:
         return circle(centre, radius)
     angle = 2 * np.pi * np.arange(CORNERS) / CORNERS
-    waves = sum(
-        height * np.cos(lobe * angle + turn)
-        for lobe, height, turn in zip(
-            LOBES, rng.standard_normal(len(LOBES)), rng.uniform(0, 2 * np.pi, len(LOBES)), strict=True
-        )
-    )
+    heights, turns = rng.standard_normal(len(LOBES)), rng.uniform(0, 2 * np.pi, len(LOBES))
+    waves = (heights[:, None] * np.cos(np.outer(LOBES, angle) + turns[:, None])).sum(axis=0)
     reach = 1 + irregular * waves / np.sqrt(np.mean(waves**2))
     corners = reach[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     edges = closed(corners)

@@ -88,18 +88,13 @@ def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDe
         start, end = (scene.plane(fiducials.numbered(numbers)) for fiducials in (before, alike))
     except UserError:  # those that both ends show lie in a row
         return CameraMotion(shift, None, remains=shift)
-    points = scene.workspace.points[common]
-    poses = [
-        pose_covariance(plane, points, fiducials.covariances[common])
-        for plane, fiducials in ((start, before), (end, after))
-    ]
+    points, radius = scene.workspace.points[common], scene.workspace.fiducial_diameter / 2
+    ends = ((start, before), (end, after))
+    poses = [pose_covariance(plane, points, seen.covariances[common]) for plane, seen in ends]
     known = tuple(pose for pose in poses if pose is not None)
     deviation = noise * np.sqrt(UNKNOWNS / (2 * count))
     larger = float((end.scales(points) / start.scales(points)).mean()) - 1
-    away = [
-        plane.on_sheet.circles(fiducials.centres[common], scene.workspace.fiducial_diameter / 2)
-        for plane, fiducials in ((start, before), (end, after))
-    ]
+    away = [plane.on_sheet.circles(seen.centres[common], radius) for plane, seen in ends]
     left = (away[1] - away[0]) * end.scales(points)[:, None]
     freedom = 2 * count - (UNKNOWNS if known else len(end.parameters))
     squares = float((left**2 / variances).sum())

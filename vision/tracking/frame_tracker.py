@@ -108,10 +108,8 @@ class FrameTracker:
 
     def _detected_near(self, image: Image, places: FloatArray) -> DiscDetections:
         """Detect discs near places, shape (m, 2), mm."""
-        scene = self._scene
-        return detect_discs_near(
-            image, scene.colour, self.plane.pixels(places), self._radii(places), scene.method
-        )
+        scene, guesses = self._scene, self.plane.pixels(places)
+        return detect_discs_near(image, scene.colour, guesses, self._radii(places), scene.method)
 
     def _searched(
         self, detections: DiscDetections, names: IntArray, fields: FloatArray, image: Image
@@ -120,9 +118,8 @@ class FrameTracker:
         detections = detections.together(self._search(image))
         names = self._associated(detections, fields)
         if 0 < (names < 0).sum() < len(names):
-            detections = detections.together(
-                self._detected_near(image, self._places + self._steps_of(detections.numbered(names)))
-            )
+            places = self._places + self._steps_of(detections.numbered(names))
+            detections = detections.together(self._detected_near(image, places))
             names = self._associated(detections, fields)
         return detections, names
 

@@ -104,9 +104,8 @@ class MarkerPlane:
 
     def scales(self, points: FloatArray) -> FloatArray:
         """Pixels per mm at points of the plane, shape (n,): the root of the ratio of areas."""
-        return np.asarray(
-            np.sqrt(np.abs(np.linalg.det(self.projection.jacobians(points, self.parameters).point)))
-        )
+        by_point = self.projection.jacobians(points, self.parameters).point
+        return np.asarray(np.sqrt(np.abs(np.linalg.det(by_point))))
 
     def displacement_covariance(
         self, initial: FloatArray, final: FloatArray, initial_noise: FloatArray, final_noise: FloatArray

@@ -80,9 +80,8 @@ def homography_plane(points: FloatArray, pixels: FloatArray, covariances: FloatA
     start = cv2.findHomography(points, pixels, 0)[0]  # its last entry is 1
     if start is None:
         raise UserError(f"{UNDETERMINED}; spread them around the finger")
-    return _plane_without_lens(
-        HOMOGRAPHY, np.ravel(start).astype(np.float64)[:8], points, pixels, covariances
-    )
+    entries = np.ravel(start).astype(np.float64)[:8]
+    return _plane_without_lens(HOMOGRAPHY, entries, points, pixels, covariances)
 
 
 def similarity_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:

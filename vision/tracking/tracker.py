@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -73,14 +74,10 @@ def track(
         tracker.plane.circles(pixels, scene.design.marker_radius),
         noise=FLOOR[scene.method] / tracker.plane.scales(markers).mean(),
     )
-    still = [[detections[number] for number in end] for end in rest]
-    initial, final = (
-        mean_detections([frame.markers for frame in end], scene.method, lossy=frames.lossy) for end in still
-    )
-    before, after, always = (
-        mean_detections(fiducials, scene.method, lossy=frames.lossy)
-        for fiducials in _fiducials_at_rest([frame.fiducials for frame in detections], rest)
-    )
+    mean = partial(mean_detections, method=scene.method, lossy=frames.lossy)
+    initial, final = (mean([detections[number].markers for number in end]) for end in rest)
+    fiducials = _fiducials_at_rest([frame.fiducials for frame in detections], rest)
+    before, after, always = map(mean, fiducials)
     motion = None
     if np.isfinite(always.radii).any():
         motion = find_camera_motion(scene, before, after)

@@ -45,9 +45,9 @@ class Workspace(CheckedModel):
     """
 
     fiducials: tuple[Point, ...]
-    fiducial_diameter: float = bounded(4.0, 0.1, LARGEST, "mm", "", "Diameter of every fiducial")
+    fiducial_diameter: float = bounded(4.0, 0.1, LARGEST, "Diameter of every fiducial", "mm")
     marker_plane: float = bounded(
-        0.0, -LARGEST, LARGEST, "mm", "", "Height of the markers' plane toward the camera"
+        0.0, -LARGEST, LARGEST, "Height of the markers' plane toward the camera", "mm"
     )
     simulated: bool = False
 

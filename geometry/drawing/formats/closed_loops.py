@@ -10,7 +10,7 @@ import shapely
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Mark, MarkerSize, Scale, place
 from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, joined
 from pinnray.geometry.drawing.formats.pieces import Piece
-from pinnray.geometry.section.loop import STRAIGHT, Loop
+from pinnray.geometry.section.loop import STRAIGHT, Loop, cross
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 
@@ -130,10 +130,7 @@ def straightened(loop: Loop, deviation: float = 1e-7) -> Loop:
             first, last = loop.points[before], loop.points[after]
             along, away = last - first, loop.points[corner] - first
             length = float(np.linalg.norm(along))
-            if (
-                0 < along @ away < length**2
-                and abs(along[0] * away[1] - along[1] * away[0]) <= deviation * length
-            ):
+            if 0 < along @ away < length**2 and abs(cross(along, away)) <= deviation * length:
                 kept.remove(corner)
     return Loop(loop.points[kept], loop.bulges[kept], tuple(loop.names[which] for which in kept))
 

@@ -99,13 +99,8 @@ def read_step(
         raise UserError(
             f"at {cut.plane} it is cut into {len(faces)} pieces; give a plane that cuts it into one"
         )
-    pieces = [
-        piece
-        for face in faces
-        for wire in face.Wires()
-        for edge in wire.Edges()
-        for piece in _pieces(edge, unit)
-    ]
+    edges = [edge for face in faces for wire in face.Wires() for edge in wire.Edges()]
+    pieces = [piece for edge in edges for piece in _pieces(edge, unit)]
     discs = np.array([_disc(marker.moved(cut.frame.inverse)) for marker in markers]).reshape(-1, 4) * unit
     size, across = MarkerSize.of(discs[:, 2]), f"{cut.depth * unit:.6g} mm"
     whole = f"{turned.Volume() * unit**3:.5g} mm3"

@@ -50,17 +50,15 @@ def read_svg(path: Path, units: str | None = None, tolerance: float | None = Non
             for piece in _pieces(element.segments(transformed=False), label, element.transform * place)
         ]
     except (ET.ParseError, UserError) as error:
-        raise UserError(f"it cannot be read as SVG: {error}") from None
+        reason = str(error)
     except RecursionError:
-        raise UserError(
-            "it cannot be read as SVG: an element contains itself, or is nested too deeply"
-        ) from None
+        reason = "an element contains itself, or is nested too deeply"
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):  # of svgelements
-        raise UserError(
-            "it cannot be read as SVG: the value of an attribute is missing or no number"
-        ) from None
-    said = {"given": " (given)", "assumed": f" {ASSUMED}"}.get(scale.origin, "")
-    return assembled(pieces, [], scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
+        reason = "the value of an attribute is missing or no number"
+    else:
+        said = {"given": " (given)", "assumed": f" {ASSUMED}"}.get(scale.origin, "")
+        return assembled(pieces, [], scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
+    raise UserError(f"it cannot be read as SVG: {reason}")
 
 
 def _shapes(group: Any, label: str) -> Iterator[tuple[Any, str]]:

@@ -42,6 +42,5 @@ def command(
     write_text(out / "fiducials.svg", workspace_svg(workspace, design))
     write_json(out / "fiducials.json", workspace.model_dump(mode="json"))
     write_text(out / "board.svg", sheet)
-    for name in ("fiducials.svg", "fiducials.json", "board.svg"):
-        print(out / name)
+    print(out / "fiducials.svg", out / "fiducials.json", out / "board.svg", sep="\n")
     return 0

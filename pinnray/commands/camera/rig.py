@@ -81,6 +81,5 @@ def command(
         options=given,
         **dict(scene),
     )
-    for path in sorted(folder.iterdir()):
-        print(path)
+    print(*sorted(folder.iterdir()), sep="\n")
     return 0

@@ -1,6 +1,7 @@
 """Track markers through a video."""
 
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -96,33 +97,30 @@ def command(
     check_output(folder)
     console, live = Console(stderr=True), live or publish
     forces, passed_over = [], None
-    with replaced_folder(folder) as partial:
+    with replaced_folder(folder) as unfinished:
         with Stages(console) as stages:
-            mesh = following = tracker = None
+            following = tracker = None
             if material:
                 with stages.stage("mesh"):
                     mesh = finger_mesh(design, settings=settings)
-            if mesh is not None and material and live:
-                tracker = force_tracker(
-                    mesh, design, material, design.markers, plane=film.simulated, learned=learned
-                )
-                following = LiveForce(tracker, design.depth, material.loss)
+                tracker_of = partial(force_tracker, mesh, design, material, learned=learned)
+                if live:
+                    tracker = tracker_of(design.markers, plane=film.simulated)
+                    following = LiveForce(tracker, design.depth, material.loss)
             watch = frame_lines(following, publish=publish) if live else None
             with stages.stage("track") as report:
-                tracking, observations, _ = track_film(
-                    film, design, partial, report, video=not without_video, watch=watch
-                )
+                video = not without_video
+                tracking, seen, _ = track_film(film, design, unfinished, report, video=video, watch=watch)
             if following is not None:
                 forces, passed_over = following.finished(), following.passed_over
-            elif mesh is not None and material:
+            elif material:
                 with stages.stage("force") as report:
-                    points, plane = observations.points, observations.plane
-                    tracker = force_tracker(mesh, design, material, points, plane=plane, learned=learned)
+                    tracker = tracker_of(seen.points, plane=seen.plane)
                     forces = forces_of(tracking, tracker, material.loss, report)
         made = {"versions": package_versions(), "machine": machine()}
         provenance = {"options": given, "design": design.definition(), **made}
         if tracker is not None and material:
-            write_forces(partial, forces, design.depth)
+            write_forces(unfinished, forces, design.depth)
             provenance["force"] = {
                 "material": material.model_dump() | {"law": tracker.law},
                 "learned": learned and learned.model_dump(),
@@ -132,15 +130,14 @@ def command(
             }
             if learn is not None and tracker.learned is not None:
                 write_learned(learn, tracker.learned, finger_lines(design))
-        write_run(partial, provenance | {"seconds": stages.seconds})
+        write_run(unfinished, provenance | {"seconds": stages.seconds})
     for warning in tracking.warnings:
         say(f"warning: {warning}")
     said = console if publish else Console()
-    said.print(track_table(tracking, observations))
+    said.print(track_table(tracking, seen))
     if forces and material:
         said.print(force_table(forces, design.depth, material.loss, passed_over))
         if not material.loss and (remark := loss_remark(forces, 0.0)):
             say(f"warning: {remark}")
-    for path in sorted(folder.iterdir()):
-        print(path, file=said.file)
+    print(*sorted(folder.iterdir()), sep="\n", file=said.file)
     return 0

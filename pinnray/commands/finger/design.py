@@ -34,19 +34,16 @@ def command(
     chosen, _ = finger.read()
     stem = Path(chosen.file).stem if isinstance(chosen, DrawnFinger) else STEP
     lines = out / f"{stem}.toml"
-    written = [
-        lines,
-        out / PICTURE,
-        *(out / name for name in CAD_FILES if name.endswith(tuple(comma_list(formats)))),
-    ]
+    kinds = comma_list(formats)
+    names = [lines.name, PICTURE, *(name for name in CAD_FILES if name.endswith(tuple(kinds)))]
+    written = [out / name for name in names]
     for given in finger.files():
         if any(path.exists() and path.samefile(given) for path in written):
             raise UserError(f"--out {out}: this would overwrite {given}, which is read; name another folder")
-    paths = cad_files(chosen, out, formats=comma_list(formats))
+    paths = cad_files(chosen, out, formats=kinds)
     write_text(lines, description_lines(chosen))
     if isinstance(chosen, DrawnFinger):
         say(f"note: {chosen.file} was read as {chosen.note}")
     picture = chosen.plot().save(out / PICTURE)
-    for path in [*paths, lines, picture]:
-        print(path)
+    print(*paths, lines, picture, sep="\n")
     return 0

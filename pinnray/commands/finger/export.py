@@ -40,8 +40,7 @@ def command(
     )
     for each in done.scores:
         print(f"{each.model}: {each.sentence}")
-    for path in done.files:
-        print(path)
+    print(*done.files, sep="\n")
     if unsteady := [each.model for each in done.scores if not each.steady]:
         say(f"warning: {' and '.join(unsteady)} did not come to rest at every load")
         return NOT_CONVERGED

@@ -28,6 +28,5 @@ def command(*, finger: FingerOptions = FingerOptions(), out: OutputPath = Path("
     triangles.plot().save(out / "mesh.png")
     nodes, area = len(triangles.points), triangles.areas.sum()
     print(f"{nodes} nodes, {len(triangles.triangles)} triangles, area {area:.4f} mm^2")
-    for name in ("mesh.vtu", "mesh.npz", "mesh.png"):
-        print(out / name)
+    print(out / "mesh.vtu", out / "mesh.npz", out / "mesh.png", sep="\n")
     return 0

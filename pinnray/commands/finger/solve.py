@@ -108,8 +108,7 @@ def command(
         if taught.learn is not None and found.learned is not None and solution.status.converged:
             write_learned(taught.learn, found.learned, finger_lines(chosen))
             written.append(taught.learn)
-    for path in written:
-        print(path)
+    print(*written, sep="\n")
     whole = all(isfinite(force) for _, force in forces)
     return 0 if evaluation.converged and whole else NOT_CONVERGED
 

@@ -53,8 +53,7 @@ def command(
         headings, *rows = [[row[place] for place in kept] for row in (table.headings, *table.rows)]
         if rows:
             Console().print(terminal_table(table.title, headings, rows, left=table.left, narrow=True))
-    for path in written:
-        print(path)
+    print(*written, sep="\n")
     for remark in found.remarks:
         say(f"warning: {remark}")
     own = [row.state for entry in found.entries[: len(job.solvers)] for row in entry.rows]

@@ -95,8 +95,8 @@ def command(
     for table in truth_tables(result)[-1:] if several else all_tables(result):
         Console().print(terminal_table(table.title, table.headings, table.rows, left=TEXTS, narrow=True))
         Console().print(Text(f"{table.caption}\n", style="table.caption"))
-    for name in ("report.html", "samples.csv", "scores.csv", "crossval.json"):
-        print(study.out / name)
+    names = ("report.html", "samples.csv", "scores.csv", "crossval.json")
+    print(*(study.out / name for name in names), sep="\n")
     for name, message in result.failed.items():
         say(f"error: {name} failed, and is tried again by the same command: {message}")
     return 0 if result.samples["converged"].all() and not result.failed else NOT_CONVERGED

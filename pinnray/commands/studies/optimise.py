@@ -33,6 +33,5 @@ def command(question: Path, *, options: StudyOptions = StudyOptions()) -> int:
     columns = [0, *range(2, 2 + len(read.names))]  # the table in the file is too wide for a terminal
     shown = text_table(read.heading, front_table(found).iloc[:, columns])
     Console().print(terminal_table(shown.title, shown.headings, shown.rows))
-    for path in [*paths, designs[0], designs[-1]]:
-        print(path)
+    print(*paths, designs[0], designs[-1], sep="\n")
     return 0

@@ -37,8 +37,7 @@ def command(study: Path, *, options: StudyOptions = StudyOptions()) -> int:
             shown = [row[:5] if grid is quantities else row[:3] for row in grid.rows]
             headings = grid.headings[: len(shown[0])]
             Console().print(terminal_table(grid.title, headings, shown, left=grid.left))
-    for path in written:
-        print(path)
+    print(*written, sep="\n")
     for remark in done.remarks:
         say(f"warning: {remark}")
     if bad := sum(each.state in ("failed", "not converged") for each in done.measurements):

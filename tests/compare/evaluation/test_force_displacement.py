@@ -83,7 +83,7 @@ def test_the_whole_curve_of_the_simulated_finger_and_an_identified_force_are_dra
     truth = replace(followed, solver="truth")
     curves = force_curves([fem, followed], Load())
     page = page_of(
-        draw_force_displacement(curves, depth=20.0, truth=ForceCurve.of(truth, Load()), identified={2: found})
+        draw_force_displacement(curves, depth=20.0, truth=ForceCurve.of(truth, Load()), identified=[found])
     )
     axes = page.figure.axes[0]
     pink = [line for line in axes.lines if line.get_color() == MEASURED and line.get_marker() == "None"]

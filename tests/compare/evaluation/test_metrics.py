@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from pinnray.comparison.evaluation.comparison import pick_reference
-from pinnray.comparison.evaluation.differences import FieldDifference, weighted_percentile
+from pinnray.comparison.evaluation.differences import FieldDifference
 from pinnray.comparison.evaluation.metrics import force_error, marker_errors, truth_differences
 from pinnray.comparison.evaluation.scores import MEANS, Scores
+from pinnray.runtime.arrays import weighted_percentile
 from pinnray.solvers.problem import Load
 
 

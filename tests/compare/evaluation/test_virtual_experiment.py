@@ -115,9 +115,9 @@ def test_another_problem_is_simulated_again(problem, solutions, changes, simulat
 
 def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(problem, solutions, monkeypatch):
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr(f"{MODULE}.package_versions", lambda: {"numpy": "9"})
+    monkeypatch.setattr("pinnray.comparison.evaluation.evaluation.package_versions", lambda: {"numpy": "9"})
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr(f"{MODULE}.sources_digest", lambda *_: "other")
+    monkeypatch.setattr("pinnray.comparison.evaluation.evaluation.sources_digest", lambda *_: "other")
     virtual_experiment(problem, 0.8)
     assert len(solutions) == 3
 

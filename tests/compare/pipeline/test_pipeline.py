@@ -298,7 +298,7 @@ def test_another_job_is_not_resumed_from(job, measured, monkeypatch, changes):
     ((name, value),) = changes.items()
     again = {"resume": True}
     if name in ("package_versions", "sources_digest"):
-        monkeypatch.setattr(f"pinnray.comparison.pipeline.solving.{name}", lambda *_: value)
+        monkeypatch.setattr(f"pinnray.comparison.evaluation.evaluation.{name}", lambda *_: value)
     elif name == "degree":
         first.degree = value
     elif name == "measured":
