@@ -50,21 +50,19 @@ def true_forces(
     components = CubicSpline(shares, depth * reactions @ stroke_axes(solution.problem.load).T)
     places = history.get("force_abscissa_mm")
     place = None if places is None else CubicSpline(shares, places)
-    rows: list[dict[str, Cell]] = []
     loads = [recording.load(number) for number in range(len(recording.motion))]
     forces = viscoelastic_forces(components, recording.motion, loss) if loss else components(loads)
-    for number, (load, (force, across)) in enumerate(zip(loads, forces.tolist(), strict=True)):
-        rows.append(
-            {
-                "frame": number,
-                "time_s": number / recording.motion.rate,
-                "load": load,
-                "force_N": force,
-                "tangential_force_N": across,
-                "position_mm": "" if place is None else float(place(load)),
-            }
-        )
-    return rows
+    return [
+        {
+            "frame": number,
+            "time_s": number / recording.motion.rate,
+            "load": load,
+            "force_N": force,
+            "tangential_force_N": across,
+            "position_mm": "" if place is None else float(place(load)),
+        }
+        for number, (load, (force, across)) in enumerate(zip(loads, forces.tolist(), strict=True))
+    ]
 
 
 def viscoelastic_forces(

@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.comparison.evaluation.differences import FieldDifference
+from pinnray.comparison.evaluation.differences import relative_l2
 from pinnray.comparison.evaluation.truths import Truth
 from pinnray.comparison.evaluation.virtual_experiment import simulate
 from pinnray.geometry.cache import finger_mesh
@@ -26,9 +27,8 @@ from pinnray.studies.crossval.folds import LoadCase
 from pinnray.studies.crossval.study import SIZES, CrossvalStudy
 
 
-@dataclass(frozen=True, eq=False)
-class SampledField:
-    """A displacement field at m markers and q quadrature points of the body; fields can be added and scaled.
+class SampledField(NamedTuple):
+    """A displacement field at m markers and q quadrature points of the body.
 
     Attributes:
         markers: Means over the markers' discs, shape (m, 2), mm.
@@ -39,16 +39,6 @@ class SampledField:
     markers: FloatArray
     displacement: FloatArray
     gradient: FloatArray
-
-    def __add__(self, other: "SampledField") -> "SampledField":
-        return SampledField(
-            self.markers + other.markers,
-            self.displacement + other.displacement,
-            self.gradient + other.gradient,
-        )
-
-    def __mul__(self, factor: float) -> "SampledField":
-        return SampledField(factor * self.markers, factor * self.displacement, factor * self.gradient)
 
     def state(self, problem: Problem) -> State:
         """Strain and stress by the law of a problem."""
@@ -75,7 +65,7 @@ class SampledField:
             "von_mises": (state.von_mises, true.von_mises),
             "von_mises_true_law": (with_true_law.von_mises, true.von_mises),
         }
-        return {name: FieldDifference.of(*pair, weights).rel_l2 for name, pair in pairs.items()}
+        return {name: relative_l2(*pair, weights) for name, pair in pairs.items()}
 
 
 @dataclass(frozen=True, eq=False)

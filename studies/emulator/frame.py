@@ -81,8 +81,6 @@ class BeamFrame:
         """Rigid lengths at both ends of the beams, shape (n, b, 2), mm."""
         ribs, walls = self.ribs, 2 * self.ribs + 3
         found = np.zeros((*length.shape, 2))
-        if not ribs:
-            return found
         joints = np.zeros(self.points.shape[1])
         joints[:ribs] = joints[ribs + 3 : 2 * ribs + 3] = 1.0
         rib = self.thickness[:, walls, None, None]

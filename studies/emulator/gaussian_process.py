@@ -91,9 +91,8 @@ class GaussianProcess:
         else:
             made = cls(inputs / fit.lengths, fit, mean, spread)
             residuals = spread * fit.left_out
-        ratios = np.sort(np.abs(residuals[count:]) / made.predict(inputs[count:])[1])
-        rank = min(int(np.ceil(LEVEL * (len(ratios) + 1))), len(ratios)) - 1
-        return replace(made, half=float(ratios[rank]))
+        ratios = np.abs(residuals[count:]) / made.predict(inputs[count:])[1]
+        return replace(made, half=float(calibrated(ratios)))
 
     @classmethod
     def _left_out(cls, inputs: FloatArray, values: FloatArray) -> FloatArray:
@@ -142,3 +141,9 @@ def likeliest(
     factor = np.sqrt(signal) * np.linalg.inv(process.L_[:landmarks, :landmarks])
     left_out = process.alpha_ / np.diag(inverse)
     return Fit(np.array(lengths), noise / signal, signal * process.alpha_, factor, left_out)
+
+
+def calibrated(ratios: FloatArray) -> FloatArray:
+    """The factor of intervals that hold, from ratios of errors to those expected, (n, ...): shape (...)."""
+    rank = min(int(np.ceil(LEVEL * (len(ratios) + 1))), len(ratios)) - 1
+    return np.asarray(np.sort(ratios, axis=0)[rank])

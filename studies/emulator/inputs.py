@@ -178,13 +178,10 @@ class Inputs:
         for (*_, travel), places in groups.items():
             own = [shapes[place] for place in places]
             found = BeamFrame.of(own).response(physics[places[0]][0], travel)
-            answers[places, 0] = found.force
-            answers[places, 1:3] = found.compliance
-            answers[places, 3:5] = found.tip
-            answers[places, 5] = _wrap(own, found.contact, found.tip)
-            answers[places, 6:9] = found.stress
+            wrap = _wrap(own, found.contact, found.tip)
+            answers[places] = np.column_stack([found.force, found.compliance, found.tip, wrap, found.stress])
         scales = [(material.young, shape.depth) for shape, (material, _) in zip(shapes, physics, strict=True)]
-        return answers, np.array(scales)
+        return answers, np.array(scales).reshape(-1, 2)
 
 
 def _wrap(shapes: Sequence[Parameters], contact: FloatArray, tip: FloatArray) -> FloatArray:
