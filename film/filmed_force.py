@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import Cell
@@ -100,7 +101,6 @@ def viscoelastic_forces(
 
 def _relaxed(forces: FloatArray, steps: float) -> FloatArray:
     """How much of forces, shape (n, 2), has relaxed, with a time constant of so many of their steps."""
-    kept, decay = np.zeros_like(forces), np.exp(-1 / steps)
-    for number, increment in enumerate(np.diff(forces, axis=0), start=1):
-        kept[number] = decay * kept[number - 1] + steps * (1 - decay) * increment
+    decay, increments = np.exp(-1 / steps), np.diff(forces, axis=0, prepend=forces[:1])
+    kept = lfilter([steps * (1 - decay)], [1, -decay], increments, axis=0)
     return np.asarray(forces - forces[0] - kept)
