@@ -150,11 +150,10 @@ def _noisy(
         return Observations(
             points=points,
             displacements=shown + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
-            standard_deviations=np.full_like(true, study.noise),
-            visible=np.ones(len(true), dtype=bool),
+            standard_deviations=study.noise,
             source=f"{source}, with {study.noise:g} mm of noise",
             simulated=True,
-            solid=study.chosen_truths[truth].solid,
+            solid=own.solid,
             marker_radius=study.design.marker_radius,
             pressed=known,
         )

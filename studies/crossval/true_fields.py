@@ -99,15 +99,9 @@ class FieldSampler:
         inside, discs = self.inside_of(solution, mesh, changes), self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             discs = mesh.locate_on(solution.problem.mesh, discs.points)
-        return SampledField(
-            markers=self.means @ solution.displacement_in_space(discs),
-            displacement=solution.field.displacement(inside),
-            gradient=(
-                solution.field.solid_gradient(inside)
-                if isinstance(solution.field, SolidField)
-                else solution.field.gradient(inside)
-            ),
-        )
+        field, markers = solution.field, self.means @ solution.displacement_in_space(discs)
+        gradient = field.solid_gradient if isinstance(field, SolidField) else field.gradient
+        return SampledField(markers, field.displacement(inside), gradient(inside))
 
     def inside_of(
         self, solution: Solution, mesh: TriangleMesh, changes: Mapping[str, float] | None = None
@@ -117,16 +111,12 @@ class FieldSampler:
             return self.inside
         points = self.inside.points
         if changes:
-            points = points + _shifts(mesh, self.inside, changes)
+            motion = WallMotion.of(mesh)
+            if missing := [name for name in changes if name not in motion.names]:
+                raise UserError(f"the finger has no wall of the {missing[0]} that the truth changes")
+            thicker = np.array([changes.get(name, 0.0) for name in motion.names])
+            points = points + motion.shifts(self.inside, thicker)
         return mesh.locate_on(solution.problem.mesh, points)
-
-
-def _shifts(mesh: TriangleMesh, location: LocatedPoints, changes: Mapping[str, float]) -> FloatArray:
-    """Motion of points of a mesh with its walls, shape (n, 2), mm."""
-    motion = WallMotion.of(mesh)
-    if missing := [name for name in changes if name not in motion.names]:
-        raise UserError(f"the finger has no wall of the {missing[0]} that the truth changes")
-    return motion.shifts(location, np.array([changes.get(name, 0.0) for name in motion.names]))
 
 
 @dataclass(frozen=True, eq=False)
