@@ -152,7 +152,7 @@ class Inputs:
     def _column(self, name: str, values: Sequence[Value]) -> FloatArray:
         """Inputs of a parameter, with a standard deviation of about one, shape (n, 1) or (n, choices)."""
         chosen = self.study.varied[name]
-        if chosen.values is not None and not _is_number(chosen):
+        if chosen.values is not None and not all(type(each) in (int, float) for each in chosen.values):
             places = np.array([chosen.values.index(value) for value in values])
             return np.asarray(2.0 * np.eye(len(chosen.values))[places])
         low, high = chosen.ends
@@ -196,10 +196,6 @@ def _rib_phase(p: Parameters) -> float:
     """Place of the contact between the ribs, in pitches; a whole number at a rib."""
     first = rib_feet(p)[0] if p.rib_count else cavity_ends(p)[0]
     return float((p.contact_abscissa - first) / rib_pitch(p))
-
-
-def _is_number(values: Range) -> bool:
-    return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values.values or ())
 
 
 def _contains(name: str, values: Range, value: Value) -> bool:
