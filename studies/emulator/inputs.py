@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -140,14 +139,10 @@ class Inputs:
 
     def columns(self, fingers: Sequence[Mapping[str, Value]]) -> FloatArray:
         """The varied parameters that are no mere factors, each with a standard deviation of about one."""
-        columns = [self._column(name, [finger[name] for finger in fingers]) for name in self._columns]
-        return np.concatenate([np.zeros((len(fingers), 0)), *columns], axis=1)
-
-    @cached_property
-    def _columns(self) -> list[str]:
-        """Varied parameters of which a process has an input: Young's modulus and depth act as factors."""
         factors = {"young"} if self.study.solver == "fem-3d" else {"young", "depth"}
-        return [name for name in self.study.varied if name not in factors]
+        names = [name for name in self.study.varied if name not in factors]
+        columns = [self._column(name, [finger[name] for finger in fingers]) for name in names]
+        return np.concatenate([np.zeros((len(fingers), 0)), *columns], axis=1)
 
     def _column(self, name: str, values: Sequence[Value]) -> FloatArray:
         """Inputs of a parameter, with a standard deviation of about one, shape (n, 1) or (n, choices)."""
