@@ -28,6 +28,14 @@ class Sampled:
     force: float
     energy: float
 
+    @classmethod
+    def of(cls, solution: Solution, points: FloatArray) -> Self:
+        """A solution at points (n, 2), mm."""
+        mesh = solution.problem.mesh
+        location = mesh.locate_on(mesh, points)  # which may lie beyond its chords of arcs
+        von_mises = solution.state(location).von_mises
+        return cls(solution.displacement(location), von_mises, solution.force, float(solution.energy))
+
 
 @dataclass(frozen=True, eq=False)
 class Reference:
@@ -50,13 +58,6 @@ class Reference:
             "force": found.force / self.exact.force - 1,
             "energy": found.energy / self.exact.energy - 1,
         }
-
-    def sampled(self, solution: Solution) -> Sampled:
-        """A solution of the problem at the points."""
-        mesh = solution.problem.mesh
-        location = mesh.locate_on(mesh, self.points)  # which may lie beyond its chords of arcs
-        von_mises = solution.state(location).von_mises
-        return Sampled(solution.displacement(location), von_mises, solution.force, float(solution.energy))
 
     @classmethod
     def load(cls, problem: BenchmarkProblem) -> Self:

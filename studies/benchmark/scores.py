@@ -16,7 +16,7 @@ from pinnray.solvers.problem import contact_functional
 from pinnray.solvers.solution import SolidField, Solution
 from pinnray.solvers.solver import Solver, Traits, UnsupportedProblemError, check_problem, solved
 from pinnray.studies.benchmark.problems import BenchmarkProblem
-from pinnray.studies.benchmark.references import Reference
+from pinnray.studies.benchmark.references import Reference, Sampled
 from pinnray.studies.sweep.measurement import Ending, Measurement
 
 USABLE = {"displacement": 0.05, "force": 0.05, "von_mises_away": 0.1}
@@ -69,7 +69,7 @@ def score(task: BenchmarkTask, _report: Callable[..., None]) -> list[Measurement
 
 def figures(solution: Solution, reference: Reference) -> dict[str, Any]:
     """Errors by `MEASURES`, deviations at base and contact, what was claimed, and what of it is not true."""
-    errors = reference.errors(reference.sampled(solution))
+    errors = reference.errors(Sampled.of(solution, reference.points))
     claimed, stroke = claims(solution), float(np.linalg.norm(solution.problem.load.values))
     off = missed(solution)
     broken = broken_claims(solution, errors, claimed, reference)
