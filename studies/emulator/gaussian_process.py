@@ -85,25 +85,16 @@ class GaussianProcess:
         start, count = RBF(np.full(inputs.shape[1], 3.0), (0.05, 1e3)), min(LANDMARKS, len(inputs) // 2)
         fit = likeliest(inputs, (values - mean) / spread, start, landmarks=count, learners=LEARNERS)
         if len(inputs) < FEW and not quick:
-            fit = fit._replace(factor=np.zeros((1, 1)))  # of few, it is no guide to where they err more
-            made, count = cls(inputs / fit.lengths, fit, mean, spread), 0
-            residuals = cls._left_out(inputs, values)
+            fit, count = fit._replace(factor=np.zeros((1, 1))), 0  # few do not tell where they err more
+            residuals, part = np.empty(len(values)), np.arange(len(values)) % FOLDS
+            for out in (part == number for number in range(FOLDS)):
+                process = cls.fitted(inputs[~out], values[~out], quick=True)
+                residuals[out] = values[out] - process.predict(inputs[out])[0]
         else:
-            made = cls(inputs / fit.lengths, fit, mean, spread)
             residuals = spread * fit.left_out
+        made = cls(inputs / fit.lengths, fit, mean, spread)
         ratios = np.abs(residuals[count:]) / made.predict(inputs[count:])[1]
         return replace(made, half=float(calibrated(ratios)))
-
-    @classmethod
-    def _left_out(cls, inputs: FloatArray, values: FloatArray) -> FloatArray:
-        """Residuals of samples, each from a process that is fitted without it, shape (n,)."""
-        residuals = np.empty(len(values))
-        part = np.arange(len(values)) % FOLDS
-        for number in range(FOLDS):
-            out = part == number
-            process = cls.fitted(inputs[~out], values[~out], quick=True)
-            residuals[out] = values[out] - process.predict(inputs[out])[0]
-        return residuals
 
     def predict(self, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Prediction and half width of its interval at inputs of shape (k, d), shape (k,) each."""
