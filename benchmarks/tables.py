@@ -1,11 +1,12 @@
 """Tables of figures: kept as CSV files, and in Markdown between two marks of a page."""
 
-import csv
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar
 
-from pinnray.runtime.atomic import atomic_path, write_text
+import pandas as pd
+
+from pinnray.runtime.atomic import write_text
 
 DOCS = Path(__file__).parents[1] / "docs"
 END = "<!-- end of the table -->\n"
@@ -16,17 +17,14 @@ def kept_rows(path: Path, kind: type[Row]) -> list[Row]:
     """The rows of a CSV file as named tuples; none if there is no file."""
     if not path.exists():
         return []
-    numbers: dict[Any, Callable[[str], Any]] = {int: int, float: float, float | None: _number}
-    readers = [numbers.get(each, str) for each in get_type_hints(kind).values()]
-    with path.open(encoding="utf-8", newline="") as file:
-        lines = list(csv.reader(file))[1:]
-    return [kind(*(read(cell) for read, cell in zip(readers, line, strict=True))) for line in lines]
+    table = pd.read_csv(path, float_precision="round_trip").astype(object)
+    return [kind(*row) for row in table.where(table.notna(), None).to_numpy()]
 
 
 def keep_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
     """Write named tuples as a CSV file; None is an empty cell."""
-    with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([kind._fields, *rows])  # type: ignore[attr-defined]
+    table = pd.DataFrame(rows, columns=kind._fields)  # type: ignore[attr-defined]
+    write_text(path, table.to_csv(index=False, lineterminator="\n"))
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
@@ -57,7 +55,3 @@ def fill(page: Path, name: str, table: str) -> None:
     if not begin:
         raise ValueError(f"{page} has no mark {begin_of(name).strip()}")
     write_text(page, before + begin + table + END + rest.partition(END)[2])
-
-
-def _number(cell: str) -> float | None:
-    return float(cell) if cell else None

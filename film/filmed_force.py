@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import Cell
@@ -50,21 +51,19 @@ def true_forces(
     components = CubicSpline(shares, depth * reactions @ stroke_axes(solution.problem.load).T)
     places = history.get("force_abscissa_mm")
     place = None if places is None else CubicSpline(shares, places)
-    rows: list[dict[str, Cell]] = []
     loads = [recording.load(number) for number in range(len(recording.motion))]
     forces = viscoelastic_forces(components, recording.motion, loss) if loss else components(loads)
-    for number, (load, (force, across)) in enumerate(zip(loads, forces.tolist(), strict=True)):
-        rows.append(
-            {
-                "frame": number,
-                "time_s": number / recording.motion.rate,
-                "load": load,
-                "force_N": force,
-                "tangential_force_N": across,
-                "position_mm": "" if place is None else float(place(load)),
-            }
-        )
-    return rows
+    return [
+        {
+            "frame": number,
+            "time_s": number / recording.motion.rate,
+            "load": load,
+            "force_N": force,
+            "tangential_force_N": across,
+            "position_mm": "" if place is None else float(place(load)),
+        }
+        for number, (load, (force, across)) in enumerate(zip(loads, forces.tolist(), strict=True))
+    ]
 
 
 def viscoelastic_forces(
@@ -102,7 +101,6 @@ def viscoelastic_forces(
 
 def _relaxed(forces: FloatArray, steps: float) -> FloatArray:
     """How much of forces, shape (n, 2), has relaxed, with a time constant of so many of their steps."""
-    kept, decay = np.zeros_like(forces), np.exp(-1 / steps)
-    for number, increment in enumerate(np.diff(forces, axis=0), start=1):
-        kept[number] = decay * kept[number - 1] + steps * (1 - decay) * increment
+    decay, increments = np.exp(-1 / steps), np.diff(forces, axis=0, prepend=forces[:1])
+    kept = lfilter([steps * (1 - decay)], [1, -decay], increments, axis=0)
     return np.asarray(forces - forces[0] - kept)

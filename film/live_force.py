@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from pinnray.film.force_estimate import FrameForce, force_line, force_row
-from pinnray.film.loading_path import Loading, LoadingPath
-from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.film.loading_path import LoadingPath
+from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.identification.tracker import ForceTracker
 from pinnray.vision.frames.frame import Frame
 from pinnray.vision.tracking.frame_tracker import FrameDetections
@@ -62,8 +62,12 @@ class LiveForce:
             self._forces.pop()
             self.passed_over += 1
         tracked = time.perf_counter()
-        answer = self._thread.submit(self._answer, frame, moved, deviations, known, loading, tracked)
-        self._forces.append(answer)
+
+        def answer() -> FrameForce:
+            reading = self._path.widened(self._tracker.update(moved, deviations, known), loading)
+            return FrameForce(frame.number, frame.time, reading, time.perf_counter() - tracked, loading)
+
+        self._forces.append(self._thread.submit(answer))
 
     def newest(self) -> FrameForce | None:
         """The last force that was found; None before there is one."""
@@ -86,19 +90,6 @@ class LiveForce:
         if not self._moves:
             self._sum = self._sum + np.nan_to_num(places)
             self._count = self._count + np.isfinite(places).all(axis=1, keepdims=True)
-
-    def _answer(
-        self,
-        frame: Frame,
-        displacements: FloatArray,
-        deviations: FloatArray,
-        visible: BoolArray,
-        loading: Loading,
-        tracked: float,
-    ) -> FrameForce:
-        """In the thread: the force, for what `ForceTracker.update` takes, known at the time `tracked`, s."""
-        reading = self._path.widened(self._tracker.update(displacements, deviations, visible), loading)
-        return FrameForce(frame.number, frame.time, reading, time.perf_counter() - tracked, loading)
 
 
 def frame_lines(force: LiveForce | None, *, publish: bool) -> Callable[[Frame, FrameDetections], str]:

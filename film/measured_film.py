@@ -1,29 +1,24 @@
 """A film as the source of the markers of a comparison."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from pinnray.comparison.pipeline.job import Measured
 from pinnray.film.film import Film
+from pinnray.film.predicted_frame import predicted_frame
+from pinnray.film.track_film import track_figures, track_film
 from pinnray.geometry.finger.finger import Finger
-
-if TYPE_CHECKING:
-    from pinnray.comparison.pipeline.job import Measured
-    from pinnray.runtime.stages import Stages
+from pinnray.runtime.stages import Stages
 
 
 class MeasuredFilm(Film):
     """A film that is tracked when a comparison begins; see `comparison.pipeline.job.MarkerSource`."""
 
-    def measured(self, design: Finger, folder: Path, stages: "Stages") -> "Measured":
+    def measured(self, design: Finger, folder: Path, stages: Stages) -> Measured:
         """Track the film into the folder `track`; solutions are drawn into a frame of the pressed finger.
 
         Raises:
             UserError: If the film cannot be read or tracked.
         """
-        from pinnray.comparison.pipeline.job import Measured
-        from pinnray.film.predicted_frame import predicted_frame
-        from pinnray.film.track_film import track_figures, track_film
-
         track = folder / "track"
         with stages.stage("track") as progress:
             track.mkdir()

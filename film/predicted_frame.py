@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
@@ -67,14 +66,15 @@ def draw_predictions(comparison: Results, tracking: Tracking, frame: Frame) -> F
             row, column = divmod(number, columns)
             place = (GAP + column * (width + GAP), HEAD + TITLE + row * (TITLE + height + GAP))
             axes = axes_at(drawn, (*place, width, height))
-            axes.imshow(_red_first(image), cmap="gray", vmin=0, vmax=255)
+            axes.imshow(image if image.ndim == 2 else image[..., ::-1], cmap="gray", vmin=0, vmax=255)
             axes.set(xlim=(left, right), ylim=(bottom, top))
             axes.set_axis_off()
             edges = body[comparison.mesh.boundary_edges]
             axes.add_collection(LineCollection(list(edges), colors=BODY, lw=0.7, path_effects=RIM))
             computed = comparison.observations.points + evaluation.shown_displacement
             _markers(axes, tracking.pixels[frame.number], plane.pixels(computed))
-            _name(axes, comparison, evaluation)
+            note = errors_note(comparison.scores[evaluation.solver])
+            axes.set_title(f"{evaluation.label_at_markers}\n{note}", size=SMALL)
         label = f"markers, {comparison.observations.label}"
         handles = [
             Line2D([], [], ls="", marker="o", ms=5, mfc="none", mec=MEASURED, mew=1.1, label=label),
@@ -105,19 +105,9 @@ def _window(pixels: FloatArray, image: Image) -> tuple[FloatArray, FloatArray]:
     return np.clip(low - margin, 0, size - 1), np.clip(high + margin, 0, size - 1)
 
 
-def _red_first(image: Image) -> Image:
-    """The image, grey or coloured, as matplotlib wants it."""
-    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
-
-
 def _markers(axes: Axes, seen: FloatArray, computed: FloatArray) -> None:
     """The markers of the frame, and those of a solver, shape (m, 2), pixels."""
     for size, colour in ((2.0, "white"), (1.1, MEASURED)):
         axes.plot(*seen.T, "o", ms=5, mfc="none", mec=colour, mew=size)
     for size, colour in ((2.0, "white"), (0.9, INK)):
         axes.plot(*computed.T, "x", ms=4, color=colour, mew=size)
-
-
-def _name(axes: Axes, comparison: Results, evaluation: Evaluation) -> None:
-    note = errors_note(comparison.scores[evaluation.solver])
-    axes.set_title(f"{evaluation.label_at_markers}\n{note}", size=SMALL)

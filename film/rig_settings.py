@@ -59,7 +59,7 @@ class RigSettings(CheckedModel):
         """
         from pinnray.vision.calibration.camera_file import load_camera
         from pinnray.vision.rig.virtual_camera import default_camera, viewing_pose
-        from pinnray.vision.tracking.workspace import Workspace, default_workspace
+        from pinnray.vision.tracking.workspace import default_workspace
 
         if not (found := re.fullmatch(r"(\d{2,4})x(\d{2,4})", self.frame.strip())):
             raise UserError(f"frame {self.frame}: give width and height in pixels, such as 1280x720")
@@ -69,7 +69,6 @@ class RigSettings(CheckedModel):
                 f"frames of {camera.width}x{camera.height} pixels; the rig makes up to "
                 f"{MOST_PIXELS // 1_000_000} million"
             )
-        around = default_workspace(finger).model_dump()
-        workspace = Workspace(**{**around, "marker_plane": self.marker_plane})
+        workspace = default_workspace(finger).model_copy(update={"marker_plane": self.marker_plane})
         pose = viewing_pose(camera, workspace, tilt=self.tilt, direction=self.tilt_direction, turn=self.turn)
         return workspace, camera, pose

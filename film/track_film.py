@@ -69,16 +69,10 @@ def track_film(
             raise UserError(
                 f"fps {film.fps:g}: {frames.name} says {frames.rate:g} frames a second itself; leave it out"
             )
-        write = None
+        comment, write = RIG_MARK if frames.simulated else "", None
         if video:
-            write = stack.enter_context(
-                video_writer(
-                    folder / "annotated.mp4",
-                    frames.size,
-                    frames.rate,
-                    comment=RIG_MARK if frames.simulated else "",
-                )
-            )
+            file = folder / "annotated.mp4"
+            write = stack.enter_context(video_writer(file, frames.size, frames.rate, comment=comment))
 
         def see(frame: Frame, detections: FrameDetections) -> None:
             nonlocal farthest
@@ -104,9 +98,8 @@ def track_film(
         frame, detections = kept[name]
         trajectories = list(tracking.pixels.swapaxes(0, 1)) if name == "final" else []
         lines = [f"{name}: frames {end.start} to {end.stop - 1} are at rest", *tracking.warnings]
-        write_picture(
-            folder / f"{name}.png", annotated(frame.image, detections, lines, trajectories=trajectories)
-        )
+        picture = annotated(frame.image, detections, lines, trajectories=trajectories)
+        write_picture(folder / f"{name}.png", picture)
     write_measurements(folder / "observations.csv", observations)
     write_csv(folder / "tracks.csv", track_rows(tracking))
     write_json(folder / "track.json", track_summary(tracking, observations) | film.provenance())
@@ -167,9 +160,8 @@ def track_table(tracking: Tracking, observations: Observations) -> Table:
     for number, (x, y) in enumerate(observations.points):
         cells = [NONE, NONE]
         if observations.visible[number]:
-            pairs = zip(
-                observations.displacements[number], observations.standard_deviations[number], strict=True
-            )
+            moved, deviations = observations.displacements[number], observations.standard_deviations[number]
+            pairs = zip(moved, deviations, strict=True)
             cells = [f"{value:.4f} ±{significant(deviation, 2)}" for value, deviation in pairs]
         rows.append([str(number + 1), f"{x:.3f}", f"{y:.3f}", *cells, str(frames[number])])
     return terminal_table(

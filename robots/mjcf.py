@@ -48,52 +48,42 @@ def chain_mjcf(name: str, chain: Chain, springs: Springs, wall: float, depth: fl
         depth: Of the finger, mm.
         damping: Its loss factor.
     """
-    root = _model(name, "implicitfast")
-    parent = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="finger")
-    for link, step in enumerate(np.diff(chain.points, axis=0)):
+    root, starts = _model(name, "implicitfast"), chain.points.copy()
+    starts[0] = 0.0  # link 0 is part of the finger
+    parent = _add(_add(root, "worldbody"), "body", name="finger")
+    for link, (start, step) in enumerate(zip(starts, np.diff(chain.points, axis=0), strict=False)):
         if link:
-            start = chain.points[link]
-            at = start if link == 1 else start - chain.points[link - 1]
-            parent = ET.SubElement(parent, "body", name=f"link{link}", pos=_text([*at, 0]))
+            parent = _add(parent, "body", name=f"link{link}", pos=[*start - starts[link - 1], 0])
             if link == 1:
-                ET.SubElement(parent, "joint", name="slide", type="slide", axis=_text([*chain.axis, 0]))
-            ET.SubElement(parent, "joint", name=f"hinge{link}", type="hinge", axis="0 0 1")
-        else:
-            start = np.zeros(2)
+                _add(parent, "joint", name="slide", type="slide", axis=[*chain.axis, 0])
+            _add(parent, "joint", name=f"hinge{link}", type="hinge", axis="0 0 1")
         mass, turning = chain.masses[link], chain.inertias[link]
-        across = mass * (MM * depth) ** 2 / 12
-        ET.SubElement(
-            parent,
-            "inertial",
-            pos=_text([*chain.centres[link] - start, 0]),
-            mass=_text(mass),
-            # How a slice's inertia in the plane is shared between x and y matters to no hinge.
-            diaginertia=_text([turning / 2 + across, turning / 2 + across, turning]),
-        )
+        # How a slice's inertia in the plane is shared between x and y matters to no hinge.
+        beside = turning / 2 + mass * (MM * depth) ** 2 / 12
+        centre = [*chain.centres[link] - start, 0]
+        _add(parent, "inertial", pos=centre, mass=mass, diaginertia=[beside, beside, turning])
         length, half = float(np.linalg.norm(step)), MM * wall / 2
         inward = np.array([step[1], -step[0]]) / length
-        ET.SubElement(
+        _add(
             parent,
             "geom",
-            HARD,
+            **HARD,
             name=f"front{link}",
             type="box",
-            pos=_text([*chain.points[link] - start + step / 2 + half * inward, 0]),
-            size=_text([length / 2, half, MM * depth / 2]),
-            euler=_text([0, 0, np.arctan2(step[1], step[0])]),
+            pos=[*chain.points[link] - start + step / 2 + half * inward, 0],
+            size=[length / 2, half, MM * depth / 2],
+            euler=[0, 0, np.arctan2(step[1], step[0])],
             rgba=BODY_COLOUR,
         )
     # Neighbours overlap where they turn, and MuJoCo excludes no pair with a body that is fixed.
-    ET.SubElement(ET.SubElement(root, "contact"), "exclude", body1="finger", body2="link1")
-    tendons = ET.SubElement(root, "tendon")
+    _add(_add(root, "contact"), "exclude", body1="finger", body2="link1")
+    tendons = _add(root, "tendon")
     dampings = damping.loss_factor * springs.stiffnesses / springs.frequencies
     joints = ["slide", *(f"hinge{link}" for link in range(1, chain.hinges + 1))]
     for row, stiffness, resistance in zip(springs.rows, springs.stiffnesses, dampings, strict=True):
-        tendon = ET.SubElement(
-            tendons, "fixed", springlength="0", stiffness=_text(stiffness), damping=_text(resistance)
-        )
+        tendon = _add(tendons, "fixed", springlength=0, stiffness=stiffness, damping=resistance)
         for joint, coefficient in zip(joints, row, strict=True):
-            ET.SubElement(tendon, "joint", joint=joint, coef=_text(coefficient))
+            _add(tendon, "joint", joint=joint, coef=coefficient)
     return _written(root)
 
 
@@ -109,21 +99,19 @@ def gripper_mjcf(name: str, chain: str, place: FloatArray, radius: float, depth:
         stroke: How far each carriage moves beyond the first touch, mm.
     """
     root = _model(name, "implicitfast", STEP / 2)  # a held object shakes loose in whole ones
-    ET.SubElement(ET.SubElement(root, "asset"), "model", name="finger", file=chain)
-    world, drives = ET.SubElement(root, "worldbody"), ET.SubElement(root, "actuator")
+    _add(_add(root, "asset"), "model", name="finger", file=chain)
+    world, drives = _add(root, "worldbody"), _add(root, "actuator")
     for side, sign, turn in (("left", -1, 0.0), ("right", 1, np.pi)):
         away = sign * (radius + place[1] + CLEARANCE)
-        body = ET.SubElement(
-            world, "body", name=side, pos=_text([0, MM * away, 0]), euler=_text([turn, 0, 0])
-        )
-        ET.SubElement(body, "joint", name=side, type="slide", axis="0 1 0", armature=CARRIAGE)
-        ET.SubElement(body, "attach", model="finger", body="finger", prefix=f"{side}-")
-        reach = _text([0, MM * (stroke + CLEARANCE)])
-        ET.SubElement(drives, "position", DRIVE, name=side, joint=side, ctrlrange=reach)
-    body = ET.SubElement(world, "body", name="object", pos=_text([MM * place[0], 0, 0]))
-    ET.SubElement(body, "freejoint")
-    size = _text([MM * radius, MM * depth / 2])
-    ET.SubElement(body, "geom", HARD, name="object", type="cylinder", size=size, density="1000")
+        body = _add(world, "body", name=side, pos=[0, MM * away, 0], euler=[turn, 0, 0])
+        _add(body, "joint", name=side, type="slide", axis="0 1 0", armature=CARRIAGE)
+        _add(body, "attach", model="finger", body="finger", prefix=f"{side}-")
+        reach = [0, MM * (stroke + CLEARANCE)]
+        _add(drives, "position", **DRIVE, name=side, joint=side, ctrlrange=reach)
+    body = _add(world, "body", name="object", pos=[MM * place[0], 0, 0])
+    _add(body, "freejoint")
+    size = [MM * radius, MM * depth / 2]
+    _add(body, "geom", **HARD, name="object", type="cylinder", size=size, density=1000)
     return _written(root)
 
 
@@ -138,29 +126,15 @@ def flex_mjcf(name: str, body: SolidMesh, material: Material, density: float, da
         damping: Its loss factor at the first vibration.
     """
     root = _model(name, "discrete")
-    ET.SubElement(root, "size", memory="256M")
-    finger = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="finger")
-    flex = ET.SubElement(
-        finger,
-        "flexcomp",
-        name="flex",
-        type="direct",
-        dim="3",
-        radius="0",
-        mass=_text(density * body.volume),
-        point=_text(body.points),
-        element=_text(body.tetrahedra),
-        rgba=BODY_COLOUR,
-    )
-    ET.SubElement(flex, "contact", HARDER, selfcollide="none")
-    ET.SubElement(
-        flex,
-        "elasticity",
-        young=_text(1e6 * material.young),
-        poisson=_text(material.poisson),
-        damping=_text(damping.loss_factor / damping.frequency),
-    )
-    ET.SubElement(flex, "pin", id=_text(body.nodes_on("base")))
+    _add(root, "size", memory="256M")
+    finger, mass = _add(_add(root, "worldbody"), "body", name="finger"), density * body.volume
+    kind = {"name": "flex", "type": "direct", "dim": "3", "radius": "0"}
+    cells = {"point": body.points, "element": body.tetrahedra}
+    flex = _add(finger, "flexcomp", **kind, mass=mass, **cells, rgba=BODY_COLOUR)
+    _add(flex, "contact", **HARDER, selfcollide="none")
+    resistance = damping.loss_factor / damping.frequency
+    _add(flex, "elasticity", young=1e6 * material.young, poisson=material.poisson, damping=resistance)
+    _add(flex, "pin", id=body.nodes_on("base"))
     return _written(root)
 
 
@@ -172,8 +146,8 @@ def with_header(text: str, lines: Sequence[str]) -> str:
 
 def _model(name: str, integrator: str, step: float = STEP) -> ET.Element:
     root = ET.Element("mujoco", model=name)
-    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-    ET.SubElement(root, "option", timestep=_text(step), integrator=integrator, gravity="0 0 0")
+    _add(root, "compiler", angle="radian", autolimits="true")
+    _add(root, "option", timestep=step, integrator=integrator, gravity="0 0 0")
     return root
 
 
@@ -182,6 +156,10 @@ def _written(root: ET.Element) -> str:
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _text(values: ArrayLike) -> str:
-    found: FloatArray = np.asarray(values)
-    return " ".join(f"{value:.9g}" for value in found.ravel())
+def _add(parent: ET.Element, tag: str, **values: ArrayLike) -> ET.Element:
+    """A new element in another one, with words, numbers and arrays as its attributes."""
+    texts = {
+        name: each if isinstance(each, str) else " ".join(f"{value:.9g}" for value in np.ravel(each))
+        for name, each in values.items()
+    }
+    return ET.SubElement(parent, tag, texts)

@@ -5,8 +5,8 @@ Needs the extra `robots`: MuJoCo 4, whose earlier versions have other elastic co
 
 import importlib.util
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -121,7 +121,9 @@ def pressed_in_mujoco(model: Model, load: Press, radius: float, depth: float, re
         solref=[float(each) for each in HARDER["solref"].split()],
         solimp=[*(float(each) for each in HARDER["solimp"].split()), 0.5, 2],
     )
-    with _silent_warnings():
+    with ExitStack() as stack:  # MuJoCo writes no MUJOCO_LOG.TXT: `FAULTS` are counted
+        stack.callback(mujoco.set_mju_user_warning, mujoco.get_mju_user_warning())
+        mujoco.set_mju_user_warning(lambda text: None)
         compiled = spec.compile()
         data = mujoco.MjData(compiled)
         step = compiled.opt.timestep
@@ -160,16 +162,3 @@ def _force(model: Any, data: Any) -> FloatArray:
         pushed = contact.frame.reshape(3, 3).T @ wrench[:3]  # by the first one on the second
         total += pushed if contact.geom[0] == model.ngeom - 1 else -pushed
     return total[:2]
-
-
-@contextmanager
-def _silent_warnings() -> Iterator[None]:
-    """Keep MuJoCo from writing MUJOCO_LOG.TXT; `FAULTS` are counted, others do not change the forces."""
-    import mujoco
-
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)

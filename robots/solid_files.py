@@ -1,7 +1,6 @@
 """Files of the extruded body for other programs: VTK and STL, in metres, and its material."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyvista
@@ -25,7 +24,7 @@ def write_solid(out: Path, body: SolidMesh) -> tuple[Path, Path]:
 
 def write_material(path: Path, material: Material, density: float, loss_factor: float) -> None:
     """Write the material in SI units; the loss factor is stated, not measured."""
-    content: dict[str, Any] = {
+    content = {
         "schema": 1,
         "length_unit": "m",
         "young_Pa": 1e6 * material.young,

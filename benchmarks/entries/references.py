@@ -3,6 +3,7 @@
 Their error is bounded by the difference between two meshes: it falls at least in proportion to the elements.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,12 +40,10 @@ def main(rows: str = "") -> Table:
         if rows in problem.name:
             made = make_reference(problem)
             save(made, problem.reference_file)
-            cells.append(
-                (problem.name, str(len(made.points)), *(f"{made.bounds[name]:.1e}" for name in MEASURES))
-            )
-    return terminal_table(
-        "Bounds of the references' errors", ("problem", "points", *MEASURES), cells, left=["problem"]
-    )
+            bounds = (f"{made.bounds[name]:.1e}" for name in MEASURES)
+            cells.append((problem.name, str(len(made.points)), *bounds))
+    headings = ("problem", "points", *MEASURES)
+    return terminal_table("Bounds of the references' errors", headings, cells, left=["problem"])
 
 
 def make_reference(problem: BenchmarkProblem) -> Reference:
@@ -58,13 +57,9 @@ def make_reference(problem: BenchmarkProblem) -> Reference:
     points = unpacked(*packed(rule.location.points))
     singular = np.concatenate([singular_points(fine.problem.mesh), _touched(fine)])
     away = cKDTree(singular).query(points)[0] > mean_thickness(fine.problem.mesh)
-    unknown = Sampled(np.empty(0), np.empty(0), 0.0, 0.0)
-    place = Reference(points, rule.weights, away, unknown)
-    reference = Reference(points, rule.weights, away, place.sampled(fine))
-    errors = reference.errors(place.sampled(coarse))
-    return Reference(
-        points, rule.weights, away, reference.exact, {name: abs(value) for name, value in errors.items()}
-    )
+    reference = Reference(points, rule.weights, away, Sampled.of(fine, points))
+    errors = reference.errors(Sampled.of(coarse, points))
+    return replace(reference, bounds={name: abs(value) for name, value in errors.items()})
 
 
 def _graded(problem: BenchmarkProblem, sizes: dict[str, float]) -> Solution:

@@ -132,7 +132,7 @@ def trial(line: str, expected: dict[str, str], fault: Fault, folder: Path) -> li
     hit = started(line, folder, fault)
     wrong = {
         "the point was not reached": len(hit.points) <= fault.at,
-        f"{hit.orphans} processes were left over": hit.orphans > 0,
+        "processes were left over": hit.orphans,
         "the output folder holds neither the last result nor the new": command in REPLACING
         and numbers(out) not in (before, expected),
     }

@@ -19,11 +19,8 @@ CUT = "cut off"
 
 def numbers(folder: Path) -> dict[str, str]:
     """By path a digest of the numbers in every file of a folder, "" for pages and pictures, or `CUT`."""
-    found = {}
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and not path.name.startswith("."):
-            found[path.relative_to(folder).as_posix()] = _digest(path)
-    return found
+    files = (path for path in sorted(folder.rglob("[!.]*")) if path.is_file())
+    return {path.relative_to(folder).as_posix(): _digest(path) for path in files}
 
 
 def _digest(path: Path) -> str:

@@ -72,7 +72,7 @@ class Ending(NamedTuple):
     code: int  # of its exit; the negative number of the signal that ended it
     text: str  # standard output and error, also of its children
     points: tuple[Point, ...]  # the changes of files that it had begun
-    orphans: int  # processes that were still there `PATIENCE_S` after its end
+    orphans: bool  # whether processes were still there `PATIENCE_S` after its end
 
 
 def supervised(
@@ -159,7 +159,7 @@ class _Supervisor:
         poll = select.poll()
         poll.register(self.listener, select.POLLIN)
         code: int | None = None
-        left = 0
+        left = False
         while True:
             events = poll.poll(50)
             if events and events[0][1] & select.POLLIN:
@@ -174,19 +174,11 @@ class _Supervisor:
                 os.kill(self.child, signal.SIGKILL)
                 limit += PATIENCE_S
             elif time.monotonic() > limit:
-                left = self._end_all()
+                left = True
+                with suppress(ProcessLookupError):  # they may have ended just now
+                    os.killpg(self.child, signal.SIGKILL)
                 break
         return Ending(code, log.read_text(errors="replace"), tuple(self.points), left)
-
-    def _end_all(self) -> int:
-        """Kill what is left of the child's session, and return the number of processes."""
-        left = 0
-        for entry in Path("/proc").glob("[0-9]*"):
-            with suppress(OSError, ValueError):
-                if os.getsid(int(entry.name)) == self.child:
-                    os.kill(int(entry.name), signal.SIGKILL)
-                    left += 1
-        return left
 
     def _serve(self) -> None:
         received = ctypes.create_string_buffer(80)
@@ -242,17 +234,13 @@ class _Supervisor:
         return None if own else 0
 
 
-def _memory(task: int, address: int, length: int) -> bytes:
-    with open(f"/proc/{task}/mem", "rb", buffering=0) as memory:
-        memory.seek(address)
-        return memory.read(length)
-
-
 def _text(task: int, address: int) -> str:
     """The text that ends with a zero at an address; read page by page, because the next may be missing."""
     found = b""
-    while b"\0" not in found:
-        found += _memory(task, address + len(found), 4096 - (address + len(found)) % 4096)
+    with open(f"/proc/{task}/mem", "rb", buffering=0) as memory:
+        memory.seek(address)
+        while b"\0" not in found:
+            found += memory.read(4096 - memory.tell() % 4096)
     return os.fsdecode(found.partition(b"\0")[0])
 
 

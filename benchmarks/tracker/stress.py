@@ -92,7 +92,7 @@ class Case:
 class Bumped(Recording):
     """A film whose camera is in another place once the finger is no longer at rest."""
 
-    after: Pose
+    after: Recording  # From the other place
 
     def frames(self) -> Iterator[tuple[Image, FrameTruth]]:
         """The frames in order, each with its truth."""
@@ -100,9 +100,7 @@ class Bumped(Recording):
 
     def frame(self, number: int) -> tuple[Image, FrameTruth]:
         """One frame."""
-        pose = self.pose if number < self.motion.rest else self.after
-        settings = {name: value for name, value in vars(self).items() if name != "after"}
-        return Recording(**settings | {"pose": pose}).frame(number)
+        return super().frame(number) if number < self.motion.rest else self.after.frame(number)
 
 
 CORNER = Case(exposure={"noise": 6, "blur": 1.5, "gradient": 0.3}, tilt=5)
@@ -207,8 +205,8 @@ def filmed(case: Case, finger: Finger, number: int) -> Recording:
     if not case.bumped:
         return recording
     turn, shift = np.radians((0.1, -0.1, 0.2)), (0.5, -0.3, 0.4)  # mm
-    after = Pose(recording.pose.rotation + turn, recording.pose.translation + shift)
-    return Bumped(**vars(recording), after=after)
+    pose = Pose(recording.pose.rotation + turn, recording.pose.translation + shift)
+    return Bumped(**vars(recording), after=replace(recording, pose=pose))
 
 
 def seen(case: Case, recording: Recording, methods: Sequence[DetectionMethod] = METHODS) -> Outcome:

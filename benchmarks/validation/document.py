@@ -23,12 +23,13 @@ from benchmarks.validation.markers import (
     Frame,
     Run,
     frames,
+    length,
     measured,
     moved_feet,
     read_runs,
 )
 from benchmarks.validation.picture import side_view
-from benchmarks.validation.study import Outcome, all_cases, length, predict, young_modulus
+from benchmarks.validation.study import Outcome, all_cases, predict, young_modulus
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.atomic import write_text
 from pinnray.runtime.tables import terminal_table

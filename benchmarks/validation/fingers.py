@@ -8,6 +8,7 @@ import shapely
 
 import pinnray as pr
 from benchmarks.tables import markdown
+from benchmarks.validation.markers import length
 from benchmarks.validation.printed_finger import FINGERS, FRICTION, RADIUS, PrintedFinger
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import nearest_similarity
@@ -60,16 +61,11 @@ class Experiment:
         places = self.places(solution)
         pressed = self.seen.points + self.seen.displacements
         free = nearest_similarity(pressed, places, rigid=True).moved(pressed)
-        return distance(pressed - places), distance(free - places)
+        return length(pressed - places), length(free - places)
 
     def places(self, solution: Solution) -> FloatArray:
         """Where a solution has the points, shape (m, 2), mm."""
         return self.seen.points + solution.displacement(self.seen.points)
-
-
-def distance(vectors: FloatArray) -> float:
-    """Root mean square length of vectors of shape (m, 2)."""
-    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
 
 
 def of_fingers() -> tuple[dict[str, str], dict[str, Figure]]:
@@ -77,14 +73,14 @@ def of_fingers() -> tuple[dict[str, str], dict[str, Figure]]:
     forward, held_out, forces, pictures = [], [], [], {}
     for finger in FINGERS:
         experiment = Experiment(finger)
-        moved = distance(experiment.seen.displacements)
+        moved = length(experiment.seen.displacements)
         noise = float(experiment.seen.standard_deviations[0, 0]) * np.sqrt(2)
         smooth, rough = (experiment.predicted(friction) for friction in (0.0, FRICTION))
         misses = (*experiment.misses(smooth), *experiment.misses(rough))
         forward.append((finger.name, *(f"{value:.2f}" for value in (moved, noise, finger.authors, *misses))))
         solutions = {solver: experiment.left_out(solver) for solver in SOLVERS}
         away = {
-            name: distance(each.left_out - experiment.seen.displacements)
+            name: length(each.left_out - experiment.seen.displacements)
             for name, each in solutions.items()
             if each.left_out is not None
         }

@@ -135,3 +135,8 @@ def turned_offsets(deformation: Deformation) -> FloatArray:
         around = foot + patch
         turned.append(rigid_fit(around, around + deformation.at(around)).rotation @ offset)
     return np.array(turned)
+
+
+def length(vectors: FloatArray) -> float:
+    """Root mean square of the lengths of vectors of shape (n, d)."""
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from benchmarks.validation import comsol
 from benchmarks.validation.half_beam import Deformation, HalfBeam
-from benchmarks.validation.markers import LOADS, NOMINAL, marker_places, turned_offsets
+from benchmarks.validation.markers import LOADS, NOMINAL, length, marker_places, turned_offsets
 from pinnray.runtime.arrays import FloatArray
 
 KNOWN = "gravity"
@@ -52,11 +52,6 @@ class Outcome:
         """The same as `error` for COMSOL's places, with the markers' offsets turned as in this model."""
         theirs = comsol.PLACES[case] + turned_offsets(self.deformations[case])
         return length(theirs - self.measured[case].mean(axis=0))
-
-
-def length(vectors: FloatArray) -> float:
-    """Root mean square of the lengths of vectors of shape (n, 3)."""
-    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
 
 
 def predict(beam: HalfBeam, measured: Mapping[str, FloatArray], *, tilt: float = 0.0) -> Outcome:

@@ -3,11 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from secrets import token_hex
 
 import pandas as pd
 
-from pinnray.runtime.content_hash import content_hash, has_source, sources_digest
+from pinnray.runtime.content_hash import content_hash, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import machine, package_versions
 from pinnray.runtime.notebook import brief
@@ -19,7 +18,7 @@ from pinnray.studies.benchmark.entry import Entry, EntryRow, label_of, load_entr
 from pinnray.studies.benchmark.problems import ProblemSet, problem_set
 from pinnray.studies.benchmark.scores import BenchmarkTask, score
 from pinnray.studies.sweep.measurement import Measurement
-from pinnray.studies.sweep.store import Journal, resumed
+from pinnray.studies.sweep.store import Journal, class_of, resumed
 from pinnray.studies.sweep.sweep import OUT_OF_TIME, run_tasks
 
 DEFINITION = "definition.json"
@@ -152,9 +151,7 @@ def _scored(
     solver: Solver, label: str, problems: ProblemSet, journal: Journal, progress: Progress, time_limit: float
 ) -> dict[str, Measurement]:
     """The results of a solver by problem."""
-    kind = type(solver)
-    source = sources_digest(kind.__module__) if has_source(kind.__module__) else token_hex()
-    digest = content_hash([kind.__module__, kind.__qualname__, source, solver.settings()])[:16]
+    digest = content_hash([*class_of(solver), solver.settings()])[:16]
     names = {each.name: f"{label}, {each.name}, {digest}" for each in problems.problems}
     tasks = {names[each.name]: BenchmarkTask(names[each.name], solver, each) for each in problems.problems}
     found = _run(tasks, journal, progress, time_limit)

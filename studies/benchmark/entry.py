@@ -34,11 +34,6 @@ class EntryRow:
     claimed: dict[str, float | bool] = field(default_factory=dict)
     broken: list[str] = field(default_factory=list)  #: Claims that are not true
 
-    @property
-    def solved(self) -> bool:
-        """Whether there is a result to score."""
-        return self.displacement is not None
-
 
 @dataclass(frozen=True)
 class Entry:
@@ -53,11 +48,6 @@ class Entry:
     rows: list[EntryRow]
     note: str = ""  #: What differs from its authors' settings
     schema: int = SCHEMA
-
-    @property
-    def solved(self) -> dict[str, EntryRow]:
-        """The rows with a result by problem."""
-        return {row.problem: row for row in self.rows if row.solved}
 
     @property
     def file_name(self) -> str:

@@ -40,7 +40,7 @@ LAWS = {True: "linear", False: "finite strain"}
 
 def write_benchmark(found: Benchmark, folder: Path, record: Mapping[str, Any]) -> list[Path]:
     """Write the page, its picture and the table of all figures; returns the paths."""
-    tables = [summary_table(found), *problem_tables(found)]
+    tables = [problem_table(problem, found.entries) for problem in found.problems.problems]
     write_text(folder / FIGURES, found.table().to_csv(index=False, lineterminator="\n", float_format="%.6g"))
     caption = (
         "Median error over median time; the numbers are those of the table below. Line: the front, which no "
@@ -50,7 +50,7 @@ def write_benchmark(found: Benchmark, folder: Path, record: Mapping[str, Any]) -
         folder / PAGE,
         "Solvers on the benchmark",
         sentences(found),
-        [broken_table(found), *tables],
+        [broken_table(found), summary_table(found), *tables],
         {"front": (draw_front(found), caption)},
         f"{FIGURES}, {ENTRIES}/*.json (an entry each, to send in). Started {record['started']}.",
     )
@@ -98,15 +98,12 @@ def summary_table(found: Benchmark) -> TextTable:
             rows.append((number, entry, law, *counts, *figures, f"{each['broken']:.0f}"))
     headings = ("no.", "entry", "law", "solved", "con-\nverged", *COLUMNS, "broken\nclaims")
     title = "Medians over the problems of each law that an entry solved"
-    return TextTable(title, headings, rows, f"{MEANINGS} {_notes(found.entries)}", left=("entry", "law"))
+    notes = " ".join(f"{entry.label}: {entry.note}" for entry in found.entries if entry.note)
+    return TextTable(title, headings, rows, f"{MEANINGS} {notes}", left=("entry", "law"))
 
 
-def problem_tables(found: Benchmark) -> list[TextTable]:
-    """A table for each problem, with the bound of the reference's error and the reasons of failures."""
-    return [_problem_table(problem, found.entries) for problem in found.problems.problems]
-
-
-def _problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextTable:
+def problem_table(problem: BenchmarkProblem, entries: Sequence[Entry]) -> TextTable:
+    """A problem's figures, with the bound of the reference's error and the reasons of failures."""
     rows = [(each.label, next(row for row in each.rows if row.problem == problem.name)) for each in entries]
     shown = [(label, row) for label, row in rows if row.state != "refused"]
     texts = figure_texts([vars(row) for _, row in shown], Reference.load(problem).bounds)
@@ -138,7 +135,3 @@ def figure_texts(rows: Sequence[Mapping[str, Any]], bounds: Mapping[str, float])
         bound = shown(bounds[figure]).replace("+", "") if figure in bounds else NONE
         columns.append([bound, *(marked if near.sum() > 1 else texts)])
     return [list(row) for row in zip(*columns, strict=True)]
-
-
-def _notes(entries: Sequence[Entry]) -> str:
-    return " ".join(f"{entry.label}: {entry.note}" for entry in entries if entry.note)

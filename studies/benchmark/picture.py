@@ -35,7 +35,7 @@ def draw_front(found: Benchmark, page: float = WIDTH) -> Figure:
     with figure(height, page) as drawn:
         write_heading(drawn, "Accuracy over cost", f"{len(found.problems.problems)} problems")
         spaces = {**room, "hspace": 0.12, "wspace": 0.06}
-        grid = drawn.subplots(len(SHOWN), 2, sharex=True, sharey="row", gridspec_kw=spaces)
+        grid, numbered = drawn.subplots(len(SHOWN), 2, sharex=True, sharey="row", gridspec_kw=spaces), []
         for (name, words), row in zip(SHOWN.items(), grid, strict=True):
             row[0].set_ylabel(words)
             for axes, linear in zip(row, (True, False), strict=True):
@@ -51,14 +51,12 @@ def draw_front(found: Benchmark, page: float = WIDTH) -> Figure:
                 whole, sure = (known[["solved", "converged"]] == count).to_numpy().T
                 best = costs[whole][unbeaten(costs[whole])]
                 axes.step(*best[best[:, 0].argsort()].T, where="post", color=MUTED, lw=1.0, zorder=1)
+                numbered.append((axes, [labels.index(label) + 1 for label, _ in known.index], costs))
                 for (label, _), point, filled in zip(known.index, costs, sure, strict=True):
                     colour, mark = looks[label]
                     axes.plot(*point, mark, color=colour, mfc=colour if filled else "white", ms=5)
-        for (name, _), row in zip(SHOWN.items(), grid, strict=True):  # at the last limits of the axes
-            for axes, linear in zip(row, (True, False), strict=True):
-                known = medians[medians.index.get_level_values("linear") == linear].dropna()
-                numbers = [labels.index(label) + 1 for label, _ in known.index]
-                _write_numbers(axes, numbers, known[["times_fem", name]].to_numpy() * [1.0, 100.0])
+        for each in numbered:  # at the last limits of the axes
+            _write_numbers(*each)
         for top, bottom, law in zip(grid[0], grid[-1], ("linear", "finite strain"), strict=True):
             top.set_title(law)
             bottom.set_xlabel("time, multiples of fem's")

@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from pinnray.comparison.evaluation.differences import relative_l2
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.solution import Solution
@@ -27,6 +28,14 @@ class Sampled:
     force: float
     energy: float
 
+    @classmethod
+    def of(cls, solution: Solution, points: FloatArray) -> Self:
+        """A solution at points (n, 2), mm."""
+        mesh = solution.problem.mesh
+        location = mesh.locate_on(mesh, points)  # which may lie beyond its chords of arcs
+        von_mises = solution.state(location).von_mises
+        return cls(solution.displacement(location), von_mises, solution.force, float(solution.energy))
+
 
 @dataclass(frozen=True, eq=False)
 class Reference:
@@ -41,25 +50,14 @@ class Reference:
     def errors(self, found: Sampled) -> dict[str, float]:
         """Relative errors by `MEASURES`: L2 norms over the body, force and energy with their signs."""
         return {
-            "displacement": self._l2(found.displacement, self.exact.displacement),
-            "von_mises": self._l2(found.von_mises, self.exact.von_mises),
-            "von_mises_away": self._l2(found.von_mises, self.exact.von_mises, self.away),
+            "displacement": relative_l2(found.displacement, self.exact.displacement, self.weights),
+            "von_mises": relative_l2(found.von_mises, self.exact.von_mises, self.weights),
+            "von_mises_away": relative_l2(
+                *(values[self.away] for values in (found.von_mises, self.exact.von_mises, self.weights))
+            ),
             "force": found.force / self.exact.force - 1,
             "energy": found.energy / self.exact.energy - 1,
         }
-
-    def sampled(self, solution: Solution) -> Sampled:
-        """A solution of the problem at the points."""
-        mesh = solution.problem.mesh
-        location = mesh.locate_on(mesh, self.points)  # which may lie beyond its chords of arcs
-        von_mises = solution.state(location).von_mises
-        return Sampled(solution.displacement(location), von_mises, solution.force, float(solution.energy))
-
-    def _l2(self, found: FloatArray, exact: FloatArray, where: BoolArray | slice = slice(None)) -> float:
-        weights = self.weights[where]
-        rows = (values[where].reshape(len(weights), -1) for values in (found - exact, exact))
-        error, size = (float(weights @ (each**2).sum(axis=1)) for each in rows)
-        return float(np.sqrt(error / size))
 
     @classmethod
     def load(cls, problem: BenchmarkProblem) -> Self:

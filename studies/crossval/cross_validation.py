@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from secrets import token_hex
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.geometry.observations import Observations
 from pinnray.geometry.picture_frame import FIXED
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.content_hash import content_hash, has_source, sources_digest
+from pinnray.runtime.content_hash import content_hash
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.runtime.processes.child import ProcessFailed
@@ -32,7 +31,7 @@ from pinnray.studies.crossval.scores import Sample, left_out_table
 from pinnray.studies.crossval.study import CrossvalStudy, of_draw, visible_markers
 from pinnray.studies.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from pinnray.studies.sweep.measurement import Measurement
-from pinnray.studies.sweep.store import resumed
+from pinnray.studies.sweep.store import class_of, resumed
 from pinnray.studies.sweep.sweep import run_tasks
 
 DEFINITION = "definition.json"
@@ -151,11 +150,10 @@ def _noisy(
         return Observations(
             points=points,
             displacements=shown + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
-            standard_deviations=np.full_like(true, study.noise),
-            visible=np.ones(len(true), dtype=bool),
+            standard_deviations=study.noise,
             source=f"{source}, with {study.noise:g} mm of noise",
             simulated=True,
-            solid=study.chosen_truths[truth].solid,
+            solid=own.solid,
             marker_radius=study.design.marker_radius,
             pressed=known,
         )
@@ -187,9 +185,7 @@ def _samples(
 
 def _digests(solver: Solver, seeds: int) -> list[str]:
     """Digests of a solver's class, source and settings; other ones each time if the class has no source."""
-    kind = type(solver)
-    source = sources_digest(kind.__module__) if has_source(kind.__module__) else token_hex()
-    own = [kind.__module__, kind.__qualname__, source]
+    own = class_of(solver)
     return [content_hash([*own, of_draw(solver, seed).settings()]) for seed in range(seeds)]
 
 

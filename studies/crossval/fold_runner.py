@@ -71,7 +71,6 @@ def run_folds(task: SolverTask, report: Callable[..., None]) -> list[Measurement
             solver = of_draw(task.solver, seed)
             if runner is None or "seed" in solver.settings():
                 runner = FoldRunner(task, solver)
-            runner.forget_fit()
             for name, fold in folds.items():
                 report(runner.sample(name, task.observations[seed], fold))
     except UserError as error:
@@ -98,11 +97,7 @@ class FoldRunner:
         self._body, self._truths = DeformedBody(mesh), task.truths
         self._unassimilated: dict[int, tuple[Solution, SampledField]] = {}
         self._refit: Callable[[Observations], Solution] | None = None
-        self._fit: tuple[tuple[int, ...], Solution] | None = None
-
-    def forget_fit(self) -> None:
-        """Forget the fit to the markers of one seed."""
-        self._fit = None
+        self._fit: tuple[Observations, tuple[int, ...], Solution] | None = None
 
     def sample(self, name: str, observations: Sequence[Observations], fold: Fold) -> Measurement:
         """One fold, of which `observations` holds the markers at every load; see `scores.left_out_table`."""
@@ -164,10 +159,10 @@ class FoldRunner:
 
     def _fitted(self, observations: Observations, held: tuple[int, ...]) -> Solution:
         """The solution with the markers that are not held out; folds with equal markers share it."""
-        if self._fit is None or self._fit[0] != held:
+        if self._fit is None or self._fit[0] is not observations or self._fit[1] != held:
             self._refit = self._refit or refitter(self._solver, self.problem)
-            self._fit = held, self._refit(hide_markers(observations, held))
-        return self._fit[1]
+            self._fit = observations, held, self._refit(hide_markers(observations, held))
+        return self._fit[2]
 
     def _at_load_case(self, solution: Solution, case: int) -> SampledField:
         """A fit at the full load, carried over to a load case.
@@ -185,8 +180,9 @@ class FoldRunner:
         try:
             there, here = (self._without_markers(each)[1] for each in (case, 0))
         except UnsupportedProblemError:
-            return sampled * share
-        return there + (sampled + here * -1.0) * share
+            return SampledField(*(share * each for each in sampled))
+        triples = zip(there, sampled, here, strict=True)
+        return SampledField(*(plain + share * (fitted - before) for plain, fitted, before in triples))
 
     def _at(self, case: int) -> Problem:
         return replace(self.problem, load=self._task.told(self._task.load_cases[case].load))

@@ -94,10 +94,7 @@ def folds_of(schemes: Sequence[str], count: int, load_cases: Sequence[LoadCase])
 
 def hide_markers(observations: Observations, held: Sequence[int]) -> Observations:
     """The observations without the held-out markers: invisible, and their numbers zero."""
-    keep = np.ones(len(observations.points), dtype=bool)
-    keep[list(held)] = False
-    displacements, deviations = (
-        np.where(keep[:, None], values, 0.0)
-        for values in (observations.displacements, observations.standard_deviations)
-    )
+    keep = ~np.isin(np.arange(len(observations.points)), held)
+    both = observations.displacements, observations.standard_deviations
+    displacements, deviations = (np.where(keep[:, None], values, 0.0) for values in both)
     return replace(observations, displacements=displacements, standard_deviations=deviations, visible=keep)

@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.comparison.evaluation.differences import FieldDifference
+from pinnray.comparison.evaluation.differences import relative_l2
 from pinnray.comparison.evaluation.truths import Truth
 from pinnray.comparison.evaluation.virtual_experiment import simulate
 from pinnray.geometry.cache import finger_mesh
@@ -26,9 +27,8 @@ from pinnray.studies.crossval.folds import LoadCase
 from pinnray.studies.crossval.study import SIZES, CrossvalStudy
 
 
-@dataclass(frozen=True, eq=False)
-class SampledField:
-    """A displacement field at m markers and q quadrature points of the body; fields can be added and scaled.
+class SampledField(NamedTuple):
+    """A displacement field at m markers and q quadrature points of the body.
 
     Attributes:
         markers: Means over the markers' discs, shape (m, 2), mm.
@@ -39,16 +39,6 @@ class SampledField:
     markers: FloatArray
     displacement: FloatArray
     gradient: FloatArray
-
-    def __add__(self, other: "SampledField") -> "SampledField":
-        return SampledField(
-            self.markers + other.markers,
-            self.displacement + other.displacement,
-            self.gradient + other.gradient,
-        )
-
-    def __mul__(self, factor: float) -> "SampledField":
-        return SampledField(factor * self.markers, factor * self.displacement, factor * self.gradient)
 
     def state(self, problem: Problem) -> State:
         """Strain and stress by the law of a problem."""
@@ -75,7 +65,7 @@ class SampledField:
             "von_mises": (state.von_mises, true.von_mises),
             "von_mises_true_law": (with_true_law.von_mises, true.von_mises),
         }
-        return {name: FieldDifference.of(*pair, weights).rel_l2 for name, pair in pairs.items()}
+        return {name: relative_l2(*pair, weights) for name, pair in pairs.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,15 +99,9 @@ class FieldSampler:
         inside, discs = self.inside_of(solution, mesh, changes), self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             discs = mesh.locate_on(solution.problem.mesh, discs.points)
-        return SampledField(
-            markers=self.means @ solution.displacement_in_space(discs),
-            displacement=solution.field.displacement(inside),
-            gradient=(
-                solution.field.solid_gradient(inside)
-                if isinstance(solution.field, SolidField)
-                else solution.field.gradient(inside)
-            ),
-        )
+        field, markers = solution.field, self.means @ solution.displacement_in_space(discs)
+        gradient = field.solid_gradient if isinstance(field, SolidField) else field.gradient
+        return SampledField(markers, field.displacement(inside), gradient(inside))
 
     def inside_of(
         self, solution: Solution, mesh: TriangleMesh, changes: Mapping[str, float] | None = None
@@ -127,16 +111,12 @@ class FieldSampler:
             return self.inside
         points = self.inside.points
         if changes:
-            points = points + _shifts(mesh, self.inside, changes)
+            motion = WallMotion.of(mesh)
+            if missing := [name for name in changes if name not in motion.names]:
+                raise UserError(f"the finger has no wall of the {missing[0]} that the truth changes")
+            thicker = np.array([changes.get(name, 0.0) for name in motion.names])
+            points = points + motion.shifts(self.inside, thicker)
         return mesh.locate_on(solution.problem.mesh, points)
-
-
-def _shifts(mesh: TriangleMesh, location: LocatedPoints, changes: Mapping[str, float]) -> FloatArray:
-    """Motion of points of a mesh with its walls, shape (n, 2), mm."""
-    motion = WallMotion.of(mesh)
-    if missing := [name for name in changes if name not in motion.names]:
-        raise UserError(f"the finger has no wall of the {missing[0]} that the truth changes")
-    return motion.shifts(location, np.array([changes.get(name, 0.0) for name in motion.names]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,27 +34,6 @@ EXACT: Mapping[str, Callable[[Section, Parameters, Study], float]] = {
 """Quantities that follow from the section."""
 
 
-@dataclass(frozen=True)
-class Predictions:
-    """Predicted quantities of n fingers.
-
-    Attributes:
-        names: Of the q quantities, in the order of `pinnray.solvers.finger_figures.QUANTITIES`.
-        values: Predictions, shape (n, q), in the quantities' units.
-        low: Lower ends of the 95 % intervals, shape (n, q); the value itself where it is exact.
-        high: Upper ends, shape (n, q).
-    """
-
-    names: tuple[str, ...]
-    values: FloatArray
-    low: FloatArray
-    high: FloatArray
-
-    def column(self, name: str) -> FloatArray:
-        """Predictions of one quantity, shape (n,)."""
-        return self.values[:, self.names.index(name)]
-
-
 @dataclass(frozen=True, eq=False)
 class Learnt:
     """A quantity that a process predicts.
@@ -94,28 +73,31 @@ class Emulator:
 
     def predict(
         self, fingers: Sequence[Mapping[str, Value]], names: Sequence[str] | None = None
-    ) -> Predictions:
+    ) -> dict[str, FloatArray]:
         """Predict quantities of fingers given by the study's varied parameters.
 
         Args:
             fingers: Values of every varied parameter; see `Inputs.fault`, which is not asked again.
             names: Quantities; None means all. Those that follow from the section alone (`area`, `mass`,
                 `thinnest_wall`, `narrowest_gap`) are exact, and take most of the time.
+
+        Returns:
+            By quantity, in the order of `pinnray.solvers.finger_figures.QUANTITIES`: predictions, lower and
+            upper ends of their 95 % intervals, in its unit, shape (3, n); equal where they are exact.
         """
-        chosen = tuple(name for name in self.names if names is None or name in names)
+        chosen = [name for name in self.names if names is None or name in names]
         shapes = [self.inputs.parameters(finger) for finger in fingers]
         found: dict[str, FloatArray] = {}
-        if (learnt := [name for name in chosen if name in self.learnt]) and fingers:
+        if self.learnt.keys() & chosen:
             numbers = self.inputs.numbers(fingers, shapes)
-            found = {name: _predicted(self.learnt[name], name, numbers) for name in learnt}
-        if exact := [name for name in chosen if name in EXACT]:
-            sections = [finger_section(shape) for shape in shapes]
-            for name in exact:
-                pairs = zip(sections, shapes, strict=True)
-                values = np.array([EXACT[name](section, shape, self.study) for section, shape in pairs])
-                found[name] = np.stack([values] * 3)
-        whole = np.array([found[name] for name in chosen]).reshape(len(chosen), 3, len(fingers))
-        return Predictions(chosen, *whole.transpose(1, 2, 0))
+        if EXACT.keys() & chosen:
+            pairs = [(finger_section(shape), shape) for shape in shapes]
+        for name in chosen:
+            if name in self.learnt:
+                found[name] = _predicted(self.learnt[name], name, numbers)
+            else:
+                found[name] = np.tile([EXACT[name](*pair, self.study) for pair in pairs], (3, 1))
+        return found
 
 
 def fitted_emulator(
@@ -159,16 +141,15 @@ def fitted_emulator(
 
 
 def prediction_table(
-    emulator: Emulator, fingers: Sequence[Mapping[str, Value]], found: Predictions
+    emulator: Emulator, fingers: Sequence[Mapping[str, Value]], found: Mapping[str, FloatArray]
 ) -> pd.DataFrame:
     """A row for every finger: its varied parameters, and each quantity with the ends of its interval.
 
     A quantity that is exact for every finger has no columns for the ends.
     """
     columns = {title(name): [finger[name] for finger in fingers] for name in emulator.study.varied}
-    for place, name in enumerate(found.names):
-        low, high = found.low[:, place], found.high[:, place]
-        columns[heading(name)] = found.values[:, place].tolist()
+    for name, (values, low, high) in found.items():
+        columns[heading(name)] = values.tolist()
         if (low != high).any():
             columns |= {f"{heading(name)}_low": low.tolist(), f"{heading(name)}_high": high.tolist()}
     return pd.DataFrame(columns)

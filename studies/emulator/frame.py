@@ -81,8 +81,6 @@ class BeamFrame:
         """Rigid lengths at both ends of the beams, shape (n, b, 2), mm."""
         ribs, walls = self.ribs, 2 * self.ribs + 3
         found = np.zeros((*length.shape, 2))
-        if not ribs:
-            return found
         joints = np.zeros(self.points.shape[1])
         joints[:ribs] = joints[ribs + 3 : 2 * ribs + 3] = 1.0
         rib = self.thickness[:, walls, None, None]
@@ -95,14 +93,16 @@ class BeamFrame:
         """What the frames do if their contact moves by `travel`, mm; None is free of force."""
         start, end = (np.take_along_axis(self.points, self.beams[:, :, side, None], 1) for side in (0, 1))
         length = np.maximum(np.linalg.norm(end - start, axis=2), SHORTEST)
-        turn = _rotations((end - start) / length[..., None])
-        local = _stiffness(length, self.rigid(length), self.thickness, material)
+        rigid = self.rigid(length)
+        elastic = length - rigid.sum(axis=2)
+        modes = _deformations((end - start) / length[..., None], elastic, rigid)
+        stiffness = _stiffness(elastic, self.thickness, material)
         degrees = (3 * self.beams[..., None] + np.arange(3)).reshape(*length.shape, 6)
         count, size = len(self.points), 3 * self.points.shape[1]
         whole = np.zeros((count, size, size))
         finger = np.arange(count)[:, None, None]
-        turned = turn.transpose(0, 1, 3, 2) @ local @ turn
-        np.add.at(whole, (finger[..., None], degrees[..., :, None], degrees[..., None, :]), turned)
+        own = modes.swapaxes(2, 3) @ stiffness @ modes
+        np.add.at(whole, (finger[..., None], degrees[..., :, None], degrees[..., None, :]), own)
         clamped = [3 * node + part for node in (self.ribs, 2 * self.ribs + 3) for part in range(3)]
         free = np.setdiff1d(np.arange(size), clamped)
         contact, apex = 3 * (self.ribs + 1), 3 * (2 * self.ribs + 5)
@@ -117,9 +117,9 @@ class BeamFrame:
         given = np.broadcast_to(values[:, None], (count, len(axes), 1))
         force[:, axes] = np.linalg.solve(compliance[:, axes][:, :, axes], given)
         state = (moved @ force)[..., 0]
-        ends = (local @ turn @ state[finger, degrees][..., None])[..., 0]
-        moment = np.maximum(np.abs(ends[..., 2]), np.abs(ends[..., 5]))
-        stress = np.abs(ends[..., 3]) / self.thickness + 6 * moment / self.thickness**2
+        forces = stiffness @ modes @ state[finger, degrees][..., None]
+        moment = np.abs(modes.swapaxes(2, 3) @ forces)[..., [2, 5], 0].max(axis=2)
+        stress = np.abs(forces[..., 0, 0]) / self.thickness + 6 * moment / self.thickness**2
         parts = np.cumsum([0, self.ribs + 2, self.ribs + 1, self.ribs])
         return BeamResponse(
             force=force[:, axes, 0] @ (values / np.linalg.norm(values)),
@@ -166,45 +166,33 @@ def _nodes(p: Parameters) -> FloatArray:
     )
 
 
-def _rotations(along: FloatArray) -> FloatArray:
-    """Rotations from the frame's axes to those of beams along unit vectors (..., 2), shape (..., 6, 6)."""
-    turn = np.zeros((*along.shape[:-1], 6, 6))
-    c, s = along[..., 0], along[..., 1]
-    for first in (0, 3):
-        turn[..., first, first] = turn[..., first + 1, first + 1] = c
-        turn[..., first, first + 1], turn[..., first + 1, first] = s, -s
-        turn[..., first + 2, first + 2] = 1.0
-    return turn
+def _deformations(along: FloatArray, elastic: FloatArray, rigid: FloatArray) -> FloatArray:
+    """What motions of the two nodes (u, v, turn each) do to beams, shape (..., 3, 6).
+
+    Rows are the stretch, mm, and how far either end of the elastic part turns from the line between its ends.
+
+    Args:
+        along: Unit vectors, shape (..., 2).
+        elastic: Lengths of the elastic parts, shape (...), mm.
+        rigid: Lengths of the rigid parts at both ends, shape (..., 2), mm.
+    """
+    across = np.stack([-along[..., 1], along[..., 0]], axis=-1)[..., None, :] / elastic[..., None, None]
+    found = np.zeros((*elastic.shape, 3, 6))
+    found[..., 0, :2], found[..., 0, 3:5] = -along, along
+    found[..., 1:, :2], found[..., 1:, 3:5] = across, -across
+    found[..., 1:, [2, 5]] = np.eye(2) + (rigid / elastic[..., None])[..., None, :]
+    return found
 
 
-def _stiffness(
-    length: FloatArray, rigid: FloatArray, thickness: FloatArray, material: Material
-) -> FloatArray:
-    """Stiffness of beams in their own axes, shape (..., 6, 6), rigid near their ends (..., 2), mm."""
-    local = _elastic_stiffness(length - rigid.sum(axis=-1), thickness, material)
-    offset = np.zeros_like(local)
-    offset[..., range(6), range(6)] = 1.0
-    offset[..., 1, 2], offset[..., 4, 5] = rigid[..., 0], -rigid[..., 1]
-    return np.asarray(np.swapaxes(offset, -1, -2) @ local @ offset)
-
-
-def _elastic_stiffness(length: FloatArray, thickness: FloatArray, material: Material) -> FloatArray:
-    """Stiffness of beams in their own axes, shape (..., 6, 6)."""
+def _stiffness(length: FloatArray, thickness: FloatArray, material: Material) -> FloatArray:
+    """Stiffness of elastic beams against their deformations, shape (..., 3, 3)."""
     modulus = 1 / (1 - material.poisson**2) if material.plane == "strain" else 1.0
     shear = SHEAR_SHARE * thickness / (2 * (1 + material.poisson))
     bending = modulus * thickness**3 / 12
     phi = 12 * bending / (shear * length**2)
-    part = bending / ((1 + phi) * length**3)
-    local = np.zeros((*length.shape, 6, 6))
-    stretch = modulus * thickness / length
-    local[..., 0, 0] = local[..., 3, 3] = stretch
-    local[..., 0, 3] = local[..., 3, 0] = -stretch
-    side = 6 * length * part
-    for i, j, value in (
-        *((1, 1, 12 * part), (4, 4, 12 * part), (1, 4, -12 * part)),
-        *((1, 2, side), (1, 5, side), (2, 4, -side), (4, 5, -side)),
-        *((2, 2, (4 + phi) * length**2 * part), (5, 5, (4 + phi) * length**2 * part)),
-        (2, 5, (2 - phi) * length**2 * part),
-    ):
-        local[..., i, j] = local[..., j, i] = value
-    return local
+    part = bending / ((1 + phi) * length)
+    found = np.zeros((*length.shape, 3, 3))
+    found[..., 0, 0] = modulus * thickness / length
+    found[..., 1, 1] = found[..., 2, 2] = (4 + phi) * part
+    found[..., 1, 2] = found[..., 2, 1] = (2 - phi) * part
+    return found

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -140,19 +139,15 @@ class Inputs:
 
     def columns(self, fingers: Sequence[Mapping[str, Value]]) -> FloatArray:
         """The varied parameters that are no mere factors, each with a standard deviation of about one."""
-        columns = [self._column(name, [finger[name] for finger in fingers]) for name in self._columns]
-        return np.concatenate([np.zeros((len(fingers), 0)), *columns], axis=1)
-
-    @cached_property
-    def _columns(self) -> list[str]:
-        """Varied parameters of which a process has an input: Young's modulus and depth act as factors."""
         factors = {"young"} if self.study.solver == "fem-3d" else {"young", "depth"}
-        return [name for name in self.study.varied if name not in factors]
+        names = [name for name in self.study.varied if name not in factors]
+        columns = [self._column(name, [finger[name] for finger in fingers]) for name in names]
+        return np.concatenate([np.zeros((len(fingers), 0)), *columns], axis=1)
 
     def _column(self, name: str, values: Sequence[Value]) -> FloatArray:
         """Inputs of a parameter, with a standard deviation of about one, shape (n, 1) or (n, choices)."""
         chosen = self.study.varied[name]
-        if chosen.values is not None and not _is_number(chosen):
+        if chosen.values is not None and not all(type(each) in (int, float) for each in chosen.values):
             places = np.array([chosen.values.index(value) for value in values])
             return np.asarray(2.0 * np.eye(len(chosen.values))[places])
         low, high = chosen.ends
@@ -178,13 +173,10 @@ class Inputs:
         for (*_, travel), places in groups.items():
             own = [shapes[place] for place in places]
             found = BeamFrame.of(own).response(physics[places[0]][0], travel)
-            answers[places, 0] = found.force
-            answers[places, 1:3] = found.compliance
-            answers[places, 3:5] = found.tip
-            answers[places, 5] = _wrap(own, found.contact, found.tip)
-            answers[places, 6:9] = found.stress
+            wrap = _wrap(own, found.contact, found.tip)
+            answers[places] = np.column_stack([found.force, found.compliance, found.tip, wrap, found.stress])
         scales = [(material.young, shape.depth) for shape, (material, _) in zip(shapes, physics, strict=True)]
-        return answers, np.array(scales)
+        return answers, np.array(scales).reshape(-1, 2)
 
 
 def _wrap(shapes: Sequence[Parameters], contact: FloatArray, tip: FloatArray) -> FloatArray:
@@ -199,10 +191,6 @@ def _rib_phase(p: Parameters) -> float:
     """Place of the contact between the ribs, in pitches; a whole number at a rib."""
     first = rib_feet(p)[0] if p.rib_count else cavity_ends(p)[0]
     return float((p.contact_abscissa - first) / rib_pitch(p))
-
-
-def _is_number(values: Range) -> bool:
-    return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values.values or ())
 
 
 def _contains(name: str, values: Range, value: Value) -> bool:

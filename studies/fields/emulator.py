@@ -15,11 +15,11 @@ from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.elasticity import LawName
-from pinnray.solvers.material import Material
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import stroke_axes
 from pinnray.solvers.solver import with_law
+from pinnray.studies.emulator.gaussian_process import calibrated
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.fields.gaussian_processes import Block
 from pinnray.studies.fields.prediction import PredictedField
@@ -34,9 +34,6 @@ left out: smaller ones follow the elements that touch the cylinder by turns, and
 
 MOTION = 1e-10
 """Share of the squared motion of meshes below which modes are left out: these are to be exact."""
-
-LEVEL = 0.95
-"""Probability of the intervals."""
 
 RIDGE = 1e-2
 """Penalty on the coefficients of the strength, of which few samples may have fewer than they are."""
@@ -295,6 +292,7 @@ def _calibrated(made: FieldEmulator, shots: Snapshots, paths: FloatArray) -> Fie
     for sample, finger in enumerate(known.samples):
         points = shots.points[min(sample, len(shots.points) - 1)]
         material, load = known.inputs.physics(finger)
+        lame = material.model_copy(update={"young": made.young}).lame
         position = known.inputs.parameters(finger).contact_abscissa
         deviations = made.field.deviations(made.known[sample])
         for stroke, share in enumerate(shots.shares):
@@ -305,7 +303,7 @@ def _calibrated(made: FieldEmulator, shots: Snapshots, paths: FloatArray) -> Fie
             scaled = shots.numbers[sample, stroke] / scales_of[sample] ** (POWERS > 0)
             missed = scaled - number_errors[sample, stroke] * made.units * share**POWERS
             for kind, nodal, numbers in ((0, true, scaled), (1, guess, missed)):
-                stress = reader.stress(points, nodal, made.law, _unit(material, made.young).lame)
+                stress = reader.stress(points, nodal, made.law, lame)
                 figures = reader.figures(points, nodal, stress, position)
                 values[kind, sample, stroke, 1:] = (stroke_axes(load)[0] @ numbers[:2], *figures, numbers[4])
             values[0, sample, stroke, 0] = np.sqrt(np.mean(true**2))
@@ -316,13 +314,8 @@ def _calibrated(made: FieldEmulator, shots: Snapshots, paths: FloatArray) -> Fie
     off, expected = np.abs(values[1] - values[0]), scales * indicators[..., None]
     # Those from which the deviations are taken would have none.
     ratios = np.divide(off, expected, out=np.zeros_like(off), where=expected > 0)[made.field.landmarks :]
-    rank = min(int(np.ceil(LEVEL * (len(ratios) + 1))), len(ratios)) - 1
     relative = (values[1, :, -1, 0] - values[0, :, -1, 0]) / values[0, :, -1, 0]
-    return replace(made, scales=scales, calibration=np.sort(ratios, axis=0)[rank], errors=relative)
-
-
-def _unit(material: Material, young: float) -> Material:
-    return material.model_copy(update={"young": young})
+    return replace(made, scales=scales, calibration=calibrated(ratios), errors=relative)
 
 
 def _between(rows: FloatArray, shares: FloatArray, share: float) -> FloatArray:

@@ -12,7 +12,7 @@ from pinnray.runtime import html
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.html import Packed
 from pinnray.runtime.machine import package_versions
-from pinnray.solvers.finger_figures import QUANTITIES
+from pinnray.solvers.finger_figures import QUANTITIES, Quantity
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.load import Physics
 from pinnray.studies.emulator.inputs import WIDE
@@ -39,8 +39,8 @@ TITLES = {
 }
 """What the page calls the figures."""
 
-MEANINGS = {"contact_width": "deformed length of the front that touches the cylinder"}
-UNITS = {"contact_width": "mm"}
+CONTACT_ZONE = Quantity("mm", "deformed length of the front that touches the cylinder")
+"""The figure that is no quantity of a finger."""
 
 
 def write_explorer(emulator: FieldEmulator, path: Path) -> Path:
@@ -102,13 +102,8 @@ def manifest(emulator: FieldEmulator, packed: Packed) -> dict[str, Any]:
         "baseYoung": emulator.young,
         "lame": [unit.λ, unit.μ],
         "figures": [
-            {
-                "name": name,
-                "title": TITLES[name],
-                "unit": QUANTITIES[name].unit if name in QUANTITIES else UNITS[name],
-                "meaning": QUANTITIES[name].meaning if name in QUANTITIES else MEANINGS[name],
-            }
-            for name in FIGURES
+            {"name": name, "title": TITLES[name], "unit": figure.unit, "meaning": figure.meaning}
+            for name, figure in ((name, QUANTITIES.get(name, CONTACT_ZONE)) for name in FIGURES)
         ],
         "colourStress": float(LARGEST * emulator.scales[-1, 1 + FIGURES.index("von_mises")]),
         "thickness": reader.thickness,

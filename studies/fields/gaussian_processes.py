@@ -2,17 +2,16 @@
 
 The kernel is Matérn's of order 5/2, with one length for every input: where a rib begins, what a load does has
 a kink. Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006:
-eq. 4.17, algorithm 2.1, eq. 5.12 (leave-one-out).
+eq. 4.17.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Self
 
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.studies.emulator.gaussian_process import conditioned, left_out, likeliest
+from pinnray.studies.emulator.gaussian_process import likeliest
 from pinnray.studies.fields.reduction import Modes
 
 WATCHED = 12
@@ -34,6 +33,7 @@ class Block:
         numbers: Mean, standard deviation and noise's variance over it of every process, shape (3, r).
         factors: Inverse Cholesky factors of the covariance of the first m samples, of the w leading modes,
             shape (w, m, m).
+        left_out: Errors of the samples' coefficients, each predicted from all others, shape (n, r).
     """
 
     modes: Modes
@@ -42,29 +42,29 @@ class Block:
     weights: FloatArray
     numbers: FloatArray
     factors: FloatArray
+    left_out: FloatArray
 
     @classmethod
     def fitted(cls, inputs: FloatArray, modes: Modes, coefficients: FloatArray) -> Self:
         """The block of samples whose coefficients (n, r) are known."""
         from sklearn.gaussian_process.kernels import Matern
 
-        count = min(len(inputs) // 2, LANDMARKS)
-        squares = (inputs[:, None] - inputs) ** 2
-        rates, weights, numbers = [], [], []
-        factors: list[FloatArray] = []
+        means, spreads = coefficients.mean(axis=0), coefficients.std(axis=0)
+        spreads[spreads == 0] = 1.0
         start = Matern(np.full(inputs.shape[1], 2.0), (0.05, 1e3), nu=2.5)
-        for column in coefficients.T:
-            mean, spread = float(column.mean()), float(column.std()) or 1.0
-            lengths, noise = likeliest(inputs, (column - mean) / spread, start)
-            rate = 1 / lengths**2
-            factor, weight = conditioned(matern(squares @ rate) + noise * np.eye(len(inputs)), column - mean)
-            rates.append(rate)
-            weights.append(weight)
-            numbers.append((mean, spread, noise))
-            if len(factors) < WATCHED:
-                factors.append(np.linalg.inv(factor[:count, :count]))
+        count = min(len(inputs) // 2, LANDMARKS)
+        fits = [
+            likeliest(inputs, each, start, landmarks=count) for each in ((coefficients - means) / spreads).T
+        ]
+        lengths, noises, weights, factors, left_out = (np.array(each) for each in zip(*fits, strict=True))
         return cls(
-            modes, inputs, np.array(rates), np.array(weights).T, np.array(numbers).T, np.array(factors)
+            modes,
+            inputs,
+            1 / lengths**2,
+            spreads * weights.T,
+            np.array([means, spreads, noises]),
+            factors[:WATCHED],
+            spreads * left_out.T,
         )
 
     def vector(self, inputs: FloatArray) -> FloatArray:
@@ -84,17 +84,6 @@ class Block:
         known = ((self.factors @ covariance.T[..., None])[..., 0] ** 2).sum(axis=1)
         _, spread, noise = self.numbers[:, : len(known)]
         return np.asarray(spread * np.sqrt(np.maximum(1 - known, 0.0) + noise))
-
-    @cached_property
-    def left_out(self) -> FloatArray:
-        """Errors of the samples' coefficients, each predicted from all others, shape (n, r)."""
-        squares = (self.inputs[:, None] - self.inputs) ** 2
-        errors = np.empty_like(self.weights)
-        for mode, rates in enumerate(self.rates):
-            covariance = matern(squares @ rates) + self.numbers[2, mode] * np.eye(len(squares))
-            factor, _ = conditioned(covariance, self.weights[:, mode])
-            errors[:, mode] = left_out(factor, self.weights[:, mode])
-        return errors
 
 
 def matern(squares: FloatArray) -> FloatArray:

@@ -15,14 +15,12 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.text_files import read_json
 from pinnray.solvers.lagrange import LagrangeSpace
+from pinnray.studies.emulator.emulator import FEWEST
 from pinnray.studies.emulator.inputs import Inputs
 from pinnray.studies.sweep.field_path import FieldPath, moving_mesh
 from pinnray.studies.sweep.job import field_base, field_file
 from pinnray.studies.sweep.study import Study, Value
 from pinnray.studies.sweep.sweep import STUDY_FILE, load_sweep
-
-FEWEST = 20
-"""Least number of samples with a field."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,15 +32,15 @@ def write_designs(job: StudyJob[Question], task: Task, path: Path) -> Path:
     Returns:
         The path of the design.
     """
-    changed = changed_parameters(job, task)
     problem = path.parent.with_name(PROBLEMS) / path.name
     remark = f"# The shape alone; with load, material and solver: {COMMAND.format(quote(str(problem)))}"
-    lines = [f"{name} = {json.dumps(value)}" for name, value in changed.items()]
-    write_text(path, "\n".join([remark, *lines]) + "\n")
-    options = problem_options(job, task)
     told = f"# The finger of {path.parent.name}/{path.name} as the search solved it: options of compare"
-    lines = [f"{name} = {json.dumps(value)}" for name, value in options.items()]
-    write_text(problem, "\n".join([told, "[options]", *lines]) + "\n")
+    for file, head, values in (
+        (path, remark, changed_parameters(job, task)),
+        (problem, f"{told}\n[options]", problem_options(job, task)),
+    ):
+        lines = [f"{name} = {json.dumps(value)}" for name, value in values.items()]
+        write_text(file, "\n".join([head, *lines]) + "\n")
     return path
 
 

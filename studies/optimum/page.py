@@ -136,17 +136,13 @@ def text_table(title: str, table: pd.DataFrame) -> TextTable:
 
 def page_tables(optimum: Optimum) -> list[TextTable]:
     """The front in tables that are narrow enough for a page."""
-    table = front_table(optimum).rename(columns=_in_lines)
+    table = front_table(optimum)
+    table.columns = table.columns.str.replace("mm_per_N", "mm/N").str.replace("_", "\n")  # narrow ones
     split = 2 + len(optimum.study.names) + len(optimum.study.varied)
     found = [text_table(optimum.study.heading, table.iloc[:, :split])]
     for columns in np.array_split(np.arange(split, len(table.columns)), 2):
         found.append(text_table("Their other quantities", table.iloc[:, [0, *columns]]))
     return found
-
-
-def _in_lines(heading: str) -> str:
-    """A heading with a line for each word: the columns stay narrow."""
-    return heading.replace("mm_per_N", "mm/N").replace("_", "\n")
 
 
 def spread(optimum: Optimum, count: int = DRAWN) -> list[int]:

@@ -108,9 +108,9 @@ class _Emulated(Problem):  # type: ignore[misc] # pymoo has no annotations
         if sound.any():
             good = [finger for finger, fine in zip(fingers, sound, strict=True) if fine]
             predicted = self._emulator.predict(good, self._question.names)
-            values, widths = predicted.values.T, (predicted.high - predicted.low).T / 2
-            middle, hopes = (dict(zip(predicted.names, each, strict=True)) for each in (values, widths))
-            hoped = HOPE * np.array([hopes[name] for name in self._question.objectives])
+            middle = {name: values for name, (values, _, _) in predicted.items()}
+            ends = (predicted[name][1:] for name in self._question.objectives)
+            hoped = HOPE * np.array([(high - low) / 2 for low, high in ends])
             costs[sound] = (np.array(self._question.costs(middle)) - hoped).T
             excess[sound] = np.stack([np.zeros(len(good)), *self._question.excesses(middle)], axis=1)
         out["F"], out["G"] = costs, excess

@@ -45,20 +45,13 @@ class FieldPath:
         """
         history = solution.history
         nodal = [state.values for state in solution.states if isinstance(state, LagrangeField)]
-        known = np.column_stack(
-            [
-                *(history[name] for name in ("reaction_x", "reaction_y", "energy")),
-                *(
-                    history.get(name, np.zeros(len(nodal)))
-                    for name in ("force_abscissa_mm", "contact_width_mm")
-                ),
-            ]
-        )
+        columns = ("reaction_x", "reaction_y", "energy", "force_abscissa_mm", "contact_width_mm")
+        known = [history.get(name, np.zeros(len(nodal))) for name in columns]
         spline = CubicSpline(history["load_fraction"], np.array(nodal).reshape(len(nodal), -1))
         shares = np.arange(1, strokes + 1) / strokes
         return cls(
             spline(shares).reshape(strokes, -1, 2),
-            np.column_stack([np.interp(shares, history["load_fraction"], column) for column in known.T]),
+            np.column_stack([np.interp(shares, history["load_fraction"], column) for column in known]),
         )
 
     def save(self, file: Path) -> None:

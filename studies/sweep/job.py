@@ -128,13 +128,16 @@ class StudyJob(Generic[S]):
         shape = {name: value for name, value in values.items() if name not in PHYSICS}
         if shape and not isinstance(self._base, Design):
             raise UserError(f"of a drawn finger a study changes material and load, not {next(iter(shape))}")
-        checkpoints, definition = None, {**self._base.definition(), **shape}
+        checkpoints, fields, definition = None, None, {**self._base.definition(), **shape}
         if isinstance(self._base, Design) and not study.settings_alone:
             definition |= {key: least for key, least in LEAST_MARKERS.items() if key not in study.varied}
         if study.settings_alone:
             checkpoints = self.out / "runs" / "_".join(f"{key}-{value}" for key, value in settings.items())
         else:
             definition["name"] = f"{study.name}-{number}"
+        if study.strokes is not None:
+            base = json.dumps(field_base(study, self._base.definition()))
+            fields = FieldOrder(field_file(self.out, number), study.strokes, base)
         return Task(
             number,
             definition,
@@ -144,16 +147,8 @@ class StudyJob(Generic[S]):
             {**study.settings, **settings},
             study.density,
             checkpoints,
-            self._field_order(number),
+            fields,
         )
-
-    def _field_order(self, number: int) -> FieldOrder | None:
-        """The field to keep of a sample; None where the study keeps none."""
-        study = self.study
-        if study.strokes is None:
-            return None
-        base = json.dumps(field_base(study, self._base.definition()))
-        return FieldOrder(field_file(self.out, number), study.strokes, base)
 
     def marked(self, task: Task) -> dict[str, Any]:
         """The definition of a task's finger with the markers of the study, smaller where they must be."""

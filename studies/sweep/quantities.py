@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pinnray.comparison.evaluation.differences import FieldDifference
+from pinnray.comparison.evaluation.differences import relative_l2
 from pinnray.geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from pinnray.solvers.fem.linear import FemSolver
 from pinnray.solvers.finger_figures import Quantity, figures_at_rest, figures_of
@@ -56,7 +56,7 @@ def training(solution: Solution) -> dict[str, float]:
     rule = body_quadrature(problem.mesh)
     own, reference = (each.displacement(rule.location) for each in (solution, fem))
     return {
-        "rel_l2_displacement": FieldDifference.of(own, reference, rule.weights).rel_l2,
+        "rel_l2_displacement": relative_l2(own, reference, rule.weights),
         "rel_energy": float(solution.energy) / float(fem.energy) - 1,
         "boundary_violation": max(boundary_violations(solution)) / float(np.linalg.norm(problem.load.values)),
         "energy": float(solution.energy),
@@ -71,7 +71,5 @@ def boundary_violations(solution: Solution) -> tuple[float, float]:
     squares = (solution.displacement(points) ** 2).sum(axis=1)
     contact, weights = contact_functional(problem)
     mean = (weights @ solution.displacement(contact))[problem.load.prescribed]
-    return (
-        float(np.sqrt(lengths @ squares / lengths.sum())),
-        float(np.linalg.norm(mean - problem.load.values)),
-    )
+    base = float(np.sqrt(lengths @ squares / lengths.sum()))
+    return base, float(np.linalg.norm(mean - problem.load.values))

@@ -9,11 +9,14 @@ import sqlite3
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
 from pinnray.runtime.atomic import write_json
+from pinnray.runtime.content_hash import has_source, sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.output_folder import check_resumable_folder, locked
+from pinnray.solvers.solver import Solver
 from pinnray.studies.sweep.measurement import Measurement
 
 JOURNAL = "journal.sqlite"
@@ -102,3 +105,10 @@ def opened(file: Path) -> Iterator[Journal]:
             f"cannot use {file}: {error}; free some space if the disk is full, else remove the file to run "
             "every sample again"
         ) from None
+
+
+def class_of(solver: Solver) -> list[str]:
+    """Module, name and source of a solver's class, for digests; another one each time if it has no source."""
+    kind = type(solver)
+    source = sources_digest(kind.__module__) if has_source(kind.__module__) else token_hex()
+    return [kind.__module__, kind.__qualname__, source]

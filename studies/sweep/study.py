@@ -247,7 +247,8 @@ def _check_range(name: str, values: Range, sampling: str) -> None:
         if name in ("plane", "law", "load", "slide", "rib_reference", "marker_layout"):
             raise ValueError(f"{name} has no numbers between two others; give values = [...]")
         for end in () if "." in name else (values.low, values.high):
-            low, high = parameter_limits(name)
+            model = Parameters if name in Parameters.model_fields else Physics
+            low, high = (float(parameter_info(name, limit, model)) for limit in ("low", "high"))
             if end is not None and not low <= end <= high:
                 raise ValueError(
                     f"{name} = {end:g} is outside its range, {low:g} to {high:g} {unit_of(name)}"
@@ -257,9 +258,3 @@ def _check_range(name: str, values: Range, sampling: str) -> None:
         numbers = (values.low or 0, values.high or 0, values.step or 1)
         if name in WHOLE and not all(float(number).is_integer() for number in numbers):
             raise ValueError(f"{name} is a whole number; give whole ends and steps")
-
-
-def parameter_limits(name: str) -> tuple[float, float]:
-    """Smallest and largest value of a parameter that is a number."""
-    model = Parameters if name in Parameters.model_fields else Physics
-    return float(parameter_info(name, "low", model)), float(parameter_info(name, "high", model))

@@ -25,15 +25,18 @@ def known_quantities(sweep: Sweep) -> dict[str, Quantity]:
 
 def sample_table(sweep: Sweep) -> pd.DataFrame:
     """A row for every finished sample: number, varied parameters, state, quantities, time and message."""
-    rows, known = [], known_quantities(sweep)
-    for each in sweep.measurements:
-        row: dict[str, object] = {"sample": each.number}
-        row |= {title(name): value for name, value in sweep.samples[each.number].items()}
-        row |= {"state": each.state}
-        row |= {
-            heading(name, quantity): each.values.get(name, float("nan")) for name, quantity in known.items()
+    headings = {name: heading(name, quantity) for name, quantity in known_quantities(sweep).items()}
+    rows = [
+        {
+            "sample": each.number,
+            **{title(name): value for name, value in sweep.samples[each.number].items()},
+            "state": each.state,
+            **{shown: each.values.get(name, float("nan")) for name, shown in headings.items()},
+            "seconds": each.seconds,
+            "message": each.message,
         }
-        rows.append(row | {"seconds": each.seconds, "message": each.message})
+        for each in sweep.measurements
+    ]
     return pd.DataFrame(rows)
 
 
@@ -85,8 +88,7 @@ def failure_grid(sweep: Sweep) -> TextTable:
             # up to the first number or colon, so that like reasons are counted together
             kind = re.split(r":| -?\d", each.message, maxsplit=1)[0]
             reasons.setdefault((each.state, kind), []).append(each.number)
-    rows: list[tuple[str, ...]] = []
-    for (state, reason), numbers in sorted(reasons.items(), key=lambda entry: -len(entry[1])):
-        rows.append((state, str(len(numbers)), reason, first_of(numbers)))
+    often = sorted(reasons.items(), key=lambda entry: -len(entry[1]))
+    rows = [(state, str(len(own)), reason, first_of(own)) for (state, reason), own in often]
     headings = ("state", "samples", "reason", "numbers")
     return TextTable("Samples without a result", headings, rows, left=("state", "reason", "numbers"))

@@ -15,6 +15,7 @@ from benchmarks.validation.markers import (
     NOMINAL,
     PATCHES,
     frames,
+    length,
     marker_places,
     measured,
     moved_feet,
@@ -22,7 +23,7 @@ from benchmarks.validation.markers import (
     rigid_fit,
 )
 from benchmarks.validation.printed_finger import FINGERS
-from benchmarks.validation.study import all_cases, length, predict
+from benchmarks.validation.study import all_cases, predict
 
 
 @pytest.fixture(scope="module")

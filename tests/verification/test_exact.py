@@ -54,5 +54,5 @@ def test_stress_is_the_derivative_of_the_energy(law, size):
         derivative(elastic.energy_density), (stress * change).sum(axis=(1, 2)), rtol=1e-6
     )
     np.testing.assert_allclose(
-        derivative(elastic.nominal_stress), elastic.change_of_stress(deformation)(change), atol=1e-6
+        derivative(elastic.nominal_stress), elastic.change_of_stress(deformation, change), atol=1e-6
     )

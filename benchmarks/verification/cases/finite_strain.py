@@ -87,8 +87,8 @@ def equilibrium_elsewhere(law: str) -> tuple[float, float, float]:
     gradient = np.moveaxis(basis.interpolate(nodal).grad, (0, 1), (-2, -1))
     deformation = np.eye(2) + gradient
     stress = np.moveaxis(elastic.nominal_stress(deformation), (-2, -1), (0, 1))
-    change = elastic.change_of_stress(deformation)
-    tangent = np.array([[change(unit) for unit in row] for row in np.eye(4).reshape(2, 2, 2, 2)])
+    units = np.eye(4).reshape(2, 2, 2, 2)
+    tangent = np.array([[elastic.change_of_stress(deformation, unit) for unit in row] for row in units])
     internal = skfem.LinearForm(lambda v, w: np.einsum("ij...,ij...", stress, v.grad)).assemble(basis)
     stiffness = skfem.BilinearForm(
         lambda u, v, w: np.einsum("kl...ij,kl...,ij...->...", tangent, u.grad, v.grad)

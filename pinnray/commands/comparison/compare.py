@@ -186,10 +186,12 @@ def _own_folder(name: str, measurements: str | None) -> Path:
 
 def _measurements(source: str | None, options: FilmSettings) -> "Path | MeasuredFilm | None":
     """A CSV file by its suffix, else a film."""
-    if source is None or Path(source).suffix.lower() != ".csv":
-        if source is None and options.model_fields_set:
+    if source is None:
+        if options.model_fields_set:
             raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
-        from pinnray.film.measured_film import MeasuredFilm
+        return None
+    if Path(source).suffix.lower() == ".csv":
+        return Path(source)
+    from pinnray.film.measured_film import MeasuredFilm
 
-        return None if source is None else MeasuredFilm(source=source, **options.model_dump())
-    return Path(source)
+    return MeasuredFilm(source=source, **options.model_dump())

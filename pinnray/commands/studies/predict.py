@@ -8,7 +8,8 @@ from rich.console import Console
 from pinnray.options.shared import Repeated
 
 if TYPE_CHECKING:
-    from pinnray.studies.emulator.emulator import Emulator, Predictions
+    from pinnray.runtime.arrays import FloatArray
+    from pinnray.studies.emulator.emulator import Emulator
 
 
 def command(sweep: Path, *, set: Repeated = ()) -> int:
@@ -32,14 +33,14 @@ def command(sweep: Path, *, set: Repeated = ()) -> int:
     return 0
 
 
-def print_table(emulator: "Emulator", found: "Predictions") -> None:
+def print_table(emulator: "Emulator", found: "dict[str, FloatArray]") -> None:
     """Print the quantities of one finger."""
     from pinnray.runtime.tables import terminal_table
     from pinnray.solvers.finger_figures import QUANTITIES
 
     headings = ["quantity", "unit", "value", "95 % interval", "meaning"]
     rows = []
-    for name, value, low, high in zip(found.names, found.values[0], found.low[0], found.high[0], strict=True):
+    for name, ((value,), (low,), (high,)) in found.items():
         ends = "exact" if low == high else f"{low:.4g} to {high:.4g}"
         rows.append([name, QUANTITIES[name].unit, f"{value:.4g}", ends, QUANTITIES[name].meaning])
     title = f"{emulator.study.name}: predicted from {emulator.count:,} samples"

@@ -7,7 +7,8 @@ import pytest
 
 import pinnray as pr
 from benchmarks.validation import fingers
-from benchmarks.validation.fingers import Experiment, distance
+from benchmarks.validation.fingers import Experiment
+from benchmarks.validation.markers import length
 from benchmarks.validation.printed_finger import FINGERS, FRICTION
 from pinnray.solvers.problem import Load
 
@@ -39,7 +40,7 @@ def test_a_real_finger_is_predicted_with_nothing_fitted():
     smooth, rough = (experiment.misses(experiment.predicted(friction))[1] for friction in (0.0, FRICTION))
     assert rough < 1.3
     assert rough < smooth - 0.4
-    assert distance(experiment.seen.displacements) == pytest.approx(12.8, abs=0.05)
+    assert length(experiment.seen.displacements) == pytest.approx(12.8, abs=0.05)
 
 
 DATA = Path(__file__).parents[2] / "data" / "second-renderer"

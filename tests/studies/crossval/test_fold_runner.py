@@ -22,7 +22,7 @@ from pinnray.studies.crossval.fold_runner import SolverTask, run_folds
 from pinnray.studies.crossval.folds import ALL, LOAD, ONE, RANDOM, Fold, LoadCase
 from pinnray.studies.crossval.scores import FIELDS
 from pinnray.studies.crossval.study import of_draw
-from pinnray.studies.crossval.true_fields import FieldSampler, TrueField
+from pinnray.studies.crossval.true_fields import FieldSampler, SampledField, TrueField
 from pinnray.studies.sweep.measurement import Measurement
 from tests.studies.crossval.conftest import NOISE
 
@@ -36,7 +36,10 @@ def task(coarse_mesh, truth, observations) -> SolverTask:
     """`gp` and one fold of each kind, at the full load and half of it."""
     sampled = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8).of_solution(truth, coarse_mesh)
     force = float(-truth.reaction[1])
-    truths = [TrueField(sampled * share, share * force, 0.0, 35.0) for share in (1.0, 0.5)]
+    truths = [
+        TrueField(SampledField(*(share * each for each in sampled)), share * force, 0.0, 35.0)
+        for share in (1.0, 0.5)
+    ]
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
         name="gp, sliding, joints",
@@ -277,7 +280,7 @@ def test_an_error_that_is_no_number_is_in_no_mean(task, monkeypatch):
     """A displacement that is not finite at the markers alone, where no mesh node is."""
     monkeypatch.setattr(
         "pinnray.studies.crossval.fold_runner.FieldSampler.of_solution",
-        lambda *_: replace(task.truths[0].sampled, markers=np.full((9, 2), np.nan)),
+        lambda *_: task.truths[0].sampled._replace(markers=np.full((9, 2), np.nan)),
     )
     (failed,) = run_folds(replace(task, solver=make_solver("fem")), lambda *_: None)
     said = "fem: its displacement is not finite at every marker"

@@ -7,7 +7,7 @@ import pytest
 
 from pinnray.geometry.finger.parameters import Parameters
 from pinnray.solvers.problem import Material
-from pinnray.studies.emulator.frame import SHEAR_SHARE, BeamFrame, _stiffness
+from pinnray.studies.emulator.frame import SHEAR_SHARE, BeamFrame, _deformations, _stiffness
 from pinnray.studies.sweep.sampling import samples
 from pinnray.studies.sweep.study import Study
 from tests.studies.emulator.sweeps import DATA
@@ -15,10 +15,17 @@ from tests.studies.emulator.sweeps import DATA
 TRAVEL = (0.0, -10.0)
 
 
+def beam(length: float, rigid: tuple[float, float], thickness: float, material: Material) -> np.ndarray:
+    """Stiffness of a beam along x, shape (6, 6)."""
+    elastic = np.array(length - sum(rigid))
+    modes = _deformations(np.array([1.0, 0.0]), elastic, np.array(rigid))
+    return modes.T @ _stiffness(elastic, np.array(thickness), material) @ modes
+
+
 def test_a_cantilever_bends_and_shears_as_timoshenko_says() -> None:
     length, thickness, material = 7.0, 1.5, Material(poisson=0.3)
     modulus, shear = 1 / (1 - 0.3**2), 1 / (2 * 1.3)
-    local = _stiffness(np.array([length]), np.zeros((1, 2)), np.array([thickness]), material)[0]
+    local = beam(length, (0.0, 0.0), thickness, material)
     moved = np.linalg.solve(local[3:, 3:], [0.0, 1.0, 0.0])
     bending = length**3 / (3 * modulus * thickness**3 / 12)
     assert moved[1] == pytest.approx(bending + length / (SHEAR_SHARE * shear * thickness), rel=1e-12)
@@ -26,14 +33,13 @@ def test_a_cantilever_bends_and_shears_as_timoshenko_says() -> None:
 
 
 def test_rigid_ends_shorten_a_cantilever() -> None:
-    lengths, thickness, material = np.array([7.0, 6.0]), np.array([1.5, 1.5]), Material(poisson=0.3)
-    ends = np.array([[1.0, 0.0], [0.0, 0.0]])
-    stiff, short = _stiffness(lengths, ends, thickness, material)
+    material = Material(poisson=0.3)
+    stiff, short = beam(7.0, (1.0, 0.0), 1.5, material), beam(6.0, (0.0, 0.0), 1.5, material)
     assert stiff[3:, 3:] == pytest.approx(short[3:, 3:], rel=1e-12)
 
 
 def test_a_beam_that_moves_as_a_rigid_body_has_no_force() -> None:
-    local = _stiffness(np.array([7.0]), np.array([[0.4, 0.9]]), np.array([1.5]), Material())[0]
+    local = beam(7.0, (0.4, 0.9), 1.5, Material())
     assert local @ [0, -3.0, 1.0, 0, 4.0, 1.0] == pytest.approx(0, abs=1e-12)
 
 

@@ -17,10 +17,10 @@ def samples(count: int, noise: float) -> tuple[np.ndarray, np.ndarray]:
 def test_predictions_are_those_of_scikit_learn() -> None:
     inputs, values = samples(120, 0.01)
     ours = GaussianProcess.fitted(inputs[:80], values[:80])
-    mean, spread, noise, _ = ours.numbers
-    kernel = RBF(ours.lengths) + WhiteKernel(noise)
-    theirs = GaussianProcessRegressor(kernel, optimizer=None).fit(inputs[:80], (values[:80] - mean) / spread)
-    expected = mean + spread * theirs.predict(inputs[80:])
+    kernel = RBF(ours.fit.lengths) + WhiteKernel(ours.fit.noise)
+    scaled = (values[:80] - ours.mean) / ours.spread
+    theirs = GaussianProcessRegressor(kernel, optimizer=None).fit(inputs[:80], scaled)
+    expected = ours.mean + ours.spread * theirs.predict(inputs[80:])
     assert ours.predict(inputs[80:])[0] == pytest.approx(expected, rel=1e-6)
 
 
@@ -30,7 +30,7 @@ def test_intervals_hold_for_95_percent(noise: float) -> None:
     middle, width = (process := GaussianProcess.fitted(inputs[:200], values[:200])).predict(inputs[200:])
     held = np.abs(middle - values[200:]) <= width
     assert 0.90 <= held.mean() <= 0.99  # calibrated on 100 samples: the standard deviation is 0.022
-    assert len(process.factor) == 100
+    assert len(process.fit.factor) == 100
 
 
 @pytest.mark.slow
