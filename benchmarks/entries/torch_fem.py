@@ -6,8 +6,8 @@ from importlib.metadata import version
 
 import numpy as np
 import torch
-from torchfem import Planar
 from torchfem.materials import HyperelasticPlaneStrain, IsotropicElasticityPlaneStrain
+from torchfem.planar import Planar
 
 from pinnray.solvers.energy_and_force import energy_and_force
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
