@@ -30,7 +30,7 @@ from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.cylinder_model import CylinderModel
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
-from pinnray.solvers.identification.nested_search import ROUGHLY, Contacts, NestedSearch
+from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch, identified
 from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.identification.settings import IdentifyingSolver
 from pinnray.solvers.identification.unknowns import Unknowns
@@ -54,6 +54,7 @@ class FemBody:
         self.space, self._motion = space, motion
         self._elements = DolfinxSpace(space)
         self._clamped, _ = dirichlet_conditions(Problem(problem.mesh, problem.material, Load()), space)
+        self.shape = self._clamped.shape
         rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = space.shape_gradients(rule.location)
         self._wall_gradients = motion.gradients[:, rule.location.cells]
@@ -76,21 +77,11 @@ class FemBody:
         at_base = self._clamped.all(axis=1)
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
         self.feet[:, at_base] = unknowns.feet.motions(space.nodes[at_base])
+        front = np.setdiff1d(space.boundary_nodes("front"), space.boundary_nodes("base"))
+        self.front = space.nodes[front]
         self._conditions = self._elements.clamp(self._clamped)
         self._factors: Factorisation | None = None
         self._sampled: dict[bytes, LocatedPoints] = {}
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(N, 2)."""
-        return self._clamped.shape
-
-    @property
-    def front(self) -> FloatArray:
-        """Nodes of the front that are not held."""
-        return self.space.nodes[
-            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
-        ]
 
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""
@@ -238,7 +229,7 @@ class FemIdSolver(IdentifyingSolver):
         Fits share the elements; each search starts from the last result. It takes a progress, too. On a fine
         mesh the unknowns are sought on a coarse one first.
         """
-        kept: dict[tuple[Registration, Registration], Contacts] = {}
+        kept: dict[tuple[Registration, Registration], list[NestedSearch]] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
             started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
@@ -247,8 +238,8 @@ class FemIdSolver(IdentifyingSolver):
                 sought = [self.unknowns]
                 if problem.load.kind == "cylinder":
                     sought.insert(0, self.under_cylinder)
-                kept[frames] = Contacts([self._search(own, names) for names in sought])
-            found = kept[frames].identify(observations, progress)
+                kept[frames] = [self._search(own, names) for names in sought]
+            found = identified(kept[frames], observations, progress)
             mesh = found.best.model.unknowns.problem.mesh
             stats = {
                 "seconds": time.perf_counter() - started,

@@ -110,21 +110,11 @@ class ThickBody:
         self._walls[..., 0, :2, :2] = unknowns.motion.gradients[:, rule.location.cells]
         base = self.space.boundary_nodes("base")
         self._free = ~np.isin(np.arange(len(self.space.nodes)), base)
+        self.front = self.space.nodes[np.setdiff1d(self.space.boundary_nodes("front"), base)]
+        self.shape = len(self.space.nodes), len(COMPONENT)
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
         self.feet[:, base, :2] = unknowns.feet.motions(self.space.nodes[base])
         self._blocks = NodeBlocks.of(self.space)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(N, D)."""
-        return len(self.space.nodes), len(COMPONENT)
-
-    @property
-    def front(self) -> FloatArray:
-        """Nodes of the front that are not held."""
-        return self.space.nodes[
-            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
-        ]
 
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""

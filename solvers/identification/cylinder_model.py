@@ -12,12 +12,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, PressedBody
 from pinnray.solvers.identification.front_contact import Cylinder, FrontContact, Stage
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
-from pinnray.solvers.solver import NoSolutionError
 
 NEAR = 0.04
 """Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
@@ -39,20 +37,14 @@ class CylinderModel(ResponseModel):
         rows = body.traction_rows(self._points, np.eye(len(self._points)))
         self._rows = csr_matrix(rows.reshape(2 * len(self._points), -1))
 
-    def unstable(self, response: Response) -> int:
-        """As the patch has it, with what touches held along the normal, and what sticks altogether."""
-        hypothesis, stage = response.hypothesis, response.way[-1]
-        there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
-        if there is None:
-            raise NoSolutionError("the finger that was found is inside out")
-        cylinder = self._cylinder(hypothesis, 1.0)
+    def _held(self, response: Response) -> FloatArray:
+        """What touches is held along the normal, and what sticks altogether."""
+        cylinder, stage = self._cylinder(response.hypothesis, 1.0), response.way[-1]
         normal = (self._moved(response.state) - cylinder.centre) / cylinder.radius
         along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
         sticks = stage.touches & (stage.slips == 0)
-        ways = np.concatenate([_held(normal, stage.touches), _held(along, sticks)])
-        rows = (ways @ self._rows).reshape(-1, *self.body.shape)
-        negative = there.negative()
-        return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
+        ways = np.concatenate([_along(normal, stage.touches), _along(along, sticks)])
+        return np.asarray((ways @ self._rows).reshape(-1, *self.body.shape))
 
     def extrapolated(self, about: Response, values: FloatArray) -> Response:
         """See `ResponseModel`; the force, too, is of first order."""
@@ -276,7 +268,7 @@ def response_model(body: Body, unknowns: Unknowns, *, weighed: bool) -> Response
     return CylinderModel(body, unknowns, weighed=weighed)
 
 
-def _held(ways: FloatArray, held: BoolArray) -> FloatArray:
+def _along(ways: FloatArray, held: BoolArray) -> FloatArray:
     """Rows (k, 2 m) of the displacement along directions (m, 2) of the k points of a mask."""
     rows = np.eye(len(held))[held]
     return (rows[:, :, None] * ways).reshape(len(rows), 2 * len(ways))

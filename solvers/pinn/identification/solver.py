@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.identification import FemBody
 from pinnray.solvers.identification.fit import Fit
@@ -65,10 +64,8 @@ class PinnIdSolver(IdentifyingSolver):
     cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=17)
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.spacing) and self.spacing > 0):
-            raise UserError(f"pinn-id: the spacing must be positive, got {self.spacing}")
-        if self.seed < 0:
-            raise UserError(f"pinn-id: the seed must be zero or more, got {self.seed}")
+        self.check_positive("spacing")
+        self.check_not_negative("seed")
         super().__post_init__()
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
@@ -105,7 +102,8 @@ class PinnIdSolver(IdentifyingSolver):
     ) -> tuple[Solution, NestedSearch, Identified]:
         started = time.perf_counter()
         problem = replace(problem, observations=observations)
-        elements = self._elements(problem)
+        body = partial(FemBody, degree=2)
+        elements = Identifier(self, coarser(problem) or problem, body, cost_change=ROUGHLY)
         network = Identifier(
             self, problem, self._body, cost_change=COST_CHANGE, flexibility=elements.flexibility
         )
@@ -127,11 +125,6 @@ class PinnIdSolver(IdentifyingSolver):
         return NetworkBody.of(
             replace(WINDOWS, seed=self.seed), unknowns.problem, unknowns.motion, self.spacing
         )
-
-    def _elements(self, problem: Problem) -> Identifier:
-        """Seeks the unknowns by quadratic finite elements, coarse ones on a fine mesh."""
-        body = partial(FemBody, degree=2)
-        return Identifier(self, coarser(problem) or problem, body, cost_change=ROUGHLY)
 
 
 def _projected(fit: Fit, model: ResponseModel) -> Response:
