@@ -47,27 +47,8 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`."""
         check_problem(self, problem)
-        return self._solve(self.coarser(problem), problem, progress)
-
-    def coarser(self, problem: Problem) -> Problem | None:
-        """The problem on the coarse elements on which the load is followed; None for the given ones."""
         on_way = problem.load.friction or self.stops  # friction depends on the way, and stops are on it
-        return None if on_way else coarser(problem, MOST)
-
-    def path(
-        self,
-        problem: Problem,
-        space: LagrangeSpace,
-        constraints: DisplacementConstraints | None = None,
-        *,
-        rough: bool = False,
-    ) -> LoadPath:
-        """The load path, not yet followed; for the arguments see `LoadPath`."""
-        near = problem.load.kind == "cylinder" and not self.stops  # is near enough on the way to the end
-        exact_from = np.inf if rough else float(near)
-        return LoadPath(problem, space, constraints, steps=self, exact_from=exact_from)
-
-    def _solve(self, coarse: Problem | None, problem: Problem, progress: Progress) -> Solution:
+        coarse = None if on_way else coarser(problem, MOST)
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         path = self.path(problem, space)
@@ -110,6 +91,19 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
             error=error,
             contact=contact_of(problem, abscissa, regions[-1]),
         )
+
+    def path(
+        self,
+        problem: Problem,
+        space: LagrangeSpace,
+        constraints: DisplacementConstraints | None = None,
+        *,
+        rough: bool = False,
+    ) -> LoadPath:
+        """The load path, not yet followed; for the arguments see `LoadPath`."""
+        near = problem.load.kind == "cylinder" and not self.stops  # is near enough on the way to the end
+        exact_from = np.inf if rough else float(near)
+        return LoadPath(problem, space, constraints, steps=self, exact_from=exact_from)
 
 
 def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
