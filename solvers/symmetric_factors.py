@@ -104,10 +104,6 @@ class BlockMatrix:
     columns: IntArray  # Its column, at least the row and ascending within it, shape (k,)
     blocks: FloatArray  # Shape (k, b, b)
 
-    def diagonal(self) -> FloatArray:
-        """The diagonal, shape (n, b)."""
-        return np.diagonal(self.blocks[self.rows == self.columns], axis1=1, axis2=2)
-
     def factorised(self, regularisation: float, *, definite: bool = True) -> "Factors":
         """The factors of the matrix with its diagonal scaled to one, for any number of solves.
 
@@ -118,7 +114,7 @@ class BlockMatrix:
         Raises:
             UserError: If the factorisation fails.
         """
-        diagonal = np.abs(self.diagonal())
+        diagonal = np.abs(np.diagonal(self.blocks[self.rows == self.columns], axis1=1, axis2=2))
         scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
         scaled = self.blocks * scale[self.rows, :, None]
         scaled *= scale[self.columns, None, :]

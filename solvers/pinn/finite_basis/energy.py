@@ -89,11 +89,6 @@ class NetworkEnergy:
         """The quadrature points, shape (q, 2), mm."""
         return torch.cat([patch.points for patch in self.patches]).numpy()
 
-    @property
-    def points(self) -> int:
-        """Number of quadrature points, q."""
-        return len(self.weights)
-
     def total(self, output: torch.Tensor) -> float:
         """The energy per depth of an output layer (c, 2, m + 1), N mm / mm."""
         return self._total(self.gradients(output[None])[0])
@@ -106,8 +101,7 @@ class NetworkEnergy:
         """
         gradient = self.gradients(output[None])[0]
         stress, tangent = self._stress_and_tangent(gradient)
-        constant = self.material.law == "linear"
-        return self.forces(stress[None])[0], self.hessian(tangent[:1] if constant else tangent)
+        return self.forces(stress[None])[0], self.hessian(tangent[:1] if self.quadratic else tangent)
 
     def gradient(self, output: torch.Tensor) -> torch.Tensor:
         """The gradient alone, N/mm: a twentieth of the time."""
@@ -165,7 +159,7 @@ class NetworkEnergy:
     def forces(self, stresses: torch.Tensor) -> torch.Tensor:
         """Forces (s, c, 2, m + 1), N/mm, of Piola-Kirchhoff stresses P at the points, (s, q, 2, 2), MPa."""
         weighted = (self.weights[:, None, None] * stresses).permute(1, 3, 0, 2)
-        columns = weighted.reshape(2 * self.points, -1).numpy()
+        columns = weighted.reshape(2 * len(self.weights), -1).numpy()
         found = torch.from_numpy(self.gradient_operator.T @ columns)
         return found.view(-1, self.basis.per_window, len(stresses), 2).permute(2, 0, 3, 1).contiguous()
 
@@ -205,7 +199,7 @@ class NetworkEnergy:
         parts = imap_in_threads(task, range(len(self.patches)))
         values, counts, columns = (np.concatenate(part) for part in zip(*parts, strict=True))
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        return csr_matrix((values, columns, starts), shape=(2 * self.points, self.basis.size))
+        return csr_matrix((values, columns, starts), shape=(2 * len(self.weights), self.basis.size))
 
     def hessian(self, tangent: torch.Tensor) -> BlockMatrix:
         """Second derivative by the output layer, N/mm^2.

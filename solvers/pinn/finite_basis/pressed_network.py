@@ -66,11 +66,6 @@ class Taken(NamedTuple):
     potential: float  # There
     length: float  # The part, 0 if the potential does not fall
 
-    @property
-    def near(self) -> bool:
-        """Whether the minimum is so near that the tangent before will do."""
-        return self.length == 1 and self.step.size < NEAR
-
 
 class Minimum(NamedTuple):
     """The least potential with given multipliers."""
@@ -222,7 +217,8 @@ class PressedNetwork:
             stage = self.stage(output, fraction, multipliers)
             fresh = tangent.output is output
             taken = self._taken(stage, output, tangent, least, SHORTEST if fresh else 1.0)
-            if not fresh and not (taken and taken.near):
+            # Near the minimum the tangent before will do.
+            if not fresh and not (taken and taken.length == 1 and taken.step.size < NEAR):
                 formed = self._tangent(output)
                 if formed is None:
                     return None, iteration

@@ -1,7 +1,7 @@
 """Base of the presets `fast` and `local`: a network with random hidden weights and an exact output layer."""
 
 import time
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import ClassVar
@@ -44,7 +44,7 @@ FINEST = 0.75
 
 
 @dataclass(frozen=True, kw_only=True)
-class FiniteBasisSolver(NetworkSolver):
+class FiniteBasisSolver(NetworkSolver, ABC):
     """A network with random hidden weights, whose output layer alone is solved for, exactly.
 
     Its windows are spread over the body, denser at re-entrant corners, and have a few random tanh neurons
@@ -158,7 +158,7 @@ class FiniteBasisSolver(NetworkSolver):
                 "unknowns": field.output.numel(),
                 "units": field.basis.size,
                 "windows": field.basis.windows.count,
-                "quadrature_points": network.energy.points,
+                "quadrature_points": len(network.energy.weights),
                 "newton_iterations": reached.iterations,
                 "unstable_directions": state.unstable,
                 **network.marker_stats(state),
