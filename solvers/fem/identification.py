@@ -203,8 +203,6 @@ class FemIdSolver(IdentifyingSolver):
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
-    loads: ClassVar[tuple[str, ...]] = FemNonlinearSolver.loads  # of it come the drawn contact and a cylinder
-    friction: ClassVar[bool] = True
     cost: ClassVar[Cost] = Cost(per_triangle=275)
 
     def __post_init__(self) -> None:

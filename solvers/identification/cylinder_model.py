@@ -127,17 +127,11 @@ class CylinderModel(ResponseModel):
     def _rest(self, hypothesis: Hypothesis, by: HypothesisSlopes) -> Stage:
         cylinder, count = self._cylinder(hypothesis, 0.0), len(self._points)
         still = np.zeros((len(by.friction), count, 2))
-        return Stage(
-            0.0,
-            np.zeros(self.body.shape),
-            still[0],
-            cylinder.places(self._points),
-            np.zeros(count, dtype=np.bool_),
-            np.zeros(count),
-            np.zeros((len(still), *self.body.shape)),
-            still,
-            -by.centre @ cylinder.place_slopes(self._points).T,
-        )
+        state, slopes = np.zeros(self.body.shape), np.zeros((len(still), *self.body.shape))
+        touches, slips = np.zeros(count, dtype=np.bool_), np.zeros(count)
+        places = cylinder.places(self._points)
+        place_slopes = -by.centre @ cylinder.place_slopes(self._points).T
+        return Stage(0.0, state, still[0], places, touches, slips, slopes, still, place_slopes)
 
     def _ahead(self, way: list[Stage], share: float) -> Stage:
         """The last stage or, from the second one on, the state on the line through the last two."""
@@ -210,17 +204,9 @@ class CylinderModel(ResponseModel):
         slopes += np.tensordot(force_slopes[:, near].reshape(len(slopes), -1), answers, axes=1)
         moved = self._moves(slopes) - centre[:, None]
         points = self._moved(state)
-        return Stage(
-            share,
-            state,
-            forces,
-            cylinder.places(points),
-            touches,
-            slips,
-            slopes,
-            force_slopes,
-            np.einsum("pmi,mi->pm", moved, cylinder.place_slopes(points)),
-        )
+        place_slopes = np.einsum("pmi,mi->pm", moved, cylinder.place_slopes(points))
+        places = cylinder.places(points)
+        return Stage(share, state, forces, places, touches, slips, slopes, force_slopes, place_slopes)
 
     def _pressed(
         self, values: FloatArray, hypothesis: Hypothesis, by: HypothesisSlopes, way: list[Stage]

@@ -42,9 +42,8 @@ class Cylinder(NamedTuple):
     def place_slopes(self, points: FloatArray) -> FloatArray:
         """Derivatives of the places by the points, shape (m, 2)."""
         away = points - self.centre
-        return np.asarray(
-            self.radius / (away**2).sum(axis=1)[:, None] * np.stack([-away[:, 1], away[:, 0]], 1)
-        )
+        turned = np.stack([-away[:, 1], away[:, 0]], 1)
+        return np.asarray(self.radius / (away**2).sum(axis=1)[:, None] * turned)
 
 
 class Pressed(NamedTuple):

@@ -330,7 +330,8 @@ class MarkerData:
     @classmethod
     def of(cls, problem: Problem, observations: Observations, radius: float | None) -> "MarkerData":
         """All markers that were seen; see `MarkerSettings.marker_radius` for the radius, mm."""
-        points, force = observations.points[observations.visible], observations.weighed
+        seen, force = observations.visible, observations.weighed
+        points = observations.points[seen]
         if not len(points):
             raise UserError("there are no markers to find a force by")
         if force is not None:
@@ -339,13 +340,9 @@ class MarkerData:
                     "a weighed force is that of a finger with a depth: give the problem its finger"
                 )
             force = force[0] / problem.finger.depth, force[1] / problem.finger.depth
-        return cls(
-            points,
-            observations.displacements[observations.visible],
-            standard_deviations(observations),
-            radius_within(problem.mesh, points, observations.marker_radius if radius is None else radius),
-            force,
-        )
+        radius = observations.marker_radius if radius is None else radius
+        moved, radius = observations.displacements[seen], radius_within(problem.mesh, points, radius)
+        return cls(points, moved, standard_deviations(observations), radius, force)
 
     @property
     def errors(self) -> GrossErrors:
@@ -403,6 +400,5 @@ class MarkerModel:
         if self.measurement.force is None:
             return values, derivatives
         stroke, _ = stroke_axes(self.unknowns.problem.load)
-        return np.append(values, response.force @ stroke), np.vstack(
-            [derivatives, response.force_slopes @ stroke]
-        )
+        derivatives = np.vstack([derivatives, response.force_slopes @ stroke])
+        return np.append(values, response.force @ stroke), derivatives

@@ -115,6 +115,7 @@ class Identified:
         field = kind(**vars(members[0].found), members=members)
         sentence, loose = self.sentence(missed), best.model.unknowns.unregistered
         contradicted = best.estimate.inflation > CONTRADICTED
+        left_out = [f"{said}, and was left out" for said in self._contradictions()]
         return Solution(
             solver=name,
             problem=field.problem,
@@ -124,11 +125,7 @@ class Identified:
             status=Status(
                 best.estimate.converged and best.exact and not unstable and not contradicted,
                 f"{unstable_phrase(unstable)}; {sentence}" if unstable else sentence,
-                [
-                    *self._unexplained(),
-                    *(f"{said}, and was left out" for said in self._contradictions()),
-                    *self._wrapped(),
-                ],
+                [*self._unexplained(), *left_out, *self._wrapped()],
             ),
             stats={**stats, **self.stats(), "unstable_directions": unstable},
             left_out=leave_one_out_displacements(problem, -without),
@@ -206,9 +203,8 @@ class Identified:
         }
         for name, _, value, *rest in self.best.parameters:
             columns = ("deviation", "low", "high", "resolution")
-            numbers |= {name: value} | {
-                f"{name}_{column}": each for column, each in zip(columns, rest, strict=True)
-            }
+            numbers[name] = value
+            numbers |= {f"{name}_{column}": each for column, each in zip(columns, rest, strict=True)}
         force, low, high = self.force.force
         numbers |= {"law": self.best.law, "force": force, "force_low": low, "force_high": high}
         for name, probability in self._laws().items():
@@ -236,11 +232,8 @@ class Identified:
             )
         force, low, high = self.force.force
         parts.append(f"force {force:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
-        parts.append(
-            ", ".join(
-                f"{u.name} {u.value:.4g} ({u.low:.4g} to {u.high:.4g}) {u.unit}".rstrip() for u in parameters
-            )
-        )
+        values = (f"{u.name} {u.value:.4g} ({u.low:.4g} to {u.high:.4g}) {u.unit}" for u in parameters)
+        parts.append(", ".join(map(str.rstrip, values)))
         if len(laws := self._laws()) > 1:
             shares = ", ".join(f"{law} {share:.1%}" for law, share in laws.items())
             parts.append(f"law {shares} probable")
@@ -264,8 +257,7 @@ class Identified:
             parts.append(
                 f"{found.inflation:.3g} times their standard deviations; intervals are as much wider"
             )
-        if unresolved := [
-            f"{u.name} ({u.resolution:.0%})" for u in parameters if u.resolution < MIN_RESOLUTION
-        ]:
+        unresolved = [f"{u.name} ({u.resolution:.0%})" for u in parameters if u.resolution < MIN_RESOLUTION]
+        if unresolved:
             parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
         return "; ".join(parts)

@@ -142,13 +142,8 @@ class LoadPath:
         last = way.points[-1]
         if last.fraction < 1 or way.left or way.equilibrium.unstable:
             return False
-        guess = replace(
-            self.equilibrium.rest,
-            fraction=1.0,
-            nodal=self.interpolated(way, last.nodal),
-            forces=last.forces,
-            contact=self._carried_contact(way, last),
-        )
+        nodal, contact = self.interpolated(way, last.nodal), self._carried_contact(way, last)
+        guess = replace(self.equilibrium.rest, fraction=1.0, nodal=nodal, forces=last.forces, contact=contact)
         newton, self._newton = self._newton, self._begin(max_iterations=CARRIED)
         own = self.equilibrium.contact
         harder = [replace(own, stiffness=HARDER * own.stiffness)] if own else []

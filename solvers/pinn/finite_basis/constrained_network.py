@@ -87,14 +87,9 @@ class ConstrainedNetwork:
             springs.append(PointSprings(*misfit.sampling(), [0, 1]))
             targets = np.concatenate([targets, misfit.observed.ravel()])
             compliance = np.concatenate([compliance, 1 / misfit.weights.ravel()])
-        return cls(
-            energy,
-            _functionals(springs, energy.basis),
-            targets,
-            compliance,
-            tuple(springs),
-            weighting if misfit else None,
-        )
+        functionals = _functionals(springs, energy.basis)
+        weighting = weighting if misfit else None
+        return cls(energy, functionals, targets, compliance, tuple(springs), weighting)
 
     def with_neurons(self, neurons: torch.Tensor, factor: float) -> "ConstrainedNetwork":
         """The network with other neurons (3, m, c), the factor of the markers' weights held."""
@@ -172,15 +167,9 @@ class ConstrainedNetwork:
         work = abs(float(fraction * self.targets @ forces))
         reached = output + torch.from_numpy(change).view_as(output)
         derivative = forces @ self.functionals - factors.damping * change
-        return NewtonIterate(
-            reached,
-            forces,
-            decrement / work if work else decrement,
-            markers,
-            factor,
-            springs.unstable(factors.negative),
-            0.5 * float(derivative @ reached.numpy().ravel()) if self.energy.quadratic else None,
-        )
+        energy = 0.5 * float(derivative @ reached.numpy().ravel()) if self.energy.quadratic else None
+        share, unstable = decrement / work if work else decrement, springs.unstable(factors.negative)
+        return NewtonIterate(reached, forces, share, markers, factor, unstable, energy)
 
     def at_rest(self) -> NewtonIterate:
         """The solution under the whole load, of a linear law."""

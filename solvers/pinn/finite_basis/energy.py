@@ -68,9 +68,8 @@ class NetworkEnergy:
         diagonal = torch.arange(count) * (count + 1)
         known, number = torch.unique(torch.cat([*keys, diagonal]), return_inverse=True)
         patches, start = [], 0
-        for (_, places, near), upper in zip(
-            cuts, number[:-count].split([len(key) for key in keys]), strict=True
-        ):
+        uppers = number[:-count].split([len(key) for key in keys])
+        for (_, places, near), upper in zip(cuts, uppers, strict=True):
             rows = slice(start, start + len(places))
             patches.append(QuadraturePatch(places, near, upper, rows))
             start = rows.stop

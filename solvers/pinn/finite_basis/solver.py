@@ -78,6 +78,7 @@ class FiniteBasisSolver(NetworkSolver, ABC):
     cell: float
     base_length: float = 5.0
     seed: int = 0
+    name: ClassVar[str] = "pinn-std"
     laws: ClassVar[tuple[str, ...]] = LAWS
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
     cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=6)

@@ -59,8 +59,6 @@ class PinnIdSolver(IdentifyingSolver):
     twin: ClassVar[str] = "fem-id"
     sought: ClassVar[tuple[str, ...]] = tuple(name for name in DEFAULT if name != "feet")
     laws: ClassVar[tuple[str, ...]] = LAWS
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
-    friction: ClassVar[bool] = True
     cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=17)
 
     def __post_init__(self) -> None:
@@ -122,9 +120,8 @@ class PinnIdSolver(IdentifyingSolver):
         return found.solution(self.name, problem, stats)
 
     def _body(self, unknowns: Unknowns) -> NetworkBody:
-        return NetworkBody.of(
-            replace(WINDOWS, seed=self.seed), unknowns.problem, unknowns.motion, self.spacing
-        )
+        windows = replace(WINDOWS, seed=self.seed)
+        return NetworkBody.of(windows, unknowns.problem, unknowns.motion, self.spacing)
 
 
 def _projected(fit: Fit, model: ResponseModel) -> Response:
