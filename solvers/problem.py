@@ -88,12 +88,8 @@ class Problem:
         content: list[object] = [self.mesh.digest, self.material.model_dump(), self.load.model_dump()]
         if (seen := self.observations) is not None:
             content += [seen.points, seen.displacements, seen.standard_deviations, seen.visible]
-            content += [
-                seen.weighed,
-                seen.marker_radius,
-                *vars(seen.pressed).values(),
-                *vars(seen.drawn).values(),
-            ]
+            content += [seen.weighed, seen.marker_radius]
+            content += [*vars(seen.pressed).values(), *vars(seen.drawn).values()]
         if self.finger is not None:
             content.append(self.finger.digest)
         if self.learned is not None:

@@ -121,12 +121,8 @@ class BlockMatrix:
         scaled[self.rows == self.columns] += regularisation * np.eye(scaled.shape[-1])
         starts = np.searchsorted(self.rows, np.arange(self.size + 1))
         index: Any = PETSc.IntType
-        stored = PETSc.Mat().createSBAIJ(
-            (scale.size, scale.size),
-            scaled.shape[-1],
-            csr=(starts.astype(index), self.columns.astype(index), scaled.ravel()),
-            comm=PETSc.COMM_SELF,
-        )
+        csr, size = (starts.astype(index), self.columns.astype(index), scaled.ravel()), (scale.size,) * 2
+        stored = PETSc.Mat().createSBAIJ(size, scaled.shape[-1], csr=csr, comm=PETSc.COMM_SELF)
         factors = SymmetricFactors(stored, definite=definite, roomy=True)
         try:
             factors.update()

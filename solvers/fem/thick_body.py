@@ -130,13 +130,11 @@ class ThickBody:
         def factors() -> Factors:
             return self._factorised(tangent, there)
 
-        return Linearised(
-            self._forces(there.pulled_back(stress)),
-            lambda right: (
-                factors().solve((right * self._free[:, None]).reshape(len(right), -1)).reshape(right.shape)
-            ),
-            lambda: factors().negative,
-        )
+        def solve(right: FloatArray) -> FloatArray:
+            flat = (right * self._free[:, None]).reshape(len(right), -1)
+            return factors().solve(flat).reshape(right.shape)
+
+        return Linearised(self._forces(there.pulled_back(stress)), solve, lambda: factors().negative)
 
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray

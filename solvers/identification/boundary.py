@@ -125,13 +125,10 @@ class Clamp:
         (soft, soft_slopes), (f, f_slopes), (x, x_slopes) = softness, force, place
         lever = x - self.centre
         moment, moment_slopes = _cross(lever, f), _cross(x_slopes, f) + _cross(lever, f_slopes)
-        return RigidMotion(
-            self.centre,
-            soft * f / self.length,
-            float(soft * moment / self.inertia),
-            (np.outer(soft_slopes, f) + soft * f_slopes) / self.length,
-            np.asarray((soft_slopes * moment + soft * moment_slopes) / self.inertia),
-        )
+        shift, turn = soft * f / self.length, float(soft * moment / self.inertia)
+        shift_slopes = (np.outer(soft_slopes, f) + soft * f_slopes) / self.length
+        turn_slopes = np.asarray((soft_slopes * moment + soft * moment_slopes) / self.inertia)
+        return RigidMotion(self.centre, shift, turn, shift_slopes, turn_slopes)
 
 
 class Feet:

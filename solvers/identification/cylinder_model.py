@@ -222,11 +222,8 @@ class CylinderModel(ResponseModel):
         contact, place = weights @ displacements, weights @ self._points
         contact_slopes = weight_slopes @ displacements + np.einsum("m,pmi->pi", weights, moved)
         place_slopes = weight_slopes @ self._points
-        motion = self._clamp.motion(
-            (hypothesis.softness, by.softness),
-            (force, force_slopes),
-            (place + contact, place_slopes + contact_slopes),
-        )
+        softness, there = (hypothesis.softness, by.softness), (place + contact, place_slopes + contact_slopes)
+        motion = self._clamp.motion(softness, (force, force_slopes), there)
         return Response(
             values.copy(),
             hypothesis,

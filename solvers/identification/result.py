@@ -63,23 +63,17 @@ class Identified:
     def force(self) -> IdentifiedForce:
         """The force and its place: the mean over the laws, with an interval that holds their scatter."""
         places = [place for fit in self.fits if (place := fit.place)]
-        stroke, across = stroke_axes(self.best.model.unknowns.problem.load)
+        stroke, side = stroke_axes(self.best.model.unknowns.problem.load)
         components = [fit.component(stroke) for fit in self.fits]
-        force = self._mean(components)
+        force, across = self._mean(components), self._mean([fit.component(side) for fit in self.fits])
         found = np.array([value for value, _ in components]) - force.value
         parts = self.best.variances(stroke) | {"law": float(self.probabilities @ found**2)}
         whole = sum(parts.values()) or 1.0
         shares = {name: parts[name] / whole for name in sorted(parts, key=parts.__getitem__, reverse=True)}
         narrower = narrowing_phrase(self.best, stroke, parts["law"])
-        return IdentifiedForce(
-            force,
-            self._mean([fit.component(across) for fit in self.fits]),
-            self._mean(places) if places else None,
-            shares,
-            f"The variance of the force comes from: {split_phrase(parts)}. {narrower}",
-            self.best.contact,
-            self.best.learned,
-        )
+        advice = f"The variance of the force comes from: {split_phrase(parts)}. {narrower}"
+        position = self._mean(places) if places else None
+        return IdentifiedForce(force, across, position, shares, advice, self.best.contact, self.best.learned)
 
     def _cylinder(self) -> float | None:
         """Probability of the contact of a cylinder; None where the load has none."""

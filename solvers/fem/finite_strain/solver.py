@@ -64,10 +64,8 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
         solved = time.perf_counter()
         error = _error(path, problem, space)
         whole.close()
-        remarks = [
-            f"error of the discretisation {error.phrase}" if error else "",
-            locking_advice(self.degree, problem.material),
-        ]
+        known = f"error of the discretisation {error.phrase}" if error else ""
+        remarks = [known, locking_advice(self.degree, problem.material)]
         return Solution(
             solver=self.name,
             problem=problem,

@@ -74,14 +74,8 @@ class NetworkEnergy:
             patches.append(QuadraturePatch(places, near, upper, rows))
             start = rows.stop
         order = np.concatenate([numbers for numbers, *_ in cuts])
-        return cls(
-            basis=basis,
-            material=material,
-            patches=patches,
-            weights=torch.from_numpy(weights[order]),
-            rows=known.numpy() // count,
-            columns=known.numpy() % count,
-        )
+        first, second = known.numpy() // count, known.numpy() % count
+        return cls(basis, material, patches, torch.from_numpy(weights[order]), first, second)
 
     @property
     def places(self) -> FloatArray:

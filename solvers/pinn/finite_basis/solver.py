@@ -147,13 +147,14 @@ class FiniteBasisSolver(NetworkSolver, ABC):
         elif problem.load.kind != "cylinder":
             reaction[problem.load.prescribed] = network.reaction(state.forces)
         fit = None if state.markers is None else state.markers.fit(state.factor)
+        changed = f"{finer:.2g} times finer windows changed the displacement by {change:.2%}"
         return Solution(
             solver=self.name,
             problem=problem,
             field=field,
             energy=energy,
             reaction=reaction,
-            status=self._status(problem, reached, finer, change, error, fit),
+            status=self._status(problem, reached, changed, error, fit),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": field.output.numel(),
@@ -210,35 +211,22 @@ class FiniteBasisSolver(NetworkSolver, ABC):
 
     def _energy(self, problem: Problem, scale: float) -> NetworkEnergy:
         mesh = problem.mesh
-        spacing = PointSpacing.of(
-            problem,
-            wall=self.wall_spacing * scale,
-            corner=self.corner_spacing * scale,
-            growth=self.growth * scale,
-        )
+        wall, corner = self.wall_spacing * scale, self.corner_spacing * scale
+        spacing = PointSpacing.of(problem, wall=wall, corner=corner, growth=self.growth * scale)
         triangles = graded_triangles(mesh, spacing, self.cell)
         centres = spread_points(triangles, mesh, spacing, self.thinning)
         distances = spacing.at(centres)
         rng = np.random.default_rng(self.seed)
+        windows = self.windows(centres, distances, rng)
+        steepness, constraint = self.steepness / distances, HardConstraint.of(mesh, self.base_length)
         basis = FiniteBasis.around(
-            self.windows(centres, distances, rng),
-            centres,
-            self.steepness / distances,
-            neurons=self.neurons,
-            constraint=HardConstraint.of(mesh, self.base_length),
-            rng=rng,
+            windows, centres, steepness, neurons=self.neurons, constraint=constraint, rng=rng
         )
         quadrature = graded_quadrature(triangles, spacing, self.cell)
         return NetworkEnergy.of(basis, problem.material, *quadrature)
 
     def _status(
-        self,
-        problem: Problem,
-        reached: LoadStep,
-        finer: float,
-        change: float,
-        error: float,
-        fit: MarkerFit | None,
+        self, problem: Problem, reached: LoadStep, changed: str, error: float, fit: MarkerFit | None
     ) -> Status:
         region = reached.region
         if problem.load.kind == "cylinder" and reached.fraction == 1 and region is None:
@@ -252,8 +240,7 @@ class FiniteBasisSolver(NetworkSolver, ABC):
                 "take a smaller spacing, the load patch or a smaller stroke",
             )
         message = (
-            f"{finer:.2g} times finer windows changed the displacement by {change:.2%}, "
-            f"so that its error is about {error:.2%} or less (criterion {self.tolerance:.2%})"
+            f"{changed}, so that its error is about {error:.2%} or less (criterion {self.tolerance:.2%})"
         )
         if unstable := reached.state.unstable:
             return Status(False, f"{message}; but {unstable_phrase(unstable)}")
