@@ -44,14 +44,10 @@ class Problem:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        for name, kind, missing in (
-            ("mesh", TriangleMesh, False),
-            ("material", Material, False),
-            ("load", Load, False),
-            ("observations", Observations, True),
-        ):
+        kinds = {"mesh": TriangleMesh, "material": Material, "load": Load, "observations": Observations}
+        for name, kind in kinds.items():
             value = getattr(self, name)
-            if not (isinstance(value, kind) or (missing and value is None)):
+            if not isinstance(value, kind) and not (name == "observations" and value is None):
                 raise UserError(f"{name} must be a {kind.__name__}, not {reprlib.repr(value)}")
         count = len(self.mesh.points)
         first, second = self.mesh.edges.T

@@ -121,8 +121,8 @@ class BlockMatrix:
         scaled[self.rows == self.columns] += regularisation * np.eye(scaled.shape[-1])
         starts = np.searchsorted(self.rows, np.arange(self.size + 1))
         index: Any = PETSc.IntType
-        csr, size = (starts.astype(index), self.columns.astype(index), scaled.ravel()), (scale.size,) * 2
-        stored = PETSc.Mat().createSBAIJ(size, scaled.shape[-1], csr=csr, comm=PETSc.COMM_SELF)
+        csr = starts.astype(index), self.columns.astype(index), scaled.ravel()
+        stored = PETSc.Mat().createSBAIJ((scale.size,) * 2, scaled.shape[-1], csr=csr, comm=PETSc.COMM_SELF)
         factors = SymmetricFactors(stored, definite=definite, roomy=True)
         try:
             factors.update()
@@ -153,7 +153,3 @@ class Factors:
     def negative(self) -> int:
         """Number of negative eigenvalues."""
         return self.scaled.negative
-
-    def close(self) -> None:
-        """Free the factors."""
-        self.scaled.destroy()

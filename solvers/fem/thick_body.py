@@ -235,9 +235,8 @@ class ThickBody:
             first, second = np.flatnonzero(i == COMPONENT), np.flatnonzero(k == COMPONENT)
             both = np.einsum("z,mzd,lze->mlzde", self._shares, along[..., first], along[..., second])
             part = tangent[:, :, i, :, k].transpose(2, 3, 0, 1) @ both.reshape(*both.shape[:3], -1)
-            found[..., first[:, None], second] = part.transpose(2, 0, 1, 3).reshape(
-                points, 3, 3, len(first), len(second)
-            )
+            shape = points, 3, 3, len(first), len(second)
+            found[..., first[:, None], second] = part.transpose(2, 0, 1, 3).reshape(shape)
         found *= (self._weights * there.volume[:, 0, 0, 0])[:, None, None, None, None]
         local = there.inverse.swapaxes(-1, -2)[:, 0] @ self._local  # derivatives after the walls' motion
         blocks = self._blocks.of_elements(
@@ -255,8 +254,7 @@ class SideFace:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement in the face, shape (n, 2), mm."""
-        (found,) = self.body.displacements(self.state[None], location)
-        return np.asarray(found)
+        return np.asarray(self.body.displacements(self.state[None], location)[0])
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j in the face, shape (n, 2, 2)."""
@@ -264,8 +262,7 @@ class SideFace:
 
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 3, 3)."""
-        (found,) = self.body.gradients(self.state[None], location)
-        return np.asarray(found)
+        return np.asarray(self.body.gradients(self.state[None], location)[0])
 
 
 def _gradient(shapes: Sequence[csr_matrix], state: FloatArray, across: Functions) -> FloatArray:

@@ -201,12 +201,7 @@ class PressedNetwork:
         return output
 
     def _minimum(
-        self,
-        output: torch.Tensor,
-        fraction: float,
-        multipliers: FloatArray,
-        tolerance: float,
-        tangent: Tangent,
+        self, output: torch.Tensor, fraction: float, multipliers: FloatArray, largest: float, tangent: Tangent
     ) -> tuple[Minimum | None, int]:
         """The least potential with given multipliers, by Newton's method with a line search.
 
@@ -222,7 +217,7 @@ class PressedNetwork:
                 formed = self._tangent(output)
                 if formed is None:
                     return None, iteration
-                tangent, taken = formed, self._taken(stage, output, formed, least)
+                tangent, taken = formed, self._taken(stage, output, formed, least, SHORTEST)
             if taken is None:
                 return None, iteration
             if taken.step.size < ROUNDING:
@@ -230,17 +225,12 @@ class PressedNetwork:
             if taken.length == 0:
                 return None, iteration
             output, least = taken.output, taken.potential
-            if taken.length == 1 and taken.step.size < tolerance:
+            if taken.length == 1 and taken.step.size < largest:
                 return Minimum(output, taken.step, tangent), iteration
         return None, ITERATIONS
 
     def _taken(
-        self,
-        stage: ContactState,
-        output: torch.Tensor,
-        tangent: Tangent,
-        least: float,
-        shortest: float = SHORTEST,
+        self, stage: ContactState, output: torch.Tensor, tangent: Tangent, least: float, shortest: float
     ) -> Taken | None:
         """So much of a step that the potential falls; None if a point is turned inside out.
 

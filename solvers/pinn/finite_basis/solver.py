@@ -145,8 +145,10 @@ class FiniteBasisSolver(NetworkSolver, ABC):
         if region is not None:
             reaction[:] = region.force
         elif problem.load.kind != "cylinder":
-            reaction[problem.load.prescribed] = network.reaction(state.forces)
+            # The first functional of every prescribed component is a mean, whose multiplier is the force.
+            reaction[problem.load.prescribed] = state.forces[: len(problem.load.prescribed)]
         fit = None if state.markers is None else state.markers.fit(state.factor)
+        columns = "units", "energy", "estimated_error", "seconds"
         changed = f"{finer:.2g} times finer windows changed the displacement by {change:.2%}"
         return Solution(
             solver=self.name,
@@ -168,9 +170,7 @@ class FiniteBasisSolver(NetworkSolver, ABC):
                 "seed": self.seed,
                 "device": "cpu",
             },
-            history=dict(
-                zip(("units", "energy", "estimated_error", "seconds"), np.array(history).T, strict=True)
-            ),
+            history=dict(zip(columns, np.array(history).T, strict=True)),
             left_out=None if fit is None else leave_one_out_displacements(problem, fit.residual_without),
         )
 

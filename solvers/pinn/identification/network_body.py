@@ -228,7 +228,7 @@ class NetworkBody:
 
     def _factorised(self, tangent: torch.Tensor) -> Factors:
         if self._factors is not None:
-            self._factors.close()
+            self._factors.scaled.destroy()
         self._factors = self._energy.hessian(tangent).factorised(REGULARISATION, definite=False)
         self.factorisations += 1
         return self._factors
