@@ -27,7 +27,6 @@ from pinnray.geometry.mesh.boundary import mean_thickness
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import Lame, deformation_jacobian, energy_density_of, piola_stress_and_tangent
 from pinnray.solvers.fem.node_blocks import NodeBlocks
 from pinnray.solvers.identification.body import Linearised
@@ -92,8 +91,7 @@ class ThickBody:
 
     def __init__(self, unknowns: Unknowns, degree: int) -> None:
         problem = unknowns.problem
-        if problem.finger is None:
-            raise UserError("a finger without a depth has no side face")
+        assert problem.finger is not None  # it has a depth
         half, thickness = 0.5 * problem.finger.depth, mean_thickness(problem.mesh)
         below = max(half - 2 * thickness, 0.5 * half)
         ends = (INNER, 0.0, below), (LAYER, below, half)
@@ -141,8 +139,7 @@ class ThickBody:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """By the walls, as for a network, by the moduli, in which every law is linear, and by the base."""
         there = self._strained(state, changes)
-        if there is None:
-            raise UserError("the finger is inside out")
+        assert there is not None  # nothing is inside out at an equilibrium
         gradient, inverse, _ = there
         stress, tangent = piola_stress_and_tangent(self._law, gradient, lame)
         of_walls, of_feet = np.zeros((len(self._walls), *self.shape)), np.zeros_like(self.feet)

@@ -127,8 +127,7 @@ class PinnIdSolver(IdentifyingSolver):
 def _projected(fit: Fit, model: ResponseModel) -> Response:
     """The response of elements by the nearest states of a network."""
     body, response = model.body, fit.response
-    if not isinstance(body, NetworkBody):
-        raise TypeError("the bodies of pinn-id are networks")
+    assert isinstance(body, NetworkBody)
     elements = fit.model.unknowns.problem.mesh
     location = model.unknowns.problem.mesh.locate_on(elements, body.points)
     gradients = fit.model.body.gradients(np.stack([response.state, *response.slopes]), location)
