@@ -61,6 +61,7 @@ class NetworkBody:
         self._energy, self._walls = energy, torch.from_numpy(walls)
         self._law = energy.material.law
         self.shape = energy.basis.windows.count, 2, energy.basis.per_window  # Functions of a window last
+        self.points = energy.places  # The quadrature points, shape (q, 2), mm
         self.feet = np.zeros((0, *self.shape))  # None: the network is held at the whole base
         self._factors: Factors | None = None
         self.factorisations = 0
@@ -188,11 +189,6 @@ class NetworkBody:
         """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
         basis, outputs = self._energy.basis, torch.from_numpy(states)
         return basis.summed(basis.gradients, "xnwu,swiu->nsix", outputs, location.points).swapaxes(0, 1)
-
-    @property
-    def points(self) -> FloatArray:
-        """The quadrature points, shape (q, 2), mm."""
-        return self._energy.places
 
     def projected(self, gradients: FloatArray, lame: Lame, changes: FloatArray) -> FloatArray:
         """States (s, *shape) nearest to displacement gradients (s, q, 2, 2) at the points.
