@@ -236,11 +236,10 @@ class FemIdSolver(IdentifyingSolver):
                     sought.insert(0, self.under_cylinder)
                 kept[frames] = [self._search(own, names) for names in sought]
             found = identified(kept[frames], observations, progress)
-            mesh = found.best.model.unknowns.problem.mesh
             stats = {
                 "seconds": time.perf_counter() - started,
                 "unknowns": found.best.response.state.size,
-                "triangles": len(mesh.triangles),
+                "triangles": len(found.best.model.unknowns.problem.mesh.triangles),
                 "degree": self.degree,
             }
             return found.solution(self.name, replace(problem, observations=observations), stats)

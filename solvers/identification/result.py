@@ -191,10 +191,8 @@ class Identified:
     def stats(self) -> dict[str, float | int | str]:
         """All that was found, for tables: parameters, how well they are known, force and laws."""
         found = self.best.estimate
-        numbers: dict[str, float | int | str] = {
-            "evaluations": found.evaluations,
-            "inflation": found.inflation,
-        }
+        numbers: dict[str, float | int | str] = {}
+        numbers |= {"evaluations": found.evaluations, "inflation": found.inflation}
         for name, _, value, *rest in self.best.parameters:
             columns = ("deviation", "low", "high", "resolution")
             numbers[name] = value
@@ -248,9 +246,8 @@ class Identified:
         missed = np.delete(missed, self.best.doubted, axis=0)
         parts.append(f"markers missed by {np.sqrt((missed**2).mean()):.2g} mm (root mean square)")
         if found.inflation > 1:
-            parts.append(
-                f"{found.inflation:.3g} times their standard deviations; intervals are as much wider"
-            )
+            off = f"{found.inflation:.3g} times their standard deviations"
+            parts.append(f"{off}; intervals are as much wider")
         unresolved = [f"{u.name} ({u.resolution:.0%})" for u in parameters if u.resolution < MIN_RESOLUTION]
         if unresolved:
             parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")

@@ -143,10 +143,8 @@ class ForceTracker:
         if not visible.all():
             hidden = ", ".join(str(number + 1) for number in np.flatnonzero(~visible))
             remarks.append(f"hidden: marker {hidden}")
-        if found.posterior.inflation > 1:
-            remarks.append(
-                f"the markers are {found.posterior.inflation:.2g} times as far off as noise explains"
-            )
+        if (off := found.posterior.inflation) > 1:
+            remarks.append(f"the markers are {off:.2g} times as far off as noise explains")
         return self._reading(found, "; ".join(remarks))
 
     def _searched(
