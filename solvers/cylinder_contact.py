@@ -259,7 +259,6 @@ class ContactRegion:
     end: float  # Abscissa of the other end, mm
     parts: int  # Number of separate intervals between them
     width: float  # Deformed length of front face in contact, mm
-    pressure: float  # Largest Cauchy pressure, MPa
     penetration: float  # Largest depth of a node within the cylinder, mm
     friction: float  # Sum of friction along the cylinder, counterclockwise around it, N/mm
     sticking: float  # Deformed length of what sticks, mm
@@ -275,7 +274,7 @@ class ContactRegion:
             "contact_end_mm": self.end,
             "contact_parts": self.parts,
             "contact_width_mm": self.width,
-            "contact_pressure_MPa": self.pressure,
+            "contact_pressure_MPa": float(self.points.pressure.max()),
             "penetration_mm": self.penetration,
             **(rubbed if self.points.friction.any() else {}),
         }
@@ -317,7 +316,6 @@ class ContactRegion:
             end=float(between[last + 1]),
             parts=int(np.count_nonzero(np.diff(touching) > 1)) + 1,
             width=float(shares[touching].sum()),
-            pressure=float(points.pressure.max()),
             penetration=float(max(0.0, -gap.min())),
             friction=float(friction.sum()),
             sticking=float(shares[touching][~points.slips].sum()),

@@ -99,11 +99,8 @@ def stress_of(law: LawName, gradient: FloatArray, lame: Lame) -> tuple[FloatArra
     (μ (F F^T - I) + λ ln J I) / J; Gent's law has μ / (1 - (2 tr E - 2 ln J) / I_m) in the place of μ.
     """
     strain: FloatArray = np.moveaxis(np.array(strain_of(law, gradient)), -1, 0)
-    trace, unit, transposed = (
-        np.trace(strain, axis1=1, axis2=2),
-        np.eye(len(strain[0])),
-        gradient.swapaxes(1, 2),
-    )
+    trace = np.trace(strain, axis1=1, axis2=2)
+    unit, transposed = np.eye(len(strain[0])), gradient.swapaxes(1, 2)
     volume = lame.λ * trace
     across = lame.λ_out * trace
     if law == "linear" or law == "st-venant-kirchhoff":

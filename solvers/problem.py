@@ -44,14 +44,10 @@ class Problem:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        for name, kind, missing in (
-            ("mesh", TriangleMesh, False),
-            ("material", Material, False),
-            ("load", Load, False),
-            ("observations", Observations, True),
-        ):
+        kinds = {"mesh": TriangleMesh, "material": Material, "load": Load, "observations": Observations}
+        for name, kind in kinds.items():
             value = getattr(self, name)
-            if not (isinstance(value, kind) or (missing and value is None)):
+            if not isinstance(value, kind) and not (name == "observations" and value is None):
                 raise UserError(f"{name} must be a {kind.__name__}, not {reprlib.repr(value)}")
         count = len(self.mesh.points)
         first, second = self.mesh.edges.T
@@ -88,12 +84,8 @@ class Problem:
         content: list[object] = [self.mesh.digest, self.material.model_dump(), self.load.model_dump()]
         if (seen := self.observations) is not None:
             content += [seen.points, seen.displacements, seen.standard_deviations, seen.visible]
-            content += [
-                seen.weighed,
-                seen.marker_radius,
-                *vars(seen.pressed).values(),
-                *vars(seen.drawn).values(),
-            ]
+            content += [seen.weighed, seen.marker_radius]
+            content += [*vars(seen.pressed).values(), *vars(seen.drawn).values()]
         if self.finger is not None:
             content.append(self.finger.digest)
         if self.learned is not None:

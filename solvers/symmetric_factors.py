@@ -104,10 +104,6 @@ class BlockMatrix:
     columns: IntArray  # Its column, at least the row and ascending within it, shape (k,)
     blocks: FloatArray  # Shape (k, b, b)
 
-    def diagonal(self) -> FloatArray:
-        """The diagonal, shape (n, b)."""
-        return np.diagonal(self.blocks[self.rows == self.columns], axis1=1, axis2=2)
-
     def factorised(self, regularisation: float, *, definite: bool = True) -> "Factors":
         """The factors of the matrix with its diagonal scaled to one, for any number of solves.
 
@@ -118,19 +114,15 @@ class BlockMatrix:
         Raises:
             UserError: If the factorisation fails.
         """
-        diagonal = np.abs(self.diagonal())
+        diagonal = np.abs(np.diagonal(self.blocks[self.rows == self.columns], axis1=1, axis2=2))
         scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
         scaled = self.blocks * scale[self.rows, :, None]
         scaled *= scale[self.columns, None, :]
         scaled[self.rows == self.columns] += regularisation * np.eye(scaled.shape[-1])
         starts = np.searchsorted(self.rows, np.arange(self.size + 1))
         index: Any = PETSc.IntType
-        stored = PETSc.Mat().createSBAIJ(
-            (scale.size, scale.size),
-            scaled.shape[-1],
-            csr=(starts.astype(index), self.columns.astype(index), scaled.ravel()),
-            comm=PETSc.COMM_SELF,
-        )
+        csr = starts.astype(index), self.columns.astype(index), scaled.ravel()
+        stored = PETSc.Mat().createSBAIJ((scale.size,) * 2, scaled.shape[-1], csr=csr, comm=PETSc.COMM_SELF)
         factors = SymmetricFactors(stored, definite=definite, roomy=True)
         try:
             factors.update()
@@ -161,7 +153,3 @@ class Factors:
     def negative(self) -> int:
         """Number of negative eigenvalues."""
         return self.scaled.negative
-
-    def close(self) -> None:
-        """Free the factors."""
-        self.scaled.destroy()

@@ -162,8 +162,7 @@ def leave_one_out_displacements(problem: Problem, residuals: FloatArray) -> Floa
     `residuals` are observed minus predicted, shape (number of markers seen, 2), mm.
     """
     observations = problem.observations
-    if observations is None:
-        raise UserError("there are no markers to leave out")
+    assert observations is not None
     predicted = np.full(observations.displacements.shape, np.nan)
     predicted[observations.visible] = observations.displacements[observations.visible] - residuals
     return predicted

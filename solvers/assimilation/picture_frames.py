@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from pinnray.geometry.observations import Observations
-from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Pictures, Registration
+from pinnray.geometry.picture_frame import FIXED, PARTS, Homography, Pictures
 from pinnray.runtime.arrays import FloatArray
 from pinnray.solvers.assimilation.estimation import LEVEL, Parameter, values_of
 from pinnray.solvers.assimilation.marker_forces import MarkerForces
@@ -31,12 +31,9 @@ ROUNDS = 4
 
 def picture_parameters(observations: Observations) -> list[Parameter]:
     """The unknown values of the pictures' homographies, with their priors; none where both are fixed."""
-    return [*_of("pressed", observations.pressed), *_of("drawn", observations.drawn)]
-
-
-def _of(picture: str, known: Registration) -> list[Parameter]:
     return [
         Parameter(f"{picture}_{part}", unit, 0.0, deviation)
+        for picture, known in (("pressed", observations.pressed), ("drawn", observations.drawn))
         for (part, unit), deviation in zip(PARTS.items(), known.deviations.tolist(), strict=True)
         if deviation
     ]
@@ -44,12 +41,11 @@ def _of(picture: str, known: Registration) -> list[Parameter]:
 
 def pictures_of(centre: FloatArray, values: Mapping[str, float]) -> Pictures:
     """The pictures with values of `picture_parameters` by name, else zero, about a centre, (2,), mm."""
-    return Pictures(
-        *(
-            Homography(centre, np.array([values.get(f"{picture}_{part}", 0.0) for part in PARTS]))
-            for picture in ("pressed", "drawn")
-        )
+    pressed, drawn = (
+        Homography(centre, np.array([values.get(f"{picture}_{part}", 0.0) for part in PARTS]))
+        for picture in ("pressed", "drawn")
     )
+    return Pictures(pressed, drawn)
 
 
 class FramedFit(NamedTuple):

@@ -50,15 +50,12 @@ class Adaptation:
     def message(self) -> str:
         """The outcome, in a sentence without its full stop."""
         first, last = self.rounds[0], self.rounds[-1]
-        if not self.reached:
-            return (
-                f"the markers are known to {last.at_markers:.2g} mm, not to the {self.tolerance:g} mm asked "
-                f"for: refinement stopped at {last.triangles} triangles; take a larger tolerance"
-            )
-        return (
-            f"the markers are known to {last.at_markers:.2g} mm (asked for: {self.tolerance:g} mm); "
-            f"{first.triangles} triangles became {last.triangles}"
-        )
+        known, asked = f"the markers are known to {last.at_markers:.2g} mm", f"{self.tolerance:g} mm"
+        if self.reached:
+            became = f"{first.triangles} triangles became {last.triangles}"
+            return f"{known} (asked for: {asked}); {became}"
+        end = f"refinement stopped at {last.triangles} triangles; take a larger tolerance"
+        return f"{known}, not to the {asked} asked for: {end}"
 
 
 def check_adaptable(tolerance: float, load: Load) -> None:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerForces, residual_phrase
 from pinnray.solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
 from pinnray.solvers.assimilation.picture_frames import FreePictures
@@ -71,47 +70,36 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
         """Solve for the minimiser; see `Solver`. Without markers it is `fem` or `fem-nonlinear`."""
         check_problem(self, problem)
         linear = problem.material.law in FemSolver.laws
-        if self.misfit(problem) is not None:
-            return self._minimiser(problem, progress) if linear else self._stationary(problem, progress)
-        alone = (
-            FemSolver(degree=self.degree, estimate=False)
-            if linear
-            else FemNonlinearSolver(degree=self.degree)
-        )
-        plain = alone.solve(problem, progress)
+        if (misfit := self.misfit(problem)) is not None:
+            return (self._minimiser if linear else self._stationary)(problem, misfit, progress)
+        if linear:
+            plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
+        else:
+            plain = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
         said = f"without markers, or with weights of zero, this is {plain.solver}: {plain.status.message}"
         return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
-    def _misfit(self, problem: Problem) -> Misfit:
-        if (misfit := self.misfit(problem)) is None:
-            raise UserError("fem-asm was given no markers to assimilate")
-        return misfit
-
-    def _compliance(self, problem: Problem) -> MarkerCompliance:
-        """Factorise, and solve for the problem and for every component of a marker."""
-        misfit, space = self._misfit(problem), LagrangeSpace(problem.mesh, self.degree)
-        constraints = DisplacementConstraints.of(problem, space)
-        equilibrium = DiscreteEquilibrium(problem, space, constraints)
-        rows = DisplacementConstraints.springs(misfit, space).functionals
-        markers = ConstrainedElimination(rows, equilibrium.responses(rows))
-        return MarkerCompliance(equilibrium, equilibrium.linear_guess(1.0).nodal, markers)
-
-    def _minimiser(self, problem: Problem, progress: Progress) -> Solution:
+    def _minimiser(self, problem: Problem, misfit: Misfit, progress: Progress) -> Solution:
         """For the linear law: the minimiser over displacement and unknown frames of the pictures."""
         started, observations = time.perf_counter(), problem.observations
-        finger = self._compliance(problem)
+        space = LagrangeSpace(problem.mesh, self.degree)
+        equilibrium = DiscreteEquilibrium(problem, space)
+        rows = DisplacementConstraints.springs(misfit, space).functionals
+        markers = ConstrainedElimination(rows, equilibrium.responses(rows))
+        finger = MarkerCompliance(equilibrium, equilibrium.linear_guess(1.0).nodal, markers)
         progress(0.9, "solved for the forces at the markers")
         if observations is None or not (pictures := FreePictures.of(observations)).parameters:
-            solution = self._fitted(problem, finger)
+            solution = self._fitted(problem, misfit, finger)
         else:
-            found = pictures.by_forces(finger.forces(self._misfit(problem)), self)
-            straight = replace(problem, observations=pictures.straightened(observations, found.z))
-            solution = pictures.framed(self._fitted(straight, finger), problem, found)
-        finger.equilibrium.factors.destroy()
+            found = pictures.by_forces(finger.forces(misfit), self)
+            seen = pictures.straightened(observations, found.z)
+            straight = replace(misfit, observed=seen.displacements[seen.visible])
+            solution = self._fitted(replace(problem, observations=seen), straight, finger)
+            solution = pictures.framed(solution, problem, found)
+        equilibrium.factors.destroy()
         return replace(solution, stats={**solution.stats, "seconds": time.perf_counter() - started})
 
-    def _fitted(self, problem: Problem, finger: MarkerCompliance) -> Solution:
-        misfit = self._misfit(problem)
+    def _fitted(self, problem: Problem, misfit: Misfit, finger: MarkerCompliance) -> Solution:
         forces = finger.forces(misfit)
         factor = self.factor(forces)
         fit = forces.fit(factor)
@@ -136,10 +124,10 @@ class FemAsmSolver(MarkerSettings, ElementSettings):
             left_out=leave_one_out_displacements(problem, fit.residual_without),
         )
 
-    def _stationary(self, problem: Problem, progress: Progress) -> Solution:
+    def _stationary(self, problem: Problem, misfit: Misfit, progress: Progress) -> Solution:
         """At finite strain: the stationary point that the load path leads to, also without each marker."""
         started = time.perf_counter()
-        misfit, space = self._misfit(problem), LagrangeSpace(problem.mesh, self.degree)
+        space = LagrangeSpace(problem.mesh, self.degree)
         # Shorter steps do not help: large forces at the markers invert elements.
         solver = FemNonlinearSolver(degree=self.degree, min_step=0.01)
         springs = DisplacementConstraints.springs(misfit, space)

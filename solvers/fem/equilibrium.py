@@ -8,7 +8,7 @@ potential Π of the elastic energy and, for a cylinder, of contact, equilibrium 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -253,9 +253,7 @@ def linear_equilibrium(problem: Problem, degree: int) -> DiscreteEquilibrium:
     """
     space = LagrangeSpace(problem.mesh, degree)
 
-    def made() -> DiscreteEquilibrium:
-        return DiscreteEquilibrium(problem, space)
-
+    made = partial(DiscreteEquilibrium, problem, space)
     small = space.nodes.size <= SHARED_UP_TO and problem.load.kind in ("mean", "point")
     if not (small and is_shared()):
         return made()

@@ -184,17 +184,13 @@ class ErrorEstimator:
         stress, von_mises = self._changes(gradient, difference)
         displacement = solve(self.force(stress))
         energy = 0.5 * self._integral(np.einsum("qij,qij->q", stress, difference))
+        own = None if self.problem.material.law == "linear" else LagrangeField(self.space, nodal)
         return ErrorEstimate(
             energy_norm=float(np.sqrt(energy / self._integral(state.energy_density))),
             displacement=self._relative(self._shapes @ displacement, self._shapes @ nodal),
             von_mises=self._relative(von_mises, state.von_mises),
             markers=displacement[self.space.mesh.marker_nodes],
-            field=ImprovedField(
-                self.space,
-                nodal + displacement,
-                self.recovery.gradient(nodal),
-                None if self.problem.material.law == "linear" else LagrangeField(self.space, nodal),
-            ),
+            field=ImprovedField(self.space, nodal + displacement, self.recovery.gradient(nodal), own),
         )
 
     def _changes(self, gradient: FloatArray, difference: FloatArray) -> tuple[FloatArray, FloatArray]:

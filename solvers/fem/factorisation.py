@@ -52,8 +52,7 @@ class Factorisation:
 
     def solve(self, nodal: FloatArray) -> FloatArray:
         """Solve for a right-hand side of shape (N, d); the solution has the same shape."""
-        found: FloatArray = self.solve_all(nodal[None])[0]
-        return found
+        return np.asarray(self.solve_all(nodal[None])[0])
 
     def solve_all(self, nodal: FloatArray) -> FloatArray:
         """Solve for several right-hand sides, shape (r, N, d); the solutions have the same shape.

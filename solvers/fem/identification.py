@@ -30,7 +30,7 @@ from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.cylinder_model import CylinderModel
 from pinnray.solvers.identification.fit import Fit
 from pinnray.solvers.identification.model import Response, ResponseModel
-from pinnray.solvers.identification.nested_search import ROUGHLY, Contacts, NestedSearch
+from pinnray.solvers.identification.nested_search import ROUGHLY, NestedSearch, identified
 from pinnray.solvers.identification.search import Identifier
 from pinnray.solvers.identification.settings import IdentifyingSolver
 from pinnray.solvers.identification.unknowns import Unknowns
@@ -54,6 +54,7 @@ class FemBody:
         self.space, self._motion = space, motion
         self._elements = DolfinxSpace(space)
         self._clamped, _ = dirichlet_conditions(Problem(problem.mesh, problem.material, Load()), space)
+        self.shape = self._clamped.shape
         rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = space.shape_gradients(rule.location)
         self._wall_gradients = motion.gradients[:, rule.location.cells]
@@ -65,32 +66,20 @@ class FemBody:
         density = energy_density_of(problem.material.law, gradient, moduli, ufl.ln)
         energy = density * ufl.det(shift) * ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
         self._energy = self._elements.form(energy)
-        function = self._elements.function
+        self._force, self._tangent = self._elements.derivatives(energy)
+        function, self._base_motion = self._elements.function, self._elements.node_function(degree)
         force = ufl.derivative(energy, function, ufl.TestFunction(function.function_space))
-        tangent = ufl.derivative(force, function, ufl.TrialFunction(function.function_space))
         slope = ufl.derivative(force, self._moved.function, self._direction.function)
-        self._force, self._tangent, self._wall_slope = map(self._elements.form, (force, tangent, slope))
-        self._base_motion = self._elements.node_function(degree)
         by_base = ufl.derivative(force, function, self._base_motion.function)
-        self._base_slope = self._elements.form(by_base)
+        self._wall_slope, self._base_slope = map(self._elements.form, (slope, by_base))
         at_base = self._clamped.all(axis=1)
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
         self.feet[:, at_base] = unknowns.feet.motions(space.nodes[at_base])
+        front = np.setdiff1d(space.boundary_nodes("front"), space.boundary_nodes("base"))
+        self.front = space.nodes[front]
         self._conditions = self._elements.clamp(self._clamped)
         self._factors: Factorisation | None = None
         self._sampled: dict[bytes, LocatedPoints] = {}
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(N, 2)."""
-        return self._clamped.shape
-
-    @property
-    def front(self) -> FloatArray:
-        """Nodes of the front that are not held."""
-        return self.space.nodes[
-            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
-        ]
 
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""
@@ -212,8 +201,6 @@ class FemIdSolver(IdentifyingSolver):
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
-    loads: ClassVar[tuple[str, ...]] = FemNonlinearSolver.loads  # of it come the drawn contact and a cylinder
-    friction: ClassVar[bool] = True
     cost: ClassVar[Cost] = Cost(per_triangle=275)
 
     def __post_init__(self) -> None:
@@ -238,7 +225,7 @@ class FemIdSolver(IdentifyingSolver):
         Fits share the elements; each search starts from the last result. It takes a progress, too. On a fine
         mesh the unknowns are sought on a coarse one first.
         """
-        kept: dict[tuple[Registration, Registration], Contacts] = {}
+        kept: dict[tuple[Registration, Registration], list[NestedSearch]] = {}
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
             started, frames = time.perf_counter(), (observations.pressed, observations.drawn)
@@ -247,13 +234,12 @@ class FemIdSolver(IdentifyingSolver):
                 sought = [self.unknowns]
                 if problem.load.kind == "cylinder":
                     sought.insert(0, self.under_cylinder)
-                kept[frames] = Contacts([self._search(own, names) for names in sought])
-            found = kept[frames].identify(observations, progress)
-            mesh = found.best.model.unknowns.problem.mesh
+                kept[frames] = [self._search(own, names) for names in sought]
+            found = identified(kept[frames], observations, progress)
             stats = {
                 "seconds": time.perf_counter() - started,
                 "unknowns": found.best.response.state.size,
-                "triangles": len(mesh.triangles),
+                "triangles": len(found.best.model.unknowns.problem.mesh.triangles),
                 "degree": self.degree,
             }
             return found.solution(self.name, replace(problem, observations=observations), stats)

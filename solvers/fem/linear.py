@@ -69,11 +69,8 @@ class FactorisedProblem:
         error = None
         if self._solver.estimate and load.kind != "point" and load.values.any():
             error = self._estimator.estimate(nodal, equilibrium.response)
-        sentence = [
-            "solved directly",
-            _uncertainty(problem, error),
-            locking_advice(space.degree, problem.material),
-        ]
+        advice = locking_advice(space.degree, problem.material)
+        sentence = ["solved directly", _uncertainty(problem, error), advice]
         return Solution(
             solver=self._solver.name,
             problem=problem,

@@ -91,13 +91,6 @@ class Fem3dSolver(FieldSettings):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the problem in three dimensions; see `Solver`."""
         check_problem(self, problem)
-        return self._solve(problem, progress)
-
-    def space(self, problem: Problem) -> ExtrudedSpace:
-        """The elements of a problem."""
-        return ExtrudedSpace.of(problem.mesh, self.layers, self.grading, self.sides == "held")
-
-    def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         space, linear = self.space(problem), problem.material.law == "linear"
         way = None
@@ -132,3 +125,7 @@ class Fem3dSolver(FieldSettings):
             states=[FaceField(space, nodal) for nodal in whole.states()],
             contact=contact_of(problem, abscissa, region),
         )
+
+    def space(self, problem: Problem) -> ExtrudedSpace:
+        """The elements of a problem."""
+        return ExtrudedSpace.of(problem.mesh, self.layers, self.grading, self.sides == "held")

@@ -27,7 +27,6 @@ from pinnray.geometry.mesh.boundary import mean_thickness
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.geometry.mesh.quadrature import body_quadrature
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.elasticity import Lame, deformation_jacobian, energy_density_of, piola_stress_and_tangent
 from pinnray.solvers.fem.node_blocks import NodeBlocks
 from pinnray.solvers.identification.body import Linearised
@@ -92,8 +91,7 @@ class ThickBody:
 
     def __init__(self, unknowns: Unknowns, degree: int) -> None:
         problem = unknowns.problem
-        if problem.finger is None:
-            raise UserError("a finger without a depth has no side face")
+        assert problem.finger is not None  # it has a depth
         half, thickness = 0.5 * problem.finger.depth, mean_thickness(problem.mesh)
         below = max(half - 2 * thickness, 0.5 * half)
         ends = (INNER, 0.0, below), (LAYER, below, half)
@@ -110,21 +108,11 @@ class ThickBody:
         self._walls[..., 0, :2, :2] = unknowns.motion.gradients[:, rule.location.cells]
         base = self.space.boundary_nodes("base")
         self._free = ~np.isin(np.arange(len(self.space.nodes)), base)
+        self.front = self.space.nodes[np.setdiff1d(self.space.boundary_nodes("front"), base)]
+        self.shape = len(self.space.nodes), len(COMPONENT)
         self.feet = np.zeros((len(unknowns.feet.names), *self.shape))
         self.feet[:, base, :2] = unknowns.feet.motions(self.space.nodes[base])
         self._blocks = NodeBlocks.of(self.space)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(N, D)."""
-        return len(self.space.nodes), len(COMPONENT)
-
-    @property
-    def front(self) -> FloatArray:
-        """Nodes of the front that are not held."""
-        return self.space.nodes[
-            np.setdiff1d(self.space.boundary_nodes("front"), self.space.boundary_nodes("base"))
-        ]
 
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""
@@ -140,21 +128,18 @@ class ThickBody:
         def factors() -> Factors:
             return self._factorised(tangent, there)
 
-        return Linearised(
-            self._forces(there.pulled_back(stress)),
-            lambda right: (
-                factors().solve((right * self._free[:, None]).reshape(len(right), -1)).reshape(right.shape)
-            ),
-            lambda: factors().negative,
-        )
+        def solve(right: FloatArray) -> FloatArray:
+            flat = (right * self._free[:, None]).reshape(len(right), -1)
+            return factors().solve(flat).reshape(right.shape)
+
+        return Linearised(self._forces(there.pulled_back(stress)), solve, lambda: factors().negative)
 
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """By the walls, as for a network, by the moduli, in which every law is linear, and by the base."""
         there = self._strained(state, changes)
-        if there is None:
-            raise UserError("the finger is inside out")
+        assert there is not None  # nothing is inside out at an equilibrium
         gradient, inverse, _ = there
         stress, tangent = piola_stress_and_tangent(self._law, gradient, lame)
         of_walls, of_feet = np.zeros((len(self._walls), *self.shape)), np.zeros_like(self.feet)
@@ -247,9 +232,8 @@ class ThickBody:
             first, second = np.flatnonzero(i == COMPONENT), np.flatnonzero(k == COMPONENT)
             both = np.einsum("z,mzd,lze->mlzde", self._shares, along[..., first], along[..., second])
             part = tangent[:, :, i, :, k].transpose(2, 3, 0, 1) @ both.reshape(*both.shape[:3], -1)
-            found[..., first[:, None], second] = part.transpose(2, 0, 1, 3).reshape(
-                points, 3, 3, len(first), len(second)
-            )
+            shape = points, 3, 3, len(first), len(second)
+            found[..., first[:, None], second] = part.transpose(2, 0, 1, 3).reshape(shape)
         found *= (self._weights * there.volume[:, 0, 0, 0])[:, None, None, None, None]
         local = there.inverse.swapaxes(-1, -2)[:, 0] @ self._local  # derivatives after the walls' motion
         blocks = self._blocks.of_elements(
@@ -267,8 +251,7 @@ class SideFace:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement in the face, shape (n, 2), mm."""
-        (found,) = self.body.displacements(self.state[None], location)
-        return np.asarray(found)
+        return np.asarray(self.body.displacements(self.state[None], location)[0])
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j in the face, shape (n, 2, 2)."""
@@ -276,8 +259,7 @@ class SideFace:
 
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 3, 3)."""
-        (found,) = self.body.gradients(self.state[None], location)
-        return np.asarray(found)
+        return np.asarray(self.body.gradients(self.state[None], location)[0])
 
 
 def _gradient(shapes: Sequence[csr_matrix], state: FloatArray, across: Functions) -> FloatArray:

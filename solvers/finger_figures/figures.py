@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from warnings import warn
 
 import numpy as np
@@ -24,9 +24,6 @@ from pinnray.solvers.finger_figures.measures import (
 from pinnray.solvers.problem import Load, Material, Problem
 from pinnray.solvers.shared_work import shared
 from pinnray.solvers.solution import Solution
-
-if TYPE_CHECKING:
-    from pinnray.solvers.fem.linear import FactorisedProblem
 
 DENSITY = 1.2
 """Of a printed polyurethane, g/cm^3: where the substance is not known."""
@@ -147,21 +144,17 @@ class FingerFigures:
 
     def rows(self) -> list[tuple[str, str, str]]:
         """What, how much with its unit and interval, and its meaning: a row for each figure that is known."""
-        known = {name: value for name, value in self.values().items() if not np.isnan(value)}
-        return [
-            (name.replace("_", " "), self._said(name, value), self._meaning(name))
-            for name, value in known.items()
-        ]
-
-    def _said(self, name: str, value: float) -> str:
-        said = f"{value:.4g}"
-        if (interval := self.intervals.get(name)) is not None:
-            said += f" ({interval[0]:.4g} to {interval[1]:.4g})"
-        return f"{said} {QUANTITIES[name].unit}".rstrip()
-
-    def _meaning(self, name: str) -> str:
-        meaning, place = QUANTITIES[name].meaning, self.places.get(name)
-        return meaning if place is None else f"{meaning}: at ({place[0]:.3g}, {place[1]:.3g}) mm"
+        found = []
+        for name, (unit, meaning, _) in QUANTITIES.items():
+            if np.isnan(value := getattr(self, name)):
+                continue
+            said = f"{value:.4g}"
+            if (interval := self.intervals.get(name)) is not None:
+                said += f" ({interval[0]:.4g} to {interval[1]:.4g})"
+            if (place := self.places.get(name)) is not None:
+                meaning += f": at ({place[0]:.3g}, {place[1]:.3g}) mm"
+            found.append((name.replace("_", " "), f"{said} {unit}".rstrip(), meaning))
+        return found
 
 
 QUANTITIES: Mapping[str, Quantity] = {
@@ -264,10 +257,18 @@ def figures_at_rest(
         density = problem.material.substance.density if problem.material.substance else DENSITY
 
     def computed() -> dict[str, float]:
-        along, across = _compliances(solve or _prepared(problem, linear).solve, position, finger.depth)
+        solved = solve
+        if solved is None:
+            from pinnray.solvers.fem.linear import FemSolver
+
+            still = replace(problem, material=linear, load=Load(position=position), observations=None)
+            solved = FemSolver(estimate=False).prepare(still).solve
+        # The force acts in one direction, and the contact is free in the other.
+        units = [Load(displacement=moved, position=position) for moved in ((1.0, 0.0), (0.0, 1.0))]
+        compliance = np.linalg.inv(finger.depth * np.array([solved(unit).reaction for unit in units]))
         return {
-            "compliance_along": along,
-            "compliance_across": across,
+            "compliance_along": float(compliance[0, 0]),
+            "compliance_across": float(compliance[1, 1]),
             "area": finger.section.area,
             "mass": finger.section.area * finger.depth * density / 1000,
             "thinnest_wall": thinnest_wall(finger.section),
@@ -276,13 +277,6 @@ def figures_at_rest(
 
     depends_on = problem.mesh.digest, finger.digest, repr(linear), position, density
     return shared(("figures at rest", *depends_on), computed)
-
-
-def _prepared(problem: Problem, linear: Material) -> "FactorisedProblem":
-    from pinnray.solvers.fem.linear import FemSolver
-
-    still = replace(problem, material=linear, load=Load(position=problem.load.position), observations=None)
-    return FemSolver(estimate=False).prepare(still)
 
 
 def _finger(problem: Problem) -> Finger:
@@ -318,16 +312,3 @@ def _intervals(solution: Solution, depth: float, stress: Extreme) -> dict[str, I
         half = NORMAL * float(known.von_mises(solution.problem.mesh.locate(stress.place[None]))[0])
         found["von_mises"] = max(stress.value - half, 0.0), stress.value + half
     return found
-
-
-def _compliances(
-    solve: Callable[[Load], Solution], position: float | None, depth: float
-) -> tuple[float, float]:
-    """Displacement of the contact per force on the whole depth, along and across the finger, mm/N.
-
-    The force acts in one direction, and the contact is free in the other.
-    """
-    units = [Load(displacement=moved, position=position) for moved in ((1.0, 0.0), (0.0, 1.0))]
-    stiffness = depth * np.array([solve(unit).reaction for unit in units])
-    compliance = np.linalg.inv(stiffness)
-    return float(compliance[0, 0]), float(compliance[1, 1])

@@ -55,7 +55,9 @@ def wrap_angle(solution: Solution) -> float:
     comes around the indenter, negative if it gives way more than the chord before the contact does. A finger
     that moves as a rigid body has none.
     """
-    before = kink_points(solution.problem)
+    base, tip = front_ends(solution.problem)
+    contact = np.array([0.5 * sum(contact_ends(solution.problem))])
+    before = np.concatenate([[base], front_points(solution.problem.mesh, contact), [tip]])
     after = before + solution.displacement(before)
     return turn(after) - turn(before)
 
@@ -132,13 +134,6 @@ def front_ends(problem: Problem) -> FloatArray:
     """The front's ends at base and tip, shape (2, 2), mm."""
     nodes = problem.mesh.points[np.unique(problem.mesh.boundary("front"))]
     return nodes[[nodes[:, 0].argmin(), nodes[:, 0].argmax()]]
-
-
-def kink_points(problem: Problem) -> FloatArray:
-    """The front's end at the base, the contact's middle and the front's end at the tip, shape (3, 2), mm."""
-    base, tip = front_ends(problem)
-    middle = front_points(problem.mesh, np.array([0.5 * sum(contact_ends(problem))]))
-    return np.concatenate([[base], middle, [tip]])
 
 
 def turn(points: FloatArray) -> float:

@@ -96,5 +96,5 @@ class PressedBody(Body, Protocol):
 
     @property
     def front(self) -> FloatArray:
-        """Points of the front, shape (m, 2), mm, at which a cylinder is kept out."""
+        """Points of the front that are not held, shape (m, 2), mm, at which a cylinder is kept out."""
         ...

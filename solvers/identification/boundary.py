@@ -24,6 +24,8 @@ LOOSE = 0.1
 """Standard deviation of how far a foot gives, and of how far its ends move when it turns, mm: about as far as
 a print is off."""
 
+Sloped = tuple[FloatArray, FloatArray]
+"""A quantity with its derivatives."""
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 """Rotation by 90 degrees."""
 
@@ -112,12 +114,7 @@ class Clamp:
         self.centre = lengths @ points / lengths.sum()
         self.inertia = float(lengths @ ((points - self.centre) ** 2).sum(axis=1))
 
-    def motion(
-        self,
-        softness: tuple[float, FloatArray],
-        force: tuple[FloatArray, FloatArray],
-        place: tuple[FloatArray, FloatArray],
-    ) -> RigidMotion:
+    def motion(self, softness: tuple[float, FloatArray], force: Sloped, place: Sloped) -> RigidMotion:
         """The finger's motion for ℓ / E, mm/MPa, f, (2,), N/mm, and x, (2,), mm.
 
         Each argument comes with its derivatives by p unknowns, shapes (p,), (p, 2) and (p, 2).
@@ -125,13 +122,10 @@ class Clamp:
         (soft, soft_slopes), (f, f_slopes), (x, x_slopes) = softness, force, place
         lever = x - self.centre
         moment, moment_slopes = _cross(lever, f), _cross(x_slopes, f) + _cross(lever, f_slopes)
-        return RigidMotion(
-            self.centre,
-            soft * f / self.length,
-            float(soft * moment / self.inertia),
-            (np.outer(soft_slopes, f) + soft * f_slopes) / self.length,
-            np.asarray((soft_slopes * moment + soft * moment_slopes) / self.inertia),
-        )
+        shift, turn = soft * f / self.length, float(soft * moment / self.inertia)
+        shift_slopes = (np.outer(soft_slopes, f) + soft * f_slopes) / self.length
+        turn_slopes = np.asarray((soft_slopes * moment + soft * moment_slopes) / self.inertia)
+        return RigidMotion(self.centre, shift, turn, shift_slopes, turn_slopes)
 
 
 class Feet:

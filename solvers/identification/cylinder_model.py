@@ -12,12 +12,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
-from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, PressedBody
 from pinnray.solvers.identification.front_contact import Cylinder, FrontContact, Stage
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
-from pinnray.solvers.solver import NoSolutionError
 
 NEAR = 0.04
 """Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
@@ -39,20 +37,14 @@ class CylinderModel(ResponseModel):
         rows = body.traction_rows(self._points, np.eye(len(self._points)))
         self._rows = csr_matrix(rows.reshape(2 * len(self._points), -1))
 
-    def unstable(self, response: Response) -> int:
-        """As the patch has it, with what touches held along the normal, and what sticks altogether."""
-        hypothesis, stage = response.hypothesis, response.way[-1]
-        there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
-        if there is None:
-            raise NoSolutionError("the finger that was found is inside out")
-        cylinder = self._cylinder(hypothesis, 1.0)
+    def _held(self, response: Response) -> FloatArray:
+        """What touches is held along the normal, and what sticks altogether."""
+        cylinder, stage = self._cylinder(response.hypothesis, 1.0), response.way[-1]
         normal = (self._moved(response.state) - cylinder.centre) / cylinder.radius
         along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
         sticks = stage.touches & (stage.slips == 0)
-        ways = np.concatenate([_held(normal, stage.touches), _held(along, sticks)])
-        rows = (ways @ self._rows).reshape(-1, *self.body.shape)
-        negative = there.negative()
-        return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
+        ways = np.concatenate([_along(normal, stage.touches), _along(along, sticks)])
+        return np.asarray((ways @ self._rows).reshape(-1, *self.body.shape))
 
     def extrapolated(self, about: Response, values: FloatArray) -> Response:
         """See `ResponseModel`; the force, too, is of first order."""
@@ -135,17 +127,11 @@ class CylinderModel(ResponseModel):
     def _rest(self, hypothesis: Hypothesis, by: HypothesisSlopes) -> Stage:
         cylinder, count = self._cylinder(hypothesis, 0.0), len(self._points)
         still = np.zeros((len(by.friction), count, 2))
-        return Stage(
-            0.0,
-            np.zeros(self.body.shape),
-            still[0],
-            cylinder.places(self._points),
-            np.zeros(count, dtype=np.bool_),
-            np.zeros(count),
-            np.zeros((len(still), *self.body.shape)),
-            still,
-            -by.centre @ cylinder.place_slopes(self._points).T,
-        )
+        state, slopes = np.zeros(self.body.shape), np.zeros((len(still), *self.body.shape))
+        touches, slips = np.zeros(count, dtype=np.bool_), np.zeros(count)
+        places = cylinder.places(self._points)
+        place_slopes = -by.centre @ cylinder.place_slopes(self._points).T
+        return Stage(0.0, state, still[0], places, touches, slips, slopes, still, place_slopes)
 
     def _ahead(self, way: list[Stage], share: float) -> Stage:
         """The last stage or, from the second one on, the state on the line through the last two."""
@@ -218,17 +204,9 @@ class CylinderModel(ResponseModel):
         slopes += np.tensordot(force_slopes[:, near].reshape(len(slopes), -1), answers, axes=1)
         moved = self._moves(slopes) - centre[:, None]
         points = self._moved(state)
-        return Stage(
-            share,
-            state,
-            forces,
-            cylinder.places(points),
-            touches,
-            slips,
-            slopes,
-            force_slopes,
-            np.einsum("pmi,mi->pm", moved, cylinder.place_slopes(points)),
-        )
+        place_slopes = np.einsum("pmi,mi->pm", moved, cylinder.place_slopes(points))
+        places = cylinder.places(points)
+        return Stage(share, state, forces, places, touches, slips, slopes, force_slopes, place_slopes)
 
     def _pressed(
         self, values: FloatArray, hypothesis: Hypothesis, by: HypothesisSlopes, way: list[Stage]
@@ -244,11 +222,8 @@ class CylinderModel(ResponseModel):
         contact, place = weights @ displacements, weights @ self._points
         contact_slopes = weight_slopes @ displacements + np.einsum("m,pmi->pi", weights, moved)
         place_slopes = weight_slopes @ self._points
-        motion = self._clamp.motion(
-            (hypothesis.softness, by.softness),
-            (force, force_slopes),
-            (place + contact, place_slopes + contact_slopes),
-        )
+        softness, there = (hypothesis.softness, by.softness), (place + contact, place_slopes + contact_slopes)
+        motion = self._clamp.motion(softness, (force, force_slopes), there)
         return Response(
             values.copy(),
             hypothesis,
@@ -271,12 +246,11 @@ def response_model(body: Body, unknowns: Unknowns, *, weighed: bool) -> Response
     """The model of the contact that the unknowns have."""
     if "travel" not in unknowns.names:
         return ResponseModel(body, unknowns, weighed=weighed)
-    if not isinstance(body, PressedBody):
-        raise TypeError("a cylinder presses bodies of finite elements")
+    assert isinstance(body, PressedBody)  # of finite elements
     return CylinderModel(body, unknowns, weighed=weighed)
 
 
-def _held(ways: FloatArray, held: BoolArray) -> FloatArray:
+def _along(ways: FloatArray, held: BoolArray) -> FloatArray:
     """Rows (k, 2 m) of the displacement along directions (m, 2) of the k points of a mask."""
     rows = np.eye(len(held))[held]
     return (rows[:, :, None] * ways).reshape(len(rows), 2 * len(ways))

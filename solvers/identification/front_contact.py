@@ -42,15 +42,13 @@ class Cylinder(NamedTuple):
     def place_slopes(self, points: FloatArray) -> FloatArray:
         """Derivatives of the places by the points, shape (m, 2)."""
         away = points - self.centre
-        return np.asarray(
-            self.radius / (away**2).sum(axis=1)[:, None] * np.stack([-away[:, 1], away[:, 0]], 1)
-        )
+        turned = np.stack([-away[:, 1], away[:, 0]], 1)
+        return np.asarray(self.radius / (away**2).sum(axis=1)[:, None] * turned)
 
 
 class Pressed(NamedTuple):
     """The points of the front in equilibrium with the cylinder."""
 
-    points: FloatArray  # y, shape (m, 2), mm
     forces: FloatArray  # f, shape (m, 2), N/mm
     touches: BoolArray  # Shape (m,)
     slips: FloatArray  # Sign of t where a point slips, else zero, shape (m,)
@@ -164,7 +162,7 @@ class FrontContact:
         slips = way * np.where(forward > 0, -1.0, np.where(sticks, 0.0, 1.0)) * touches
         moved = moved + self._answer @ np.concatenate([q, t])
         forces = self._axes[0] @ q + self._axes[1] @ t + self._turning @ moved
-        return Pressed(self._points + moved.reshape(-1, 2), forces.reshape(-1, 2), touches, slips)
+        return Pressed(forces.reshape(-1, 2), touches, slips)
 
     def slopes(
         self, found: Pressed, free: FloatArray, centre: FloatArray, friction: FloatArray, before: FloatArray
@@ -195,8 +193,7 @@ class FrontContact:
         pushed = rubbed - np.linalg.solve(answer @ ways.T, missed.T).T @ ways
         moved = moved + pushed @ self._answer.T
         axes = np.concatenate(self._axes, axis=1)
-        slopes: FloatArray = (pushed @ axes.T + moved @ self._turning.T).reshape(free.shape)
-        return slopes
+        return np.asarray((pushed @ axes.T + moved @ self._turning.T).reshape(free.shape))
 
 
 def swapped(matrix: FloatArray, offset: FloatArray, guess: BoolArray) -> FloatArray | None:

@@ -1,7 +1,7 @@
 """Fits of the unknowns under one law each, from a start or from another fit."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,26 +27,18 @@ MOST_LOST = 8
 """Hypotheses without equilibrium at which a search ends: each costs all halvings of the way to it."""
 
 
+@dataclass(eq=False)
 class LawFits:
-    """Fits the unknowns of one finger under any of the laws.
+    """Fits the unknowns of one finger under any of the laws."""
 
-    Args:
-        model: The finger by a law.
-        parameters: The unknowns, which the laws share.
-        prior: Of their standardised values.
-        cost_change: Relative change of the cost below which a search has converged.
-    """
+    model: Callable[[LawName], ResponseModel]  # The finger by a law
+    parameters: Sequence[Parameter]  # The unknowns, which the laws share
+    prior: Prior  # Of their standardised values
+    cost_change: float  # Relative change of the cost below which a search has converged
+    progress: Progress = silent
 
-    def __init__(
-        self,
-        model: Callable[[LawName], ResponseModel],
-        parameters: Sequence[Parameter],
-        prior: Prior,
-        cost_change: float,
-    ) -> None:
-        self._model, self.parameters, self.prior, self._cost_change = model, parameters, prior, cost_change
-        self._names = [parameter.name for parameter in parameters]
-        self.progress: Progress = silent
+    def __post_init__(self) -> None:
+        self._names = [parameter.name for parameter in self.parameters]
 
     def shifted(self, fit: Fit, measurement: MarkerData) -> Fit:
         """The fit to a measurement, to first order about another fit."""
@@ -79,7 +71,7 @@ class LawFits:
         The values are at rest: the indentation that a linear finger would need is added. What is `held`
         stays, and its value in the fit is zero.
         """
-        model = self._model(law)
+        model = self.model(law)
         markers = MarkerModel(model, measurement)
         model.restart(near.response if isinstance(near, Fit) else None)
 
@@ -124,7 +116,7 @@ class LawFits:
             measurement.errors,
             kept,
             prior=prior,
-            cost_change=self._cost_change,
+            cost_change=self.cost_change,
             rounds=rounds,
         )
         if (rough := reached.get(found.values.tobytes())) is None:

@@ -117,13 +117,17 @@ class ResponseModel:
         return found
 
     def unstable(self, response: Response) -> int:
-        """Number of directions in which the energy falls while the mean of the contact is held still."""
+        """Number of directions in which the energy falls while the contact is held still."""
         hypothesis = response.hypothesis
         there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
         if there is None:
             raise NoSolutionError("the finger that was found is inside out")
-        rows, negative = self._traction(hypothesis.position, hypothesis.width)[0], there.negative()
+        rows, negative = self._held(response), there.negative()
         return ConstrainedElimination(rows, there.solve(rows)).unstable(negative)
+
+    def _held(self, response: Response) -> FloatArray:
+        """Rows of what the contact holds still, (k, *shape)."""
+        return np.asarray(self._traction(response.hypothesis.position, response.hypothesis.width)[0])
 
     def restart(self, response: Response | None) -> None:
         """Start the next response from this one, also by another body; None: from rest."""
@@ -326,7 +330,8 @@ class MarkerData:
     @classmethod
     def of(cls, problem: Problem, observations: Observations, radius: float | None) -> "MarkerData":
         """All markers that were seen; see `MarkerSettings.marker_radius` for the radius, mm."""
-        points, force = observations.points[observations.visible], observations.weighed
+        seen, force = observations.visible, observations.weighed
+        points = observations.points[seen]
         if not len(points):
             raise UserError("there are no markers to find a force by")
         if force is not None:
@@ -335,13 +340,9 @@ class MarkerData:
                     "a weighed force is that of a finger with a depth: give the problem its finger"
                 )
             force = force[0] / problem.finger.depth, force[1] / problem.finger.depth
-        return cls(
-            points,
-            observations.displacements[observations.visible],
-            standard_deviations(observations),
-            radius_within(problem.mesh, points, observations.marker_radius if radius is None else radius),
-            force,
-        )
+        radius = observations.marker_radius if radius is None else radius
+        moved, radius = observations.displacements[seen], radius_within(problem.mesh, points, radius)
+        return cls(points, moved, standard_deviations(observations), radius, force)
 
     @property
     def errors(self) -> GrossErrors:
@@ -394,11 +395,10 @@ class MarkerModel:
         seen_slopes -= np.tensordot(by.drawn, drawing.slopes(seen), axes=1)
         seen_slopes = np.einsum("mij,pmj->pmi", hypothesis.pictures.jacobians(seen), seen_slopes)
         seen_slopes += np.tensordot(by.pressed, pressed.slopes(seen), axes=1)
-        moved, moved_slopes = pressed.moved(seen) - points, seen_slopes
-        values, derivatives = moved.ravel(), moved_slopes.reshape(len(moved_slopes), -1).T
+        values = (pressed.moved(seen) - points).ravel()
+        derivatives = seen_slopes.reshape(len(seen_slopes), -1).T
         if self.measurement.force is None:
             return values, derivatives
         stroke, _ = stroke_axes(self.unknowns.problem.load)
-        return np.append(values, response.force @ stroke), np.vstack(
-            [derivatives, response.force_slopes @ stroke]
-        )
+        derivatives = np.vstack([derivatives, response.force_slopes @ stroke])
+        return np.append(values, response.force @ stroke), derivatives

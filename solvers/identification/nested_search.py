@@ -1,6 +1,7 @@
 """The unknowns sought by a coarse discretisation and carried to others, under each contact."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +21,7 @@ ROUGHLY = 1e-2
 large, and by a coarse one the force's place makes the cost rough."""
 
 
+@dataclass(frozen=True, eq=False)
 class NestedSearch:
     """Finds the unknowns by a coarse discretisation and carries them to others; see `Identifier`.
 
@@ -31,15 +33,10 @@ class NestedSearch:
             finger has no depth.
     """
 
-    def __init__(
-        self,
-        coarse: Identifier,
-        carried: Callable[[Fit, ResponseModel], Response],
-        *,
-        fine: Identifier | None = None,
-        thick: Identifier | None = None,
-    ) -> None:
-        self._coarse, self._carried, self._fine, self._thick = coarse, carried, fine, thick
+    coarse: Identifier
+    carried: Callable[[Fit, ResponseModel], Response]
+    fine: Identifier | None = None
+    thick: Identifier | None = None
 
     def identify(
         self, observations: Observations, progress: Progress = silent, rival: float = -np.inf
@@ -54,49 +51,46 @@ class NestedSearch:
             for fit in fits:
                 progress(0.6, f"{fit.law}: {said}")
                 model = other.model(fit.law)
-                start = fit._replace(model=model, response=self._carried(fit, model))
+                start = fit._replace(model=model, response=self.carried(fit, model))
                 found.append(other.polished(start, observations, least))
             return found
 
-        found = self._coarse.identify(observations, lambda share, text: progress(0.6 * share, text))
+        found = self.coarse.identify(observations, lambda share, text: progress(0.6 * share, text))
         least = max(found.best.log_posterior, rival) - IMPROBABLE
         likely = [fit for fit in found.fits if fit.log_posterior > least]
         rest, thick = found.fits[len(likely) :], list[Fit]()
-        plane = likely if self._fine is None else carried(likely, self._fine, "finer")
-        if self._thick is not None and likely and found.best.estimate.inflation < CONTRADICTED:
+        plane = likely if self.fine is None else carried(likely, self.fine, "finer")
+        if self.thick is not None and likely and found.best.estimate.inflation < CONTRADICTED:
             least = plane[0].log_posterior - IMPROBABLE
-            thick = carried(likely, self._thick, "with free side faces", least)
+            thick = carried(likely, self.thick, "with free side faces", least)
         return Identified.ranked([*plane, *thick, *rest], found.lost)
 
     def updated(self, found: Identified, observations: Observations) -> Identified:
         """The unknowns for observations near those of fits, to first order; see `Identifier`."""
-        return self._coarse.updated(found, observations)
+        return self.coarse.updated(found, observations)
 
 
-class Contacts:
-    """Finds the unknowns under each contact that a load may make.
+def identified(
+    searches: Sequence[NestedSearch], observations: Observations, progress: Progress = silent
+) -> Identified:
+    """The unknowns under every law and every contact that a load may make.
 
     Args:
         searches: One for each contact.
+        observations: Of the markers.
+        progress: Called as the searches go on.
+
+    Raises:
+        UserError: If no contact has a solution.
     """
-
-    def __init__(self, searches: Sequence[NestedSearch]) -> None:
-        self._searches = searches
-
-    def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
-        """The unknowns under every contact and law.
-
-        Raises:
-            UserError: If no contact has a solution.
-        """
-        found: list[Identified] = []
-        for search in self._searches:
-            try:
-                least = max((each.best.log_posterior for each in found), default=-np.inf)
-                found.append(search.identify(observations, progress, least))
-            except NoSolutionError as error:
-                reason = error
-        if not found:
-            raise reason
-        best = max(found, key=lambda each: each.best.log_posterior)
-        return Identified.ranked([fit for each in found for fit in each.fits], best.lost)
+    found: list[Identified] = []
+    for search in searches:
+        try:
+            least = max((each.best.log_posterior for each in found), default=-np.inf)
+            found.append(search.identify(observations, progress, least))
+        except NoSolutionError as error:
+            reason = error
+    if not found:
+        raise reason
+    best = max(found, key=lambda each: each.best.log_posterior)
+    return Identified.ranked([fit for each in found for fit in each.fits], best.lost)

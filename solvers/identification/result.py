@@ -63,23 +63,17 @@ class Identified:
     def force(self) -> IdentifiedForce:
         """The force and its place: the mean over the laws, with an interval that holds their scatter."""
         places = [place for fit in self.fits if (place := fit.place)]
-        stroke, across = stroke_axes(self.best.model.unknowns.problem.load)
+        stroke, side = stroke_axes(self.best.model.unknowns.problem.load)
         components = [fit.component(stroke) for fit in self.fits]
-        force = self._mean(components)
+        force, across = self._mean(components), self._mean([fit.component(side) for fit in self.fits])
         found = np.array([value for value, _ in components]) - force.value
         parts = self.best.variances(stroke) | {"law": float(self.probabilities @ found**2)}
         whole = sum(parts.values()) or 1.0
         shares = {name: parts[name] / whole for name in sorted(parts, key=parts.__getitem__, reverse=True)}
         narrower = narrowing_phrase(self.best, stroke, parts["law"])
-        return IdentifiedForce(
-            force,
-            self._mean([fit.component(across) for fit in self.fits]),
-            self._mean(places) if places else None,
-            shares,
-            f"The variance of the force comes from: {split_phrase(parts)}. {narrower}",
-            self.best.contact,
-            self.best.learned,
-        )
+        advice = f"The variance of the force comes from: {split_phrase(parts)}. {narrower}"
+        position = self._mean(places) if places else None
+        return IdentifiedForce(force, across, position, shares, advice, self.best.contact, self.best.learned)
 
     def _cylinder(self) -> float | None:
         """Probability of the contact of a cylinder; None where the load has none."""
@@ -115,6 +109,7 @@ class Identified:
         field = kind(**vars(members[0].found), members=members)
         sentence, loose = self.sentence(missed), best.model.unknowns.unregistered
         contradicted = best.estimate.inflation > CONTRADICTED
+        left_out = [f"{said}, and was left out" for said in self._contradictions()]
         return Solution(
             solver=name,
             problem=field.problem,
@@ -124,11 +119,7 @@ class Identified:
             status=Status(
                 best.estimate.converged and best.exact and not unstable and not contradicted,
                 f"{unstable_phrase(unstable)}; {sentence}" if unstable else sentence,
-                [
-                    *self._unexplained(),
-                    *(f"{said}, and was left out" for said in self._contradictions()),
-                    *self._wrapped(),
-                ],
+                [*self._unexplained(), *left_out, *self._wrapped()],
             ),
             stats={**stats, **self.stats(), "unstable_directions": unstable},
             left_out=leave_one_out_displacements(problem, -without),
@@ -200,15 +191,12 @@ class Identified:
     def stats(self) -> dict[str, float | int | str]:
         """All that was found, for tables: parameters, how well they are known, force and laws."""
         found = self.best.estimate
-        numbers: dict[str, float | int | str] = {
-            "evaluations": found.evaluations,
-            "inflation": found.inflation,
-        }
+        numbers: dict[str, float | int | str] = {}
+        numbers |= {"evaluations": found.evaluations, "inflation": found.inflation}
         for name, _, value, *rest in self.best.parameters:
             columns = ("deviation", "low", "high", "resolution")
-            numbers |= {name: value} | {
-                f"{name}_{column}": each for column, each in zip(columns, rest, strict=True)
-            }
+            numbers[name] = value
+            numbers |= {f"{name}_{column}": each for column, each in zip(columns, rest, strict=True)}
         force, low, high = self.force.force
         numbers |= {"law": self.best.law, "force": force, "force_low": low, "force_high": high}
         for name, probability in self._laws().items():
@@ -236,11 +224,8 @@ class Identified:
             )
         force, low, high = self.force.force
         parts.append(f"force {force:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
-        parts.append(
-            ", ".join(
-                f"{u.name} {u.value:.4g} ({u.low:.4g} to {u.high:.4g}) {u.unit}".rstrip() for u in parameters
-            )
-        )
+        values = (f"{u.name} {u.value:.4g} ({u.low:.4g} to {u.high:.4g}) {u.unit}" for u in parameters)
+        parts.append(", ".join(map(str.rstrip, values)))
         if len(laws := self._laws()) > 1:
             shares = ", ".join(f"{law} {share:.1%}" for law, share in laws.items())
             parts.append(f"law {shares} probable")
@@ -261,11 +246,9 @@ class Identified:
         missed = np.delete(missed, self.best.doubted, axis=0)
         parts.append(f"markers missed by {np.sqrt((missed**2).mean()):.2g} mm (root mean square)")
         if found.inflation > 1:
-            parts.append(
-                f"{found.inflation:.3g} times their standard deviations; intervals are as much wider"
-            )
-        if unresolved := [
-            f"{u.name} ({u.resolution:.0%})" for u in parameters if u.resolution < MIN_RESOLUTION
-        ]:
+            off = f"{found.inflation:.3g} times their standard deviations"
+            parts.append(f"{off}; intervals are as much wider")
+        unresolved = [f"{u.name} ({u.resolution:.0%})" for u in parameters if u.resolution < MIN_RESOLUTION]
+        if unresolved:
             parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
         return "; ".join(parts)

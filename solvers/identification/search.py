@@ -106,8 +106,7 @@ class Identifier:
                 lost.append(law)
                 if len(lost) == len(self.laws):
                     raise
-        for each in fits:
-            self._known.setdefault(each.law, each)
+        self._known = {each.law: each for each in fits} | self._known
         return Identified.ranked(fits, lost)
 
     def _started(self, law: LawName, measurement: MarkerData) -> Fit:

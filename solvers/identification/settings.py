@@ -34,6 +34,9 @@ class IdentifyingSolver(FieldSettings):
     prior: float = 1.0
     marker_radius: float | None = None
     sought: ClassVar[tuple[str, ...]] = DEFAULT
+    # Of the load come the drawn contact and a cylinder
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
+    friction: ClassVar[bool] = True
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -128,7 +128,7 @@ class ForceTracker:
         rows = np.repeat(visible, 2)
         observed = displacements.ravel()[rows]
         noise = np.maximum(deviations.ravel()[rows], MIN_STANDARD_DEVIATION)
-        moved = _motion(displacements, visible)
+        moved = float(np.sqrt((displacements[visible] ** 2).sum(axis=1).mean()))
         grown, near = moved > GROWTH * self._largest, GROWTH * moved > self._largest
         found = self._searched(self._drawn if near else self._known, rows, observed, noise)
         if found is not None and near:
@@ -143,10 +143,8 @@ class ForceTracker:
         if not visible.all():
             hidden = ", ".join(str(number + 1) for number in np.flatnonzero(~visible))
             remarks.append(f"hidden: marker {hidden}")
-        if found.posterior.inflation > 1:
-            remarks.append(
-                f"the markers are {found.posterior.inflation:.2g} times as far off as noise explains"
-            )
+        if (off := found.posterior.inflation) > 1:
+            remarks.append(f"the markers are {off:.2g} times as far off as noise explains")
         return self._reading(found, "; ".join(remarks))
 
     def _searched(
@@ -184,16 +182,8 @@ class ForceTracker:
             used, inflation = inflation, inflation_of(slopes @ z - observed, freedom)
             if abs(inflation / used - 1) < 1e-3:
                 break
-        return _Found(
-            z,
-            PosteriorSpread(
-                prior,
-                np.linalg.inv(rows.T @ rows),
-                used,
-                quantile_of(used, freedom),
-                values_of(self._parameters, z)[1],
-            ),
-        )
+        covariance, (_, scales) = np.linalg.inv(rows.T @ rows), values_of(self._parameters, z)
+        return _Found(z, PosteriorSpread(prior, covariance, used, quantile_of(used, freedom), scales))
 
     def _linearised(self, z: FloatArray) -> _Linearised | None:
         """The markers about the equilibrium at z; None if there is none.
@@ -252,8 +242,3 @@ class ForceTracker:
 def _estimated(value: float, deviation: float) -> Estimated:
     half = NORMAL * deviation
     return Estimated(value, value - half, value + half)
-
-
-def _motion(displacements: FloatArray, visible: BoolArray) -> float:
-    """Root mean square motion, mm, of the visible markers, from displacements of shape (m, 2), mm."""
-    return float(np.sqrt((displacements[visible] ** 2).sum(axis=1).mean()))

@@ -35,17 +35,12 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
     shift = float(np.mean(contact_ends(other)) - np.mean(contact_ends(problem)))
     response = _response(member.model, member.response, share, shift)
     hypothesis, found = response.hypothesis, member.found
+    body, state = member.model.body, response.state
     return replace(
         solution,
         problem=replace(found.problem, load=other.load),
-        field=replace(
-            found,
-            changes=hypothesis.changes,
-            clamp=response.motion,
-            body=member.model.body,
-            state=response.state,
-        ),
-        energy=member.model.body.energy(response.state, hypothesis.lame, hypothesis.changes),
+        field=replace(found, changes=hypothesis.changes, clamp=response.motion, body=body, state=state),
+        energy=body.energy(state, hypothesis.lame, hypothesis.changes),
         reaction=response.force,
         left_out=None,
         uncertainty=None,

@@ -137,6 +137,12 @@ class Unknowns:
             and its way, and the friction, its observations how well the frames of their pictures are known.
         names: Some of `DEFAULT`; a finger without cavities has no walls to be found, a base in one piece no
             feet. `young` joins them where it is known with a deviation, or a press was weighed or learned.
+
+    Attributes:
+        unregistered: True if the frame of a picture is to be found.
+        place: Middle and length of the drawn contact, mm.
+        directions: Unit vectors into the front face and along it where the contact is drawn, shape (2, 2).
+        radius: Of the cylinder, mm.
     """
 
     def __init__(self, problem: Problem, names: Sequence[str]) -> None:
@@ -154,28 +160,13 @@ class Unknowns:
             finger.append("young")
         finger += self.feet.names
         self.names = (*finger, *(parameter.name for parameter in self._pictures))
-
-    @property
-    def unregistered(self) -> bool:
-        """True if the frame of a picture is to be found."""
-        return bool(self._pictures)
-
-    @property
-    def place(self) -> tuple[float, float]:
-        """Middle and length of the drawn contact, mm."""
-        left, right = contact_ends(self.problem)
-        return 0.5 * (left + right), max(right - left, self.traction.longest)
-
-    @property
-    def directions(self) -> FloatArray:
-        """Unit vectors into the front face and along it where the contact is drawn, shape (2, 2)."""
+        self.unregistered = bool(self._pictures)
+        left, right = contact_ends(problem)
+        self.place = 0.5 * (left + right), max(right - left, self.traction.longest)
         tx, ty = self.traction.tangent(self.place[0])
-        return np.array([[ty, -tx], [tx, ty]])
-
-    @property
-    def radius(self) -> float:
-        """Of the cylinder, mm."""
-        return float(self.problem.load.radius or 0.0)
+        self.directions = np.array([[ty, -tx], [tx, ty]])
+        self.radius = float(problem.load.radius or 0.0)
+        self._stroke = float(np.linalg.norm(problem.load.values))
 
     def _centre(self, position: float) -> FloatArray:
         """Of a cylinder that touches the front at an abscissa, mm; zero for another contact."""
@@ -185,11 +176,6 @@ class Unknowns:
     def stages(self) -> int:
         """Steps to the full travel, within each of which slip has one direction."""
         return max(4, ceil(self._stroke / (FRICTION_STEP * self.radius) - 1e-9))
-
-    @property
-    def _stroke(self) -> float:
-        """The load's, mm."""
-        return float(np.linalg.norm(self.problem.load.values))
 
     @property
     def _way(self) -> FloatArray:

@@ -84,8 +84,8 @@ class LoadPath:
         self._steps, self.space = steps, space
         self.equilibrium = DiscreteEquilibrium(problem, space, constraints)
         self._newton, self._exact_from = self._begin(), exact_from
-        rough = self._begin(tolerance=ROUGH_TOLERANCE) if exact_from > 0 else None
-        self._rough = rough  # For equilibria that need be near only
+        # For equilibria that need be near only
+        self._rough = self._begin(tolerance=ROUGH_TOLERANCE) if exact_from > 0 else None
         contact = self.equilibrium.contact
         self._max_step = steps.max_step if contact is None else min(steps.max_step, contact.longest_step)
         self.points = [self.equilibrium.rest]
@@ -118,7 +118,7 @@ class LoadPath:
             rest = stop - last
             fraction = stop - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the stop
             before = self._iterations
-            point, hardest = self._step(fraction)
+            point, hardest = self._found(self._guess(fraction))
             if point is None:
                 self._halved += 1
                 step /= 2
@@ -142,13 +142,8 @@ class LoadPath:
         last = way.points[-1]
         if last.fraction < 1 or way.left or way.equilibrium.unstable:
             return False
-        guess = replace(
-            self.equilibrium.rest,
-            fraction=1.0,
-            nodal=self.interpolated(way, last.nodal),
-            forces=last.forces,
-            contact=self._carried_contact(way, last),
-        )
+        nodal, contact = self.interpolated(way, last.nodal), self._carried_contact(way, last)
+        guess = replace(self.equilibrium.rest, fraction=1.0, nodal=nodal, forces=last.forces, contact=contact)
         newton, self._newton = self._newton, self._begin(max_iterations=CARRIED)
         own = self.equilibrium.contact
         harder = [replace(own, stiffness=HARDER * own.stiffness)] if own else []
@@ -220,10 +215,6 @@ class LoadPath:
         result = newton.solve(guess)
         self._iterations += result.iterations
         return result.state if result.converged else None
-
-    def _step(self, fraction: float) -> tuple[LoadState | None, int]:
-        """Equilibrium at a fraction of the load, None if there is none; iterations of the hardest solve."""
-        return self._found(self._guess(fraction))
 
     def _found(self, guess: LoadState) -> tuple[LoadState | None, int]:
         """Equilibrium near a guess, None if there is none; iterations of the hardest solve."""

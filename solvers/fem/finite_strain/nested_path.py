@@ -55,11 +55,8 @@ class NestedPath:
     def history(self) -> dict[str, FloatArray]:
         """See `LoadPath`."""
         coarse, fine = self._way.history(), self._path.history()
-        size = {
-            name: float(np.hypot(each["reaction_x"][-1], each["reaction_y"][-1]))
-            for name, each in (("coarse", coarse), ("fine", fine))
-        }
-        force = size["fine"] / size["coarse"] if size["coarse"] else 1.0
+        forces = [np.hypot(each["reaction_x"][-1], each["reaction_y"][-1]) for each in (coarse, fine)]
+        force = float(forces[1] / forces[0]) if forces[0] else 1.0
         energy = float(fine["energy"][-1] / coarse["energy"][-1]) if coarse["energy"][-1] else 1.0
         scales = {"energy": energy, "reaction_x": force, "reaction_y": force}
         return {

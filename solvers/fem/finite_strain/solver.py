@@ -14,7 +14,7 @@ from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps, che
 from pinnray.solvers.fem.finite_strain.nested_path import coarser, followed
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Problem
-from pinnray.solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
+from pinnray.solvers.solution import Solution, Status, unstable_phrase
 from pinnray.solvers.solver import Cost, ElementSettings, Progress, check_problem, silent
 
 MOST = 2 / 3
@@ -47,27 +47,8 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`."""
         check_problem(self, problem)
-        return self._solve(self.coarser(problem), problem, progress)
-
-    def coarser(self, problem: Problem) -> Problem | None:
-        """The problem on the coarse elements on which the load is followed; None for the given ones."""
         on_way = problem.load.friction or self.stops  # friction depends on the way, and stops are on it
-        return None if on_way else coarser(problem, MOST)
-
-    def path(
-        self,
-        problem: Problem,
-        space: LagrangeSpace,
-        constraints: DisplacementConstraints | None = None,
-        *,
-        rough: bool = False,
-    ) -> LoadPath:
-        """The load path, not yet followed; for the arguments see `LoadPath`."""
-        near = problem.load.kind == "cylinder" and not self.stops  # is near enough on the way to the end
-        exact_from = np.inf if rough else float(near)
-        return LoadPath(problem, space, constraints, steps=self, exact_from=exact_from)
-
-    def _solve(self, coarse: Problem | None, problem: Problem, progress: Progress) -> Solution:
+        coarse = None if on_way else coarser(problem, MOST)
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         path = self.path(problem, space)
@@ -81,12 +62,13 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
             path.equilibrium.factorise(last)
         unstable = path.equilibrium.unstable
         solved = time.perf_counter()
-        error = _error(path, problem, space)
+        touched = path.equilibrium.contact is None or last.contact.any()
+        error = None  # of a part of the load, and where it has no limit or there is no force
+        if last.fraction == 1 and problem.load.kind != "point" and touched:
+            error = ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
         whole.close()
-        remarks = [
-            f"error of the discretisation {error.phrase}" if error else "",
-            locking_advice(self.degree, problem.material),
-        ]
+        known = f"error of the discretisation {error.phrase}" if error else ""
+        remarks = [known, locking_advice(self.degree, problem.material)]
         return Solution(
             solver=self.name,
             problem=problem,
@@ -111,17 +93,18 @@ class FemNonlinearSolver(LoadSteps, ElementSettings):
             contact=contact_of(problem, abscissa, regions[-1]),
         )
 
-
-def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
-    """The discretisation error at the full load; None where it was not reached, has no limit or no force.
-
-    The tangent there must be factorised.
-    """
-    last = path.points[-1]
-    untouched = path.equilibrium.contact is not None and not last.contact.any()
-    if last.fraction < 1 or problem.load.kind == "point" or untouched:
-        return None
-    return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
+    def path(
+        self,
+        problem: Problem,
+        space: LagrangeSpace,
+        constraints: DisplacementConstraints | None = None,
+        *,
+        rough: bool = False,
+    ) -> LoadPath:
+        """The load path, not yet followed; for the arguments see `LoadPath`."""
+        near = problem.load.kind == "cylinder" and not self.stops  # is near enough on the way to the end
+        exact_from = np.inf if rough else float(near)
+        return LoadPath(problem, space, constraints, steps=self, exact_from=exact_from)
 
 
 def path_status(

@@ -78,23 +78,17 @@ class ConstrainedNetwork:
         cls, energy: NetworkEnergy, problem: Problem, weighting: MarkerSettings | None = None
     ) -> "ConstrainedNetwork":
         """The network of an energy under the load and, with a weighting, the markers of a problem."""
-        conditions = load_conditions(problem)
-        springs = [PointSprings(conditions.points, conditions.weights, problem.load.prescribed)]
-        targets = conditions.values.T.ravel()
+        points, weights, values = load_conditions(problem)
+        springs, targets = [PointSprings(points, weights, problem.load.prescribed)], values.T.ravel()
         compliance = np.zeros(len(targets))
         misfit = None if weighting is None else weighting.misfit(problem)
         if weighting is not None and misfit is not None:
             springs.append(PointSprings(*misfit.sampling(), [0, 1]))
             targets = np.concatenate([targets, misfit.observed.ravel()])
             compliance = np.concatenate([compliance, 1 / misfit.weights.ravel()])
-        return cls(
-            energy,
-            _functionals(springs, energy.basis),
-            targets,
-            compliance,
-            tuple(springs),
-            weighting if misfit else None,
-        )
+        functionals = _functionals(springs, energy.basis)
+        weighting = weighting if misfit else None
+        return cls(energy, functionals, targets, compliance, tuple(springs), weighting)
 
     def with_neurons(self, neurons: torch.Tensor, factor: float) -> "ConstrainedNetwork":
         """The network with other neurons (3, m, c), the factor of the markers' weights held."""
@@ -112,10 +106,6 @@ class ConstrainedNetwork:
     def load_count(self) -> int:
         """Number of springs of the load: the first ones."""
         return len(self.springs[0].axes) * len(self.springs[0].weights)
-
-    def reaction(self, forces: FloatArray) -> FloatArray:
-        """The indenter's force for each prescribed component, shape (a,), N/mm, from the springs' (n,)."""
-        return forces[: len(self.springs[0].axes)]
 
     def marker_stats(self, state: NewtonIterate) -> dict[str, float]:
         """The factor of the weights, the misfit, N mm / mm, and the largest force at a marker, N/mm."""
@@ -172,15 +162,9 @@ class ConstrainedNetwork:
         work = abs(float(fraction * self.targets @ forces))
         reached = output + torch.from_numpy(change).view_as(output)
         derivative = forces @ self.functionals - factors.damping * change
-        return NewtonIterate(
-            reached,
-            forces,
-            decrement / work if work else decrement,
-            markers,
-            factor,
-            springs.unstable(factors.negative),
-            0.5 * float(derivative @ reached.numpy().ravel()) if self.energy.quadratic else None,
-        )
+        energy = 0.5 * float(derivative @ reached.numpy().ravel()) if self.energy.quadratic else None
+        share, unstable = decrement / work if work else decrement, springs.unstable(factors.negative)
+        return NewtonIterate(reached, forces, share, markers, factor, unstable, energy)
 
     def at_rest(self) -> NewtonIterate:
         """The solution under the whole load, of a linear law."""
@@ -213,12 +197,13 @@ class ConstrainedNetwork:
             slopes -= springs.neuron_slopes(self.energy.basis, forces, state.output)
         return value + 0.5 * float(soft @ state.forces**2), slopes
 
-    def energy_with_springs(self, output: torch.Tensor, fraction: float = 1.0) -> float:
+    def energy_with_springs(self, output: FloatArray, fraction: float) -> float:
         """Energy per depth with that of the springs that are not rigid, under a fraction of the load."""
         soft = self.compliance > 0
         flat = self.functionals.reshape(len(self.functionals), -1)
-        gaps = fraction * self.targets - flat @ output.numpy().ravel()
-        return self.energy.total(output) + 0.5 * float((gaps[soft] ** 2 / self.compliance[soft]).sum())
+        gaps = fraction * self.targets - flat @ output.ravel()
+        elastic = self.energy.total(torch.from_numpy(output))
+        return elastic + 0.5 * float((gaps[soft] ** 2 / self.compliance[soft]).sum())
 
     def _marker_forces(self, springs: ConstrainedElimination, gap: FloatArray) -> MarkerForces | None:
         """The forces at the markers, the load's forces eliminated, of springs that close gaps (n,), mm."""

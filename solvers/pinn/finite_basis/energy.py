@@ -68,31 +68,19 @@ class NetworkEnergy:
         diagonal = torch.arange(count) * (count + 1)
         known, number = torch.unique(torch.cat([*keys, diagonal]), return_inverse=True)
         patches, start = [], 0
-        for (_, places, near), upper in zip(
-            cuts, number[:-count].split([len(key) for key in keys]), strict=True
-        ):
+        uppers = number[:-count].split([len(key) for key in keys])
+        for (_, places, near), upper in zip(cuts, uppers, strict=True):
             rows = slice(start, start + len(places))
             patches.append(QuadraturePatch(places, near, upper, rows))
             start = rows.stop
         order = np.concatenate([numbers for numbers, *_ in cuts])
-        return cls(
-            basis=basis,
-            material=material,
-            patches=patches,
-            weights=torch.from_numpy(weights[order]),
-            rows=known.numpy() // count,
-            columns=known.numpy() % count,
-        )
+        first, second = known.numpy() // count, known.numpy() % count
+        return cls(basis, material, patches, torch.from_numpy(weights[order]), first, second)
 
     @property
     def places(self) -> FloatArray:
         """The quadrature points, shape (q, 2), mm."""
         return torch.cat([patch.points for patch in self.patches]).numpy()
-
-    @property
-    def points(self) -> int:
-        """Number of quadrature points, q."""
-        return len(self.weights)
 
     def total(self, output: torch.Tensor) -> float:
         """The energy per depth of an output layer (c, 2, m + 1), N mm / mm."""
@@ -106,8 +94,7 @@ class NetworkEnergy:
         """
         gradient = self.gradients(output[None])[0]
         stress, tangent = self._stress_and_tangent(gradient)
-        constant = self.material.law == "linear"
-        return self.forces(stress[None])[0], self.hessian(tangent[:1] if constant else tangent)
+        return self.forces(stress[None])[0], self.hessian(tangent[:1] if self.quadratic else tangent)
 
     def gradient(self, output: torch.Tensor) -> torch.Tensor:
         """The gradient alone, N/mm: a twentieth of the time."""
@@ -165,7 +152,7 @@ class NetworkEnergy:
     def forces(self, stresses: torch.Tensor) -> torch.Tensor:
         """Forces (s, c, 2, m + 1), N/mm, of Piola-Kirchhoff stresses P at the points, (s, q, 2, 2), MPa."""
         weighted = (self.weights[:, None, None] * stresses).permute(1, 3, 0, 2)
-        columns = weighted.reshape(2 * self.points, -1).numpy()
+        columns = weighted.reshape(2 * len(self.weights), -1).numpy()
         found = torch.from_numpy(self.gradient_operator.T @ columns)
         return found.view(-1, self.basis.per_window, len(stresses), 2).permute(2, 0, 3, 1).contiguous()
 
@@ -205,7 +192,7 @@ class NetworkEnergy:
         parts = imap_in_threads(task, range(len(self.patches)))
         values, counts, columns = (np.concatenate(part) for part in zip(*parts, strict=True))
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        return csr_matrix((values, columns, starts), shape=(2 * self.points, self.basis.size))
+        return csr_matrix((values, columns, starts), shape=(2 * len(self.weights), self.basis.size))
 
     def hessian(self, tangent: torch.Tensor) -> BlockMatrix:
         """Second derivative by the output layer, N/mm^2.

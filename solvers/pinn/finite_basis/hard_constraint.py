@@ -7,7 +7,7 @@ import torch
 from scipy.spatial import cKDTree
 
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh
-from pinnray.runtime.arrays import FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray
 
 ON_LINE = 1e-9
 """Largest distance of a point on a straight base from its line, in sizes of the body."""
@@ -101,14 +101,9 @@ def base_distance(mesh: TriangleMesh) -> BaseDistance:
     straight = np.abs(height[nodes]).max() <= ON_LINE * size
     if straight and (np.delete(height - SHALLOW * away, nodes) > 0).all():
         return LineDistance((float(normal[0]), float(normal[1])), offset)
-    return CurveDistance(mesh.points[_with_body_on_left(mesh, "base")])
-
-
-def _with_body_on_left(mesh: TriangleMesh, name: str) -> IntArray:
-    """The edges of a named boundary, shape (k, 2), with the body on their left."""
-    every = mesh.boundary_edges
-    here = np.isin(mesh.edge_numbers(every), mesh.edge_numbers(mesh.boundary(name)))
-    return np.asarray(every[here], dtype=np.int64)
+    every = mesh.boundary_edges  # with the body on their left
+    here = np.isin(mesh.edge_numbers(every), mesh.edge_numbers(mesh.boundary("base")))
+    return CurveDistance(mesh.points[every[here]])
 
 
 @dataclass(frozen=True)

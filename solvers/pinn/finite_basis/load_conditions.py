@@ -1,7 +1,5 @@
 """The load as linear functionals of a network's displacement."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
@@ -11,34 +9,29 @@ MOMENTS = 12
 """Moments of the displacement that a rigid patch prescribes for each component."""
 
 
-class LoadConditions(NamedTuple):
-    """Prescribed values of weighted sums of the displacement at points, for every prescribed component."""
-
-    points: FloatArray  # Shape (q, 2), mm
-    # Shape (k, q); the first functional's sum to one, so that its multiplier is the force
-    weights: FloatArray
-    values: FloatArray  # Shape (a, k), mm, for each prescribed component
-
-
-def load_conditions(problem: Problem) -> LoadConditions:
+def load_conditions(problem: Problem) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The functionals of a load; none of a cylinder, which presses only where it touches.
 
     For `patch` they are moments against the tractions T_k(s) / sqrt(1 - s^2) with Chebyshev polynomials T_k,
     which have the singularity of a rigid punch at both ends: the first is that of the punch on a half-plane
     (K. L. Johnson, Contact Mechanics, Cambridge University Press, 1985, section 2.8). Gauss-Chebyshev
     quadrature makes them sums over its points s = cos(angle), where T_k is cos(k angle); s runs along x.
+
+    Returns:
+        Points (q, 2), mm; weights (k, q) of the displacement there, of which the first ones sum to one, so
+        that their multiplier is the force; and the sums' values (a, k), mm, for each prescribed component.
     """
     values = problem.load.values[:, None]
     if problem.load.kind == "cylinder":
-        return LoadConditions(np.zeros((1, 2)), np.zeros((0, 1)), np.zeros((2, 0)))
+        return np.zeros((1, 2)), np.zeros((0, 1)), np.zeros((2, 0))
     if problem.load.kind != "patch":
         points, weights = contact_functional(problem)
-        return LoadConditions(points, weights[None], values)
+        return points, weights[None], values
     angles = np.pi * (np.arange(2 * MOMENTS) + 0.5) / (2 * MOMENTS)
     left, right = contact_end_points(problem)[:, 0]
     points = front_points(problem.mesh, left + 0.5 * (1 + np.cos(angles)) * (right - left))
     weights = np.cos(np.outer(np.arange(MOMENTS), angles)) / len(angles)
-    return LoadConditions(points, weights, np.pad(values, ((0, 0), (0, MOMENTS - 1))))
+    return points, weights, np.pad(values, ((0, 0), (0, MOMENTS - 1)))
 
 
 def contact_end_points(problem: Problem) -> FloatArray:

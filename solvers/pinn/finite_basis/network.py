@@ -20,6 +20,8 @@ from pinnray.solvers.pinn.finite_basis.windows import GateTree, ShepardWindows
 from pinnray.solvers.pinn.threading import PATCH, SUMMED, boxes_around, cut_into_patches, imap_in_threads
 
 Windows = ShepardWindows | GateTree
+Functions = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+"""Of points, shape (n, 2), mm, and numbers of windows."""
 """A partition of unity by windows."""
 
 
@@ -105,19 +107,19 @@ class FiniteBasis:
 
     def functionals(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Sums of weights (k, n) times the basis functions at points (n, 2), mm: (k, c, m + 1)."""
-        found = torch.zeros(len(weights), self.windows.count, self.per_window, dtype=torch.float64)
-        for patch, place, near in self.patches(points):
-            of_patch = torch.from_numpy(weights[:, patch])
-            found.index_add_(1, near, torch.einsum("kn,nuw->kwu", of_patch, self.values(place, near)))
-        return np.asarray(found)
+        return self._weighted(self.values, "kn,nuw->kwu", points, weights)
 
     def gradient_functionals(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Sums of weights (k, n, 2) times the functions' derivatives at points (n, 2), mm: (k, c, m + 1)."""
+        return self._weighted(self.gradients, "knx,xnwu->kwu", points, weights)
+
+    def _weighted(
+        self, functions: Functions, sums: str, points: FloatArray, weights: FloatArray
+    ) -> FloatArray:
         found = torch.zeros(len(weights), self.windows.count, self.per_window, dtype=torch.float64)
         for patch, place, near in self.patches(points):
             of_patch = torch.from_numpy(weights[:, patch])
-            along = self.gradients(place, near)
-            found.index_add_(1, near, torch.einsum("knx,xnwu->kwu", of_patch, along))
+            found.index_add_(1, near, torch.einsum(sums, of_patch, functions(place, near)))
         return np.asarray(found)
 
     def slopes_of_values(self, points: FloatArray, weights: FloatArray, output: torch.Tensor) -> torch.Tensor:
@@ -166,11 +168,7 @@ class FiniteBasis:
         return found
 
     def summed(
-        self,
-        functions: Callable[[torch.Tensor, torch.Tensor], torch.Tensor],
-        sums: str,
-        outputs: torch.Tensor,
-        points: FloatArray,
+        self, functions: Functions, sums: str, outputs: torch.Tensor, points: FloatArray
     ) -> FloatArray:
         """Sums of basis functions times output layers at points (n, 2), mm: shape (n, ...).
 

@@ -1,6 +1,7 @@
 """Newton's method for a finite-basis network, with the load applied in adaptive steps."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +73,7 @@ def find_equilibrium(
         if state.change < TOLERANCE or slow:
             return (_stable(network, state, fraction) if state.unstable else state), iteration
         guess, before = state.output, state.change  # from now on the guess has the prescribed displacement
-        energy = network.energy_with_springs(guess, fraction)
+        energy = network.energy_with_springs(guess.numpy(), fraction)
         if energy < least:
             lowest, least = guess, energy
         elif not energy < LEAP * least:
@@ -85,10 +86,7 @@ def _stable(network: ConstrainedNetwork, state: NewtonIterate, fraction: float) 
 
     The step aside is the response to random forces of a tangent that is nearly singular in soft directions.
     """
-
-    def energy(output: FloatArray) -> float:
-        return network.energy_with_springs(torch.from_numpy(output), fraction)
-
+    energy = partial(network.energy_with_springs, fraction=fraction)
     starts = aside(state.output.numpy(), network.softest(state.output), energy)
     found = [settled for start in starts if (settled := least_energy(network, start, fraction))]
     return min(found, key=lambda each: energy(each.output.numpy()), default=state)
@@ -107,9 +105,7 @@ def least_energy(network: ConstrainedNetwork, start: FloatArray, fraction: float
         taken = network.step(torch.from_numpy(output), fraction, max(shift, REGULARISATION))
         return None if taken is None else ShiftedStep(taken.output.numpy() - output, taken.unstable)
 
-    def energy(output: FloatArray) -> float:
-        return network.energy_with_springs(torch.from_numpy(output), fraction)
-
+    energy = partial(network.energy_with_springs, fraction=fraction)
     lower = descended(start, energy, step)
     settled = None if lower is None else network.step(torch.from_numpy(lower), fraction)
     return None if settled is None or settled.unstable else settled

@@ -39,7 +39,6 @@ class PinnStdSolver(FiniteBasisSolver):
     gate_width: float = 0.8
     steepness: float = 0.5
     cell: float = 0.5
-    name: ClassVar[str] = "pinn-std"
     preset: ClassVar[str] = "fast"
 
     def windows(self, centres: FloatArray, spacing: FloatArray, rng: np.random.Generator) -> GateTree:
@@ -61,7 +60,6 @@ class PinnLocalSolver(FiniteBasisSolver):
     radius: float = 1.8
     steepness: float = 0.4
     cell: float = 0.45
-    name: ClassVar[str] = "pinn-std"
     preset: ClassVar[str] = "local"
 
     def __post_init__(self) -> None:
@@ -86,7 +84,6 @@ class TrainedPinnSolver(PinnLocalSolver):
     corner_spacing: float = 0.01
     growth: float = 0.8
     steps: int = 25
-    name: ClassVar[str] = "pinn-std"
     preset: ClassVar[str] = "trained"
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")

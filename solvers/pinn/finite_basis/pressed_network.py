@@ -66,11 +66,6 @@ class Taken(NamedTuple):
     potential: float  # There
     length: float  # The part, 0 if the potential does not fall
 
-    @property
-    def near(self) -> bool:
-        """Whether the minimum is so near that the tangent before will do."""
-        return self.length == 1 and self.step.size < NEAR
-
 
 class Minimum(NamedTuple):
     """The least potential with given multipliers."""
@@ -206,12 +201,7 @@ class PressedNetwork:
         return output
 
     def _minimum(
-        self,
-        output: torch.Tensor,
-        fraction: float,
-        multipliers: FloatArray,
-        tolerance: float,
-        tangent: Tangent,
+        self, output: torch.Tensor, fraction: float, multipliers: FloatArray, largest: float, tangent: Tangent
     ) -> tuple[Minimum | None, int]:
         """The least potential with given multipliers, by Newton's method with a line search.
 
@@ -222,11 +212,12 @@ class PressedNetwork:
             stage = self.stage(output, fraction, multipliers)
             fresh = tangent.output is output
             taken = self._taken(stage, output, tangent, least, SHORTEST if fresh else 1.0)
-            if not fresh and not (taken and taken.near):
+            # Near the minimum the tangent before will do.
+            if not fresh and not (taken and taken.length == 1 and taken.step.size < NEAR):
                 formed = self._tangent(output)
                 if formed is None:
                     return None, iteration
-                tangent, taken = formed, self._taken(stage, output, formed, least)
+                tangent, taken = formed, self._taken(stage, output, formed, least, SHORTEST)
             if taken is None:
                 return None, iteration
             if taken.step.size < ROUNDING:
@@ -234,17 +225,12 @@ class PressedNetwork:
             if taken.length == 0:
                 return None, iteration
             output, least = taken.output, taken.potential
-            if taken.length == 1 and taken.step.size < tolerance:
+            if taken.length == 1 and taken.step.size < largest:
                 return Minimum(output, taken.step, tangent), iteration
         return None, ITERATIONS
 
     def _taken(
-        self,
-        stage: ContactState,
-        output: torch.Tensor,
-        tangent: Tangent,
-        least: float,
-        shortest: float = SHORTEST,
+        self, stage: ContactState, output: torch.Tensor, tangent: Tangent, least: float, shortest: float
     ) -> Taken | None:
         """So much of a step that the potential falls; None if a point is turned inside out.
 

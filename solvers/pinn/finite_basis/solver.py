@@ -1,7 +1,7 @@
 """Base of the presets `fast` and `local`: a network with random hidden weights and an exact output layer."""
 
 import time
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import ClassVar
@@ -44,7 +44,7 @@ FINEST = 0.75
 
 
 @dataclass(frozen=True, kw_only=True)
-class FiniteBasisSolver(NetworkSolver):
+class FiniteBasisSolver(NetworkSolver, ABC):
     """A network with random hidden weights, whose output layer alone is solved for, exactly.
 
     Its windows are spread over the body, denser at re-entrant corners, and have a few random tanh neurons
@@ -78,6 +78,7 @@ class FiniteBasisSolver(NetworkSolver):
     cell: float
     base_length: float = 5.0
     seed: int = 0
+    name: ClassVar[str] = "pinn-std"
     laws: ClassVar[tuple[str, ...]] = LAWS
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
     cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=6)
@@ -144,21 +145,24 @@ class FiniteBasisSolver(NetworkSolver):
         if region is not None:
             reaction[:] = region.force
         elif problem.load.kind != "cylinder":
-            reaction[problem.load.prescribed] = network.reaction(state.forces)
+            # The first functional of every prescribed component is a mean, whose multiplier is the force.
+            reaction[problem.load.prescribed] = state.forces[: len(problem.load.prescribed)]
         fit = None if state.markers is None else state.markers.fit(state.factor)
+        columns = "units", "energy", "estimated_error", "seconds"
+        changed = f"{finer:.2g} times finer windows changed the displacement by {change:.2%}"
         return Solution(
             solver=self.name,
             problem=problem,
             field=field,
             energy=energy,
             reaction=reaction,
-            status=self._status(problem, reached, finer, change, error, fit),
+            status=self._status(problem, reached, changed, error, fit),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": field.output.numel(),
                 "units": field.basis.size,
                 "windows": field.basis.windows.count,
-                "quadrature_points": network.energy.points,
+                "quadrature_points": len(network.energy.weights),
                 "newton_iterations": reached.iterations,
                 "unstable_directions": state.unstable,
                 **network.marker_stats(state),
@@ -166,9 +170,7 @@ class FiniteBasisSolver(NetworkSolver):
                 "seed": self.seed,
                 "device": "cpu",
             },
-            history=dict(
-                zip(("units", "energy", "estimated_error", "seconds"), np.array(history).T, strict=True)
-            ),
+            history=dict(zip(columns, np.array(history).T, strict=True)),
             left_out=None if fit is None else leave_one_out_displacements(problem, fit.residual_without),
         )
 
@@ -209,35 +211,22 @@ class FiniteBasisSolver(NetworkSolver):
 
     def _energy(self, problem: Problem, scale: float) -> NetworkEnergy:
         mesh = problem.mesh
-        spacing = PointSpacing.of(
-            problem,
-            wall=self.wall_spacing * scale,
-            corner=self.corner_spacing * scale,
-            growth=self.growth * scale,
-        )
+        wall, corner = self.wall_spacing * scale, self.corner_spacing * scale
+        spacing = PointSpacing.of(problem, wall=wall, corner=corner, growth=self.growth * scale)
         triangles = graded_triangles(mesh, spacing, self.cell)
         centres = spread_points(triangles, mesh, spacing, self.thinning)
         distances = spacing.at(centres)
         rng = np.random.default_rng(self.seed)
+        windows = self.windows(centres, distances, rng)
+        steepness, constraint = self.steepness / distances, HardConstraint.of(mesh, self.base_length)
         basis = FiniteBasis.around(
-            self.windows(centres, distances, rng),
-            centres,
-            self.steepness / distances,
-            neurons=self.neurons,
-            constraint=HardConstraint.of(mesh, self.base_length),
-            rng=rng,
+            windows, centres, steepness, neurons=self.neurons, constraint=constraint, rng=rng
         )
         quadrature = graded_quadrature(triangles, spacing, self.cell)
         return NetworkEnergy.of(basis, problem.material, *quadrature)
 
     def _status(
-        self,
-        problem: Problem,
-        reached: LoadStep,
-        finer: float,
-        change: float,
-        error: float,
-        fit: MarkerFit | None,
+        self, problem: Problem, reached: LoadStep, changed: str, error: float, fit: MarkerFit | None
     ) -> Status:
         region = reached.region
         if problem.load.kind == "cylinder" and reached.fraction == 1 and region is None:
@@ -251,8 +240,7 @@ class FiniteBasisSolver(NetworkSolver):
                 "take a smaller spacing, the load patch or a smaller stroke",
             )
         message = (
-            f"{finer:.2g} times finer windows changed the displacement by {change:.2%}, "
-            f"so that its error is about {error:.2%} or less (criterion {self.tolerance:.2%})"
+            f"{changed}, so that its error is about {error:.2%} or less (criterion {self.tolerance:.2%})"
         )
         if unstable := reached.state.unstable:
             return Status(False, f"{message}; but {unstable_phrase(unstable)}")

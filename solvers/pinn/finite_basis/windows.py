@@ -88,12 +88,8 @@ class GateTree:
         padded = [paths[e] + [(-1, False)] * (depth - len(paths[e])) for e in range(len(centres))]
         steps = torch.tensor(padded, dtype=torch.int64).reshape(len(centres), depth, 2)
         weights = torch.from_numpy(np.array(gates).reshape(-1, 3))
-        return cls(
-            weights,
-            torch.tensor(children, dtype=torch.int64).reshape(-1, 2),
-            steps[..., 0],
-            steps[..., 1] == 1,
-        )
+        below = torch.tensor(children, dtype=torch.int64).reshape(-1, 2)
+        return cls(weights, below, steps[..., 0], steps[..., 1] == 1)
 
     @property
     def count(self) -> int:
@@ -121,11 +117,8 @@ class GateTree:
             sides = [_logits(side)[0].sigmoid_() for side in (spread - logit, spread + logit)]
             bound = (bound * torch.stack(sides)).flatten()
             reached = bound > NEGLIGIBLE
-            box, node, bound = (
-                box.repeat(2)[reached],
-                self.children[node].T.flatten()[reached],
-                bound[reached],
-            )
+            node = self.children[node].T.flatten()[reached]
+            box, bound = box.repeat(2)[reached], bound[reached]
         pairs = torch.cat(found, dim=1)
         pairs = pairs[:, (pairs[0] * self.count + pairs[1]).argsort()]
         return list(pairs[1].split(pairs[0].bincount(minlength=len(boxes)).tolist()))

@@ -60,6 +60,9 @@ class NetworkBody:
     def __init__(self, energy: NetworkEnergy, walls: FloatArray) -> None:
         self._energy, self._walls = energy, torch.from_numpy(walls)
         self._law = energy.material.law
+        self.shape = energy.basis.windows.count, 2, energy.basis.per_window  # Functions of a window last
+        self.points = energy.places  # The quadrature points, shape (q, 2), mm
+        self.feet = np.zeros((0, *self.shape))  # None: the network is held at the whole base
         self._factors: Factors | None = None
         self.factorisations = 0
 
@@ -77,12 +80,6 @@ class NetworkBody:
         """
         energy = solver.level(problem, scale).energy
         return cls(energy, motion.gradients[:, problem.mesh.locate(energy.places).cells])
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape (c, 2, m + 1) of a state: windows, components, functions of a window."""
-        basis = self._energy.basis
-        return basis.windows.count, 2, basis.per_window
 
     def admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """At the quadrature points; see `Body`."""
@@ -135,11 +132,6 @@ class NetworkBody:
                 found = _back_substituted(factors, given)
                 found += _back_substituted(factors, given - self._product(factors, tangent, found))
         return np.asarray(found)
-
-    @property
-    def feet(self) -> FloatArray:
-        """None: the network is held at the whole base."""
-        return np.zeros((0, *self.shape))
 
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray
@@ -198,11 +190,6 @@ class NetworkBody:
         basis, outputs = self._energy.basis, torch.from_numpy(states)
         return basis.summed(basis.gradients, "xnwu,swiu->nsix", outputs, location.points).swapaxes(0, 1)
 
-    @property
-    def points(self) -> FloatArray:
-        """The quadrature points, shape (q, 2), mm."""
-        return self._energy.places
-
     def projected(self, gradients: FloatArray, lame: Lame, changes: FloatArray) -> FloatArray:
         """States (s, *shape) nearest to displacement gradients (s, q, 2, 2) at the points.
 
@@ -237,7 +224,7 @@ class NetworkBody:
 
     def _factorised(self, tangent: torch.Tensor) -> Factors:
         if self._factors is not None:
-            self._factors.close()
+            self._factors.scaled.destroy()
         self._factors = self._energy.hessian(tangent).factorised(REGULARISATION, definite=False)
         self.factorisations += 1
         return self._factors

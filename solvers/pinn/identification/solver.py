@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from pinnray.geometry.observations import Observations
-from pinnray.runtime.errors import UserError
 from pinnray.solvers.fem.finite_strain.nested_path import coarser
 from pinnray.solvers.fem.identification import FemBody
 from pinnray.solvers.identification.fit import Fit
@@ -60,15 +59,11 @@ class PinnIdSolver(IdentifyingSolver):
     twin: ClassVar[str] = "fem-id"
     sought: ClassVar[tuple[str, ...]] = tuple(name for name in DEFAULT if name != "feet")
     laws: ClassVar[tuple[str, ...]] = LAWS
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
-    friction: ClassVar[bool] = True
     cost: ClassVar[Cost] = Cost(per_triangle=0, fixed=17)
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.spacing) and self.spacing > 0):
-            raise UserError(f"pinn-id: the spacing must be positive, got {self.spacing}")
-        if self.seed < 0:
-            raise UserError(f"pinn-id: the seed must be zero or more, got {self.seed}")
+        self.check_positive("spacing")
+        self.check_not_negative("seed")
         super().__post_init__()
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
@@ -105,7 +100,8 @@ class PinnIdSolver(IdentifyingSolver):
     ) -> tuple[Solution, NestedSearch, Identified]:
         started = time.perf_counter()
         problem = replace(problem, observations=observations)
-        elements = self._elements(problem)
+        body = partial(FemBody, degree=2)
+        elements = Identifier(self, coarser(problem) or problem, body, cost_change=ROUGHLY)
         network = Identifier(
             self, problem, self._body, cost_change=COST_CHANGE, flexibility=elements.flexibility
         )
@@ -124,21 +120,14 @@ class PinnIdSolver(IdentifyingSolver):
         return found.solution(self.name, problem, stats)
 
     def _body(self, unknowns: Unknowns) -> NetworkBody:
-        return NetworkBody.of(
-            replace(WINDOWS, seed=self.seed), unknowns.problem, unknowns.motion, self.spacing
-        )
-
-    def _elements(self, problem: Problem) -> Identifier:
-        """Seeks the unknowns by quadratic finite elements, coarse ones on a fine mesh."""
-        body = partial(FemBody, degree=2)
-        return Identifier(self, coarser(problem) or problem, body, cost_change=ROUGHLY)
+        windows = replace(WINDOWS, seed=self.seed)
+        return NetworkBody.of(windows, unknowns.problem, unknowns.motion, self.spacing)
 
 
 def _projected(fit: Fit, model: ResponseModel) -> Response:
     """The response of elements by the nearest states of a network."""
     body, response = model.body, fit.response
-    if not isinstance(body, NetworkBody):
-        raise TypeError("the bodies of pinn-id are networks")
+    assert isinstance(body, NetworkBody)
     elements = fit.model.unknowns.problem.mesh
     location = model.unknowns.problem.mesh.locate_on(elements, body.points)
     gradients = fit.model.body.gradients(np.stack([response.state, *response.slopes]), location)

@@ -130,7 +130,7 @@ def test_a_finger_that_has_left_the_cylinder_is_held_at_the_nodes_with_forces(co
     off, tangent = coarse.stage(output, 0.0, multipliers), coarse._tangent(output)
     off.nodal[coarse.contact.nodes, 1] -= 1.0
     assert not coarse.contact.forces(off).any()
-    held = coarse._taken(off, output, tangent, np.inf)
+    held = coarse._taken(off, output, tangent, np.inf, pressed_network.SHORTEST)
     expected = coarse._step(off, output, np.array([3, 5]), tangent)
     np.testing.assert_array_equal(held.step.change, expected.change)
 
