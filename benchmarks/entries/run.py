@@ -5,7 +5,6 @@
 - `page`: only the page.
 """
 
-from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -27,55 +26,51 @@ from pinnray.studies.benchmark.problems import SETS, problem_set
 FOLDER, PAGE = DOCS / "benchmark", DOCS / "benchmark.md"
 
 
-def _own(name: str, **settings: Any) -> Callable[[], Any]:
-    return lambda: make_solver(name, **settings)
+BEST = "Best of five settings on a finger that is not scored."
+DEEP = "deep_energy:DeepEnergySolver"
+FELUPE = "A derivative of its quadratic triangle is put right; linear problems are solved by SuperLU."
 
-
-def _outside(place: str, **settings: Any) -> Callable[[], Any]:
-    module, _, name = place.partition(":")
-    return lambda: getattr(import_module(f"benchmarks.entries.{module}"), name)(**settings)
-
-
-ALL: dict[str, tuple[Callable[[], Any], str]] = {
-    "fem": (_own("fem"), ""),
-    "fem-nonlinear": (_own("fem-nonlinear"), ""),
-    "skfem-p1": (_outside("scikit_fem:SkfemEntry", degree=1), ""),
-    "skfem-p2": (_outside("scikit_fem:SkfemEntry"), "SuperLU is in its symmetric mode."),
-    "felupe": (
-        _outside("felupe_entry:FelupeEntry"),
-        "A derivative of its quadratic triangle is put right; linear problems are solved by SuperLU.",
-    ),
-    "torch-fem": (_outside("torch_fem:TorchFemEntry"), ""),
-    "pinn-std fast": (_own("pinn-std"), ""),
-    "pinn-std local": (_own("pinn-std", preset="local"), ""),
-    "pinn-std trained": (_own("pinn-std", preset="trained"), ""),
-    "pinn-std paper": (_own("pinn-std", preset="paper"), ""),
-    "deep-energy": (
-        _outside("deep_energy:DeepEnergySolver", width=30, layers=5, adam=50, lbfgs=350),
-        "Best of five settings on a finger that is not scored.",
-    ),
+ALL: dict[str, tuple[str, dict[str, Any], str]] = {
+    "fem": ("fem", {}, ""),
+    "fem-nonlinear": ("fem-nonlinear", {}, ""),
+    "skfem-p1": ("scikit_fem:SkfemEntry", {"degree": 1}, ""),
+    "skfem-p2": ("scikit_fem:SkfemEntry", {}, "SuperLU is in its symmetric mode."),
+    "felupe": ("felupe_entry:FelupeEntry", {}, FELUPE),
+    "torch-fem": ("torch_fem:TorchFemEntry", {}, ""),
+    "pinn-std fast": ("pinn-std", {}, ""),
+    "pinn-std local": ("pinn-std", {"preset": "local"}, ""),
+    "pinn-std trained": ("pinn-std", {"preset": "trained"}, ""),
+    "pinn-std paper": ("pinn-std", {"preset": "paper"}, ""),
+    "deep-energy": (DEEP, {"width": 30, "layers": 5, "adam": 50, "lbfgs": 350}, BEST),
     "deep-energy-fourier": (
-        _outside(
-            "deep_energy:DeepEnergySolver", features=32, scale=2.0, width=30, layers=2, adam=50, lbfgs=600
-        ),
-        "Best of five settings on a finger that is not scored.",
+        DEEP,
+        {"features": 32, "scale": 2.0, "width": 30, "layers": 2, "adam": 50, "lbfgs": 600},
+        BEST,
     ),
     "deepxde": (
-        _outside("deepxde_energy:DeepXdeEntry", layers=2, adam=50, lbfgs=700, rate=5e-3),
-        "The energy as its loss is ours; best of five settings on a finger that is not scored.",
+        "deepxde_energy:DeepXdeEntry",
+        {"layers": 2, "adam": 50, "lbfgs": 700, "rate": 5e-3},
+        f"The energy as its loss is ours; {BEST[0].lower()}{BEST[1:]}",
     ),
 }
-"""How an entry is made, and what differs from its authors' settings."""
+"""A solver, or module and class beside this one; its settings; what differs from its authors' settings."""
+
+
+def made(name: str) -> Any:
+    """The solver of an entry of `ALL`."""
+    place, settings, _ = ALL[name]
+    module, _, kind = place.partition(":")
+    if not kind:
+        return make_solver(place, **settings)
+    return getattr(import_module(f"benchmarks.entries.{module}"), kind)(**settings)
 
 
 def run(which: str, rows: str = "", time_limit: float = 600.0) -> Table:
     """Run entries whose names hold a text, keep their files, and write the page."""
     out = Path("out") / f"entries-{which}"
-    chosen = {name: entry for name, entry in ALL.items() if rows in name}
-    for name, (make, note) in chosen.items():
-        job = BenchmarkJob(
-            solvers=[make()], out=out, which=which, time_limit=time_limit, notes={name.split()[0]: note}
-        )
+    for name in (each for each in ALL if rows in each):
+        notes = {name.split()[0]: ALL[name][2]}
+        job = BenchmarkJob(solvers=[made(name)], out=out, which=which, time_limit=time_limit, notes=notes)
         with Stages() as stages:
             (entry,) = run_benchmark(job, stages).entries
         copy(out / ENTRIES / entry.file_name, FOLDER)

@@ -103,6 +103,7 @@ class Bumped(Recording):
         return super().frame(number) if number < self.motion.rest else self.after.frame(number)
 
 
+HALF = covered({3: 0.5, 7: 0.5})
 CORNER = Case(exposure={"noise": 6, "blur": 1.5, "gradient": 0.3}, tilt=5)
 CASES: dict[tuple[str, str], Case] = {
     ("base", ""): Case(),
@@ -111,7 +112,7 @@ CASES: dict[tuple[str, str], Case] = {
     **{("shading, %", f"{share}"): Case(exposure={"gradient": share / 100}) for share in (0, 30, 60)},
     ("hidden", "a marker"): Case(hide=covered({5: 1.0})),
     ("hidden", "3 markers"): Case(hide=covered({2: 1.0, 5: 1.0, 8: 1.0})),
-    ("hidden", "half of 2 markers"): Case(hide=covered({3: 0.5, 7: 0.5})),
+    ("hidden", "half of 2 markers"): Case(hide=HALF),
     ("hidden", "half of 2 markers, light cable"): Case(hide=covered({3: 0.5, 7: 0.5}, "light")),
     ("hidden", "a third of 2 markers"): Case(hide=covered({3: 0.33, 7: 0.33})),
     ("hidden", "a fiducial"): Case(hide=fiducials(2)),
@@ -134,9 +135,7 @@ CASES: dict[tuple[str, str], Case] = {
     ("camera", "bumped, mp4v"): Case(bumped=True, codec="mp4v"),
     ("no fiducials", ""): Case(hide=fiducials(*range(7)), fiducials=False, tilt=0),
     ("corner", "noise 6, blur 1.5, shading 30 %, tilt 5"): CORNER,
-    ("corner", "the same, mjpg, jump, 2 half hidden"): replace(
-        CORNER, codec="mjpg", motion=JUMP, hide=covered({3: 0.5, 7: 0.5})
-    ),
+    ("corner", "the same, mjpg, jump, 2 half hidden"): replace(CORNER, codec="mjpg", motion=JUMP, hide=HALF),
     ("corner", "noise 10, blur 2.5, shading 60 %, tilt 15"): Case(
         exposure={"noise": 10, "blur": 2.5, "gradient": 0.6}, tilt=15
     ),
