@@ -140,10 +140,7 @@ def _chained(loose: Sequence[Piece], reach: float) -> Closed:
     found = joined(loose, reach)
     check_ends(found, reach)
     pieces, nodes, places, gaps = found
-    at: dict[int, list[int]] = {}
-    for number, pair in enumerate(nodes):
-        for node in pair:
-            at.setdefault(int(node), []).append(number)
+    at = (nodes.argsort(axis=None, kind="stable") // 2).reshape(-1, 2).tolist()  # both pieces at each node
     left, loops = set(range(len(pieces))), []
     for first in range(len(pieces)):
         if first not in left:
