@@ -1,5 +1,6 @@
 """Reads a drawing, settles its clamp, contact and markers, and places it in the finger's frame."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
@@ -214,7 +215,4 @@ def _length(given: float | None, unit: float, drawn: float | None, proposed: flo
 
 def _name(file: str) -> str:
     """The file's name without its suffix, as a finger may be called."""
-    stem = "".join(
-        each if each.isascii() and (each.isalnum() or each in "._-") else "-" for each in Path(file).stem
-    )
-    return stem.lstrip("._-")[:64] or "drawing"
+    return re.sub(r"[^A-Za-z0-9._-]", "-", Path(file).stem).lstrip("._-")[:64] or "drawing"
