@@ -117,15 +117,6 @@ def rib_slope(p: Parameters) -> float:
     return p.rib_angle + (p.base_tilt if p.rib_reference == "base" else 0.0)
 
 
-def rib_direction(p: Parameters) -> FloatArray:
-    """Unit vector along the ribs from front to back, shape (2,).
-
-    A positive angle leans toward the tip: x grows from the front wall to the back wall.
-    """
-    angle = np.radians(rib_slope(p))
-    return np.array([np.sin(angle), -np.cos(angle)])
-
-
 def rib_axes(p: Parameters) -> FloatArray:
     """Ends of the rib axes on the front and the back wall's centre line, shape (rib_count, 2, 2), mm."""
     lines = _rib_lines(p, rib_feet(p))
@@ -159,7 +150,9 @@ def _base_frame(p: Parameters) -> tuple[FloatArray, FloatArray]:
 
 def _rib_lines(p: Parameters, feet: FloatArray) -> Line:
     """Lines along the ribs through abscissae, shape (n,), mm, of the front wall's inner face."""
-    return Line(np.stack([feet, np.full_like(feet, -p.front_thickness)], axis=-1), rib_direction(p))
+    angle = np.radians(rib_slope(p))
+    along = np.array([np.sin(angle), -np.cos(angle)])  # from front to back
+    return Line(np.stack([feet, np.full_like(feet, -p.front_thickness)], axis=-1), along)
 
 
 def finger_outline(p: Parameters) -> Loop:
