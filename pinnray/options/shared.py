@@ -94,10 +94,8 @@ class FingerOptions(CheckedModel):
         """What the files that describe the finger say that pictures have taught of it."""
         from pinnray.geometry.finger.learned import read_learned
 
-        found = [
-            learned for file in self.files() if file.suffix == ".toml" and (learned := read_learned(file))
-        ]
-        return found[0] if found else None
+        tables = (read_learned(file) for file in self.files() if file.suffix == ".toml")
+        return next(filter(None, tables), None)
 
     def files(self) -> list[Path]:
         """The files that describe the finger."""
