@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
 from pinnray.robots.export_settings import ExportSettings, Kind
-from pinnray.robots.mjcf import CLEARANCE, Damping, chain_mjcf, flex_mjcf, gripper_mjcf, with_header
+from pinnray.robots.mjcf import CLEARANCE, chain_mjcf, flex_mjcf, gripper_mjcf, with_header
 from pinnray.robots.presses import PressedFinger, press
 from pinnray.robots.score import ModelScore, scored
 from pinnray.robots.simulation import Model, chain_front, check_mujoco, flex_front
@@ -101,9 +100,9 @@ def _mujoco(
     with stages.stage("fit"):
         chain = Chain.of(problem.mesh, pressed.front, settings.hinges, density)
         springs = fitted_springs(chain, pressed, fastest=FASTEST)
-        damping = Damping(settings.loss_factor, float(springs.frequencies[0]))
+        damping = settings.loss_factor / float(springs.frequencies[0])  # of the first vibration
         wall = thinnest_wall(finger.section)
-        hinges = chain_mjcf(name, chain, springs, wall, depth, damping)
+        hinges = chain_mjcf(name, chain, springs, wall, depth, settings.loss_factor)
 
         def flexible(factor: float) -> Model:
             scaled = problem.material.model_copy(update={"young": factor * problem.material.young})
@@ -128,7 +127,19 @@ def _mujoco(
     write_text(files[-1], _gripper(pressed, models[0].name))
     if scores:
         files += [out / "score.json", out / "score.csv"]
-        write_json(files[-2], _document(pressed, factor, density, settings, scores))
+        document = {
+            "schema": 1,
+            "finger": finger.definition(),
+            "material": pressed.problem.material.model_dump(),
+            "density_kg_per_m3": density,
+            "load": pressed.problem.load.model_dump(),
+            "loss_factor": settings.loss_factor,
+            "flex_young_factor": factor,
+            "fitted_loads": len(pressed.fitted),
+            "lost_loads": list(pressed.lost),
+            "models": {each.model: each.document() for each in scores},
+        }
+        write_json(files[-2], document)
         write_csv(files[-1], [{"model": s.model, **each.row()} for s in scores for each in s.presses])
     return Exported(tuple(files), tuple(scores), pressed.lost)
 
@@ -163,25 +174,3 @@ def _header(pressed: PressedFinger, fit: str, settings: ExportSettings) -> Seque
         "Attached to another model, whose time step holds, give that one at most 1 ms: MuJoCo's 2 ms make it "
         "unstable.",
     ]
-
-
-def _document(
-    pressed: PressedFinger,
-    factor: float,
-    density: float,
-    settings: ExportSettings,
-    scores: Sequence[ModelScore],
-) -> dict[str, Any]:
-    problem = pressed.problem
-    return {
-        "schema": 1,
-        "finger": problem.finger and problem.finger.definition(),
-        "material": problem.material.model_dump(),
-        "density_kg_per_m3": density,
-        "load": problem.load.model_dump(),
-        "loss_factor": settings.loss_factor,
-        "flex_young_factor": factor,
-        "fitted_loads": len(pressed.fitted),
-        "lost_loads": list(pressed.lost),
-        "models": {each.model: each.document() for each in scores},
-    }

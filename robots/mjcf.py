@@ -1,7 +1,6 @@
 """MJCF files of a finger for MuJoCo: a chain of hinges, two of it as a gripper, and a flexible body."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import fill
 from xml.etree import ElementTree as ET
 
@@ -29,15 +28,7 @@ CARRIAGE = "0.2"
 BODY_COLOUR = "0.9 0.6 0.3 1"
 
 
-@dataclass(frozen=True)
-class Damping:
-    """Damping of a model: stated, not fitted, for lack of a measurement."""
-
-    loss_factor: float  #: Of every vibration of the chain, and of the body's first one
-    frequency: float  #: Angular frequency of the first vibration, rad/s
-
-
-def chain_mjcf(name: str, chain: Chain, springs: Springs, wall: float, depth: float, damping: Damping) -> str:
+def chain_mjcf(name: str, chain: Chain, springs: Springs, wall: float, depth: float, loss: float) -> str:
     """The MJCF file of a chain.
 
     Args:
@@ -46,7 +37,7 @@ def chain_mjcf(name: str, chain: Chain, springs: Springs, wall: float, depth: fl
         springs: Its fixed tendons.
         wall: Thickness of the links' boxes, mm: the front wall's.
         depth: Of the finger, mm.
-        damping: Its loss factor.
+        loss: Loss factor of every vibration.
     """
     root, starts = _model(name, "implicitfast"), chain.points.copy()
     starts[0] = 0.0  # link 0 is part of the finger
@@ -78,7 +69,7 @@ def chain_mjcf(name: str, chain: Chain, springs: Springs, wall: float, depth: fl
     # Neighbours overlap where they turn, and MuJoCo excludes no pair with a body that is fixed.
     _add(_add(root, "contact"), "exclude", body1="finger", body2="link1")
     tendons = _add(root, "tendon")
-    dampings = damping.loss_factor * springs.stiffnesses / springs.frequencies
+    dampings = loss * springs.stiffnesses / springs.frequencies
     joints = ["slide", *(f"hinge{link}" for link in range(1, chain.hinges + 1))]
     for row, stiffness, resistance in zip(springs.rows, springs.stiffnesses, dampings, strict=True):
         tendon = _add(tendons, "fixed", springlength=0, stiffness=stiffness, damping=resistance)
@@ -115,7 +106,7 @@ def gripper_mjcf(name: str, chain: str, place: FloatArray, radius: float, depth:
     return _written(root)
 
 
-def flex_mjcf(name: str, body: SolidMesh, material: Material, density: float, damping: Damping) -> str:
+def flex_mjcf(name: str, body: SolidMesh, material: Material, density: float, damping: float) -> str:
     """The MJCF file of a flexible body, of Saint Venant and Kirchhoff's law on linear tetrahedra.
 
     Args:
@@ -123,7 +114,7 @@ def flex_mjcf(name: str, body: SolidMesh, material: Material, density: float, da
         body: Its tetrahedra; nodes on the base are pinned.
         material: Its elastic constants.
         density: Of the material, kg/m^3.
-        damping: Its loss factor at the first vibration.
+        damping: Time constant of its damping: a loss factor over an angular frequency, s.
     """
     root = _model(name, "discrete")
     _add(root, "size", memory="256M")
@@ -132,8 +123,7 @@ def flex_mjcf(name: str, body: SolidMesh, material: Material, density: float, da
     cells = {"point": body.points, "element": body.tetrahedra}
     flex = _add(finger, "flexcomp", **kind, mass=mass, **cells, rgba=BODY_COLOUR)
     _add(flex, "contact", **HARDER, selfcollide="none")
-    resistance = damping.loss_factor / damping.frequency
-    _add(flex, "elasticity", young=1e6 * material.young, poisson=material.poisson, damping=resistance)
+    _add(flex, "elasticity", young=1e6 * material.young, poisson=material.poisson, damping=damping)
     _add(flex, "pin", id=body.nodes_on("base"))
     return _written(root)
 

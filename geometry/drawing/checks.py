@@ -9,9 +9,9 @@ from scipy.spatial import cKDTree
 from pinnray.geometry.drawing.formats.closed_loops import straightened
 from pinnray.geometry.drawing.formats.drawing import place
 from pinnray.geometry.drawing.placement import on_curve
-from pinnray.geometry.section.loop import Loop, turns
+from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import DEVIATION, Section
-from pinnray.geometry.section.thickness import inner_normals, wall_thickness
+from pinnray.geometry.section.thickness import corner_turns, wall_thickness
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 
@@ -59,7 +59,7 @@ def check_contact(outline: Loop, contact: FloatArray) -> tuple[int, float]:
             f"the contact at {place(contact)} is on the clamp; move it to a free part of the outline"
         )
     beside = which if fraction == 0 else which + 1 if fraction == 1 else None
-    if beside is not None and abs(_bend(outline, beside % len(outline.points))) > np.radians(30):
+    if beside is not None and abs(corner_turns(outline)[beside % len(outline.points)]) > np.radians(30):
         raise UserError(f"the contact at {place(contact)} is on a corner, which has no normal; move it along")
     return which, fraction
 
@@ -84,12 +84,6 @@ def check_markers(section: Section, markers: FloatArray, diameter: float) -> Non
         raise UserError(
             f"markers {first + 1} and {second + 1} are both at {place(markers[first])}; delete one"
         )
-
-
-def _bend(outline: Loop, corner: int) -> float:
-    """Turn of the outline at a corner, radians."""
-    into, out = inner_normals(outline, corner - 1, 1.0)[0], inner_normals(outline, corner, 0.0)[0]
-    return float(turns(into, out))
 
 
 def _check_sound(rings: Sequence[shapely.LinearRing]) -> None:

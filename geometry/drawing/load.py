@@ -1,5 +1,6 @@
 """Reads a drawing, settles its clamp, contact and markers, and places it in the finger's frame."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
@@ -106,9 +107,7 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
     if contact.ends is None:
         x = float(placement(outline.along(which, fraction))[0, 0])
         proposed = proposal.contact_width(section.outline, x)
-        width, width_source = _first(
-            given=_scaled(description.contact_width, drawing.unit), proposed=proposed
-        )
+        width, width_source = _length(description.contact_width, drawing.unit, None, proposed)
     else:
         ends = placement(contact.ends)[:, 0]
         x, width, width_source = float(ends.mean()), float(np.ptp(ends)), contact.source
@@ -117,10 +116,8 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
                 f"the contact begins and ends at {place(contact.ends[0])}; call only the part contact that "
                 "the indenter touches"
             )
-    given = _scaled(description.depth, drawing.unit)
-    depth, depth_source = _first(given=given, drawn=drawing.depth, proposed=20.0)
-    given = _scaled(description.marker_height, drawing.unit)
-    height, height_source = _first(given=given, drawn=drawing.marker_height, proposed=0.6)
+    depth, depth_source = _length(description.depth, drawing.unit, drawing.depth, 20.0)
+    height, height_source = _length(description.marker_height, drawing.unit, drawing.marker_height, 0.6)
     markers = placement(points)
     markers = markers[np.lexsort((-markers[:, 1], markers[:, 0]))]
     mesh = ready_mesh(drawing.mesh, placement, section, markers, (x, width)) if drawing.mesh else None
@@ -202,27 +199,20 @@ def _markers(
     else:
         points, source = proposal.marker_places(section, proposal.MARKERS), "proposed"
     check_markers(section, points, 0.0)
-    diameter, diameter_source = _first(
-        given=_scaled(description.marker_diameter, drawing.unit),
-        drawn=drawing.marker_diameter if source == "drawn" else None,
-        proposed=proposal.marker_diameter(section, points),
-    )
+    drawn = drawing.marker_diameter if source == "drawn" else None
+    proposed = proposal.marker_diameter(section, points)
+    diameter, diameter_source = _length(description.marker_diameter, drawing.unit, drawn, proposed)
     check_markers(section, points, diameter)
     return points, diameter, {"markers": source, "marker_diameter": diameter_source}
 
 
-def _first(**choices: float | None) -> tuple[float, str]:
-    """The first number there is, with its source."""
-    return next((value, source) for source, value in choices.items() if value is not None)
-
-
-def _scaled(length: float | None, unit: float) -> float | None:
-    return None if length is None else length * unit
+def _length(given: float | None, unit: float, drawn: float | None, proposed: float) -> tuple[float, str]:
+    """A length, mm, and its source; `given` is in the drawing's unit."""
+    if given is not None:
+        return given * unit, "given"
+    return (proposed, "proposed") if drawn is None else (drawn, "drawn")
 
 
 def _name(file: str) -> str:
     """The file's name without its suffix, as a finger may be called."""
-    stem = "".join(
-        each if each.isascii() and (each.isalnum() or each in "._-") else "-" for each in Path(file).stem
-    )
-    return stem.lstrip("._-")[:64] or "drawing"
+    return re.sub(r"[^A-Za-z0-9._-]", "-", Path(file).stem).lstrip("._-")[:64] or "drawing"

@@ -138,12 +138,8 @@ def with_front(loop: Loop, contact: FloatArray) -> Loop:
                 break
             current = following
         which = int(loop.places(contact[None]).pieces[0])
-    run = {which}
-    for step in (1, -1):
-        current = (which + step) % len(loop.points)
-        while loop.names[current] != "base" and _faces(loop, current) and current not in run:
-            run.add(current)
-            current = (current + step) % len(loop.points)
+    facing = {each for each, name in enumerate(loop.names) if name != "base" and _faces(loop, each)}
+    run = next(run for run in loop.runs({which, *facing}) if which in run)
     return loop.renamed(("front" if number in run else own for number, own in enumerate(loop.names)))
 
 

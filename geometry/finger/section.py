@@ -117,15 +117,6 @@ def rib_slope(p: Parameters) -> float:
     return p.rib_angle + (p.base_tilt if p.rib_reference == "base" else 0.0)
 
 
-def rib_direction(p: Parameters) -> FloatArray:
-    """Unit vector along the ribs from front to back, shape (2,).
-
-    A positive angle leans toward the tip: x grows from the front wall to the back wall.
-    """
-    angle = np.radians(rib_slope(p))
-    return np.array([np.sin(angle), -np.cos(angle)])
-
-
 def rib_axes(p: Parameters) -> FloatArray:
     """Ends of the rib axes on the front and the back wall's centre line, shape (rib_count, 2, 2), mm."""
     lines = _rib_lines(p, rib_feet(p))
@@ -159,32 +150,28 @@ def _base_frame(p: Parameters) -> tuple[FloatArray, FloatArray]:
 
 def _rib_lines(p: Parameters, feet: FloatArray) -> Line:
     """Lines along the ribs through abscissae, shape (n,), mm, of the front wall's inner face."""
-    return Line(np.stack([feet, np.full_like(feet, -p.front_thickness)], axis=-1), rib_direction(p))
+    angle = np.radians(rib_slope(p))
+    along = np.array([np.sin(angle), -np.cos(angle)])  # from front to back
+    return Line(np.stack([feet, np.full_like(feet, -p.front_thickness)], axis=-1), along)
 
 
 def finger_outline(p: Parameters) -> Loop:
     """The outline from the base's front corner, counter-clockwise."""
-    points, names = _base_side(p)
     apex, tangent = np.array([p.height, 0.0]), tip_tangent(p)
-    points.append(base_corners(p)[1])
-    names.append("back")
-    bulges = [0.0] * len(points)
+    pieces = [*_base_side(p), (base_corners(p)[1], 0.0, "back")]
     if tangent > 0:
-        points += [apex - tangent * back_line(p, 0.0).direction, np.array([p.height - tangent, 0.0])]
-        names += ["tip", "front"]
-        bulges += [float(np.tan((np.pi - apex_angle(p)) / 4)), 0.0]
-    else:
-        points.append(apex)
-        names.append("front")
-        bulges.append(0.0)
-    return Loop(np.array(points), np.array(bulges), tuple(names))
+        rounding = float(np.tan((np.pi - apex_angle(p)) / 4))
+        pieces.append((apex - tangent * back_line(p, 0.0).direction, rounding, "tip"))
+    pieces.append((np.array([p.height - tangent, 0.0]), 0.0, "front"))
+    points, bulges, names = zip(*pieces, strict=True)
+    return Loop(np.array(points), np.array(bulges), names)
 
 
-def _base_side(p: Parameters) -> tuple[list[FloatArray], list[str]]:
-    """Corners from the base line's front end up to, without, its back end, and the names of their pieces."""
+def _base_side(p: Parameters) -> list[tuple[FloatArray, float, str]]:
+    """Start, bulge and name of the pieces from the base line's front end to its back end."""
     front = base_corners(p)[0]
     if p.foot_height == 0:
-        return [front], ["base"]
+        return [(front, 0.0, "base")]
     inward, along = _base_frame(p)
     ends = [(0.0, p.foot_height), (p.base_width, p.foot_height)]
     names = ["foot", "base", "foot"]
@@ -197,14 +184,10 @@ def _base_side(p: Parameters) -> tuple[list[FloatArray], list[str]]:
         slot += [(edges[3], top), (edges[3], lip), (edges[1], lip), (edges[1], p.foot_height)]
         ends = [ends[0], *slot, ends[1]]
         names = ["foot", "base", *["slot"] * 7, "base", "foot"]
-    return _without_steps([front, *(share * along - out * inward for share, out in ends)], names)
-
-
-def _without_steps(points: list[FloatArray], names: list[str]) -> tuple[list[FloatArray], list[str]]:
-    """The corners without pieces of no length: a slot as wide as its opening has such."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    kept = [*np.flatnonzero(steps > 1e-9).tolist(), len(points) - 1]
-    return [points[which] for which in kept], [names[which] for which in kept]
+    corners = [front, *(share * along - out * inward for share, out in ends)]
+    # A slot as wide as its opening has pieces of no length.
+    kept = [*(np.linalg.norm(np.diff(corners, axis=0), axis=1) > 1e-9), True]
+    return [(corner, 0.0, name) for corner, name, each in zip(corners, names, kept, strict=True) if each]
 
 
 def tip_middle(p: Parameters) -> FloatArray:

@@ -38,15 +38,12 @@ class MovingMesh:
         self._motion = elastic(mesh)
         self._nodes = np.unique(mesh.boundary_edges)
         points = mesh.points[self._nodes]
-        self._loop = np.zeros(len(points), dtype=np.int64)
-        self._piece, self._share = np.zeros_like(self._loop), np.zeros(len(points))
-        nearest = np.full(len(points), np.inf)
-        for number, loop in enumerate(self._loops):
-            places = loop.places(points)
-            nearer = places.distances < nearest
-            self._loop[nearer], nearest[nearer] = number, places.distances[nearer]
-            self._piece[nearer], self._share[nearer] = places.pieces[nearer], places.shares[nearer]
-        if nearest.max() > ON_CURVE:
+        found = zip(*(loop.places(points) for loop in self._loops), strict=True)
+        pieces, shares, distances = (np.stack(each) for each in found)
+        self._loop = distances.argmin(axis=0)
+        nearest = self._loop, np.arange(len(points))
+        self._piece, self._share = pieces[nearest], shares[nearest]
+        if distances[nearest].max() > ON_CURVE:
             raise UserError(f"the mesh is not of the finger {finger.name!r}: its boundary is elsewhere")
 
     def of(self, finger: Finger) -> TriangleMesh:

@@ -16,6 +16,7 @@ from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.mesh.triangle_mesh import TriangleMesh, boundary_edges
 from pinnray.geometry.section.loop import Loop
 from pinnray.geometry.section.section import Section
+from pinnray.geometry.section.thickness import corner_turns
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.atomic import write_bytes
 from pinnray.runtime.errors import UserError
@@ -78,12 +79,7 @@ def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> T
 def _corners(section: Section) -> FloatArray:
     """Re-entrant corners and the ends of the base, shape (k, 2), mm."""
     found = [loop.ends[which] for loop, which in section.named("base")]
-    for loop in section.loops:
-        along = loop.ends[:, 1] - loop.ends[:, 0]
-        angle, half = np.arctan2(along[:, 1], along[:, 0]), 2 * np.arctan(loop.bulges)
-        turn = (angle - half) - np.roll(angle + half, 1)
-        turn = (turn + np.pi) % (2 * np.pi) - np.pi
-        found.append(loop.points[turn < -np.radians(10)])
+    found += [loop.points[corner_turns(loop) < -np.radians(10)] for loop in section.loops]
     return np.concatenate(found)
 
 
@@ -200,20 +196,17 @@ def triangulate(named: Mapping[str, list[int]]) -> Triangulation:
     gmsh.model.mesh.generate(2)
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     _, connectivity = gmsh.model.mesh.getElementsByType(2)
-    triangles = connectivity.reshape(-1, 3)
-    used = np.unique(triangles)
-    number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
-    number[used] = np.arange(len(used))
+    used, triangles = np.unique(connectivity, return_inverse=True)
     order = np.argsort(tags)
     position = order[np.searchsorted(tags, used, sorter=order)]
     edges = {
-        name: number[np.concatenate([gmsh.model.mesh.getElementsByType(1, tag)[1] for tag in curves])]
+        name: np.concatenate([gmsh.model.mesh.getElementsByType(1, tag)[1] for tag in curves])
         for name, curves in named.items()
     }
     return Triangulation(
         points=coordinates.reshape(-1, 3)[position, :2].copy(),
-        triangles=number[triangles],
-        edges={name: nodes.reshape(-1, 2) for name, nodes in edges.items()},
+        triangles=triangles.reshape(-1, 3),
+        edges={name: np.searchsorted(used, nodes).reshape(-1, 2) for name, nodes in edges.items()},
     )
 
 

@@ -26,18 +26,16 @@ def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = Non
         marked: Mask of shape (t,).
         section: The section onto whose arcs new boundary nodes are moved; None leaves them on the chord.
     """
-    count, lengths = len(mesh.points), mesh.edge_lengths
-    rank = np.empty(len(lengths), dtype=np.int64)
-    rank[np.lexsort((np.arange(len(lengths)), lengths))] = np.arange(len(lengths))
+    rank = mesh.edge_lengths.argsort(kind="stable").argsort()
     sides = mesh.edge_numbers(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]])
     turn = (rank[sides].argmax(axis=1)[:, None] + np.arange(3)) % 3
     sides, corners = (np.take_along_axis(array, turn, axis=1) for array in (sides, mesh.triangles))
-    cut = np.zeros(len(lengths), dtype=bool)
+    cut = np.zeros(len(rank), dtype=bool)
     cut[sides[marked]] = True
     while (behind := cut[sides].any(axis=1) & ~cut[sides[:, 0]]).any():
         cut[sides[behind, 0]] = True
-    middle = np.full(len(lengths), -1)
-    middle[cut] = count + np.arange(cut.sum())
+    middle = np.full(len(rank), -1)
+    middle[cut] = len(mesh.points) + np.arange(cut.sum())
     return TriangleMesh(
         points=np.concatenate([mesh.points, _middles(mesh, cut, section)]),
         triangles=_cut_triangles(corners, middle[sides]),

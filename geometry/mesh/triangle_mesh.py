@@ -177,11 +177,9 @@ class TriangleMesh:
 
     def at_nodes(self) -> LocatedPoints:
         """The location of every node, in the order of the nodes."""
-        cells = np.zeros(len(self.points), dtype=np.int64)
-        corners = np.zeros(len(self.points), dtype=np.int64)
-        for corner in range(3):
-            cells[self.triangles[:, corner]] = np.arange(len(self.triangles))
-            corners[self.triangles[:, corner]] = corner
+        last = np.zeros(len(self.points), dtype=np.int64)
+        last[self.triangles.T.ravel()] = np.arange(self.triangles.size)
+        corners, cells = np.divmod(last, len(self.triangles))
         return LocatedPoints(points=self.points, cells=cells, barycentric=np.eye(3)[corners])
 
     def __reduce__(self) -> tuple[object, ...]:

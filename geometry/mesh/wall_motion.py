@@ -86,20 +86,19 @@ def _loop_motion(
     owned = _beside(mesh, loop, mask)
     breaks = _breaks(along, lengths, mean)
     if not breaks.any():
-        return _node_mean(normals * (share * owned)[:, None])
+        pushed = normals * (share * owned)[:, None]
+        return np.asarray(0.5 * (pushed + np.roll(pushed, 1, axis=0)))
     first = int(np.flatnonzero(breaks & ~np.roll(breaks, 1))[0]) if not breaks.all() else 0
     order = np.roll(np.arange(len(loop)), -first)
     faces = _faces(order, breaks)
     speeds = [share * (lengths[face] @ owned[face] > 0.5 * lengths[face].sum()) for face in faces]
     motion = np.zeros((len(loop), 2))
     corners = [
-        _corner(normals[one[-1]], normals[other[0]], speed, next_speed)
-        for one, other, speed, next_speed in zip(
-            faces, faces[1:] + faces[:1], speeds, speeds[1:] + speeds[:1], strict=True
-        )
+        _corner(normals[faces[number - 1][-1]], normals[face[0]], speeds[number - 1], speeds[number])
+        for number, face in enumerate(faces)
     ]
     for number, face in enumerate(faces):
-        left, right = corners[number - 1], corners[number]
+        left, right = corners[number], corners[(number + 1) % len(faces)]
         place = np.append(0.0, lengths[face].cumsum()) / lengths[face].sum()
         nodes = np.append(face, (face[-1] + 1) % len(loop))
         between = (1 - place)[:, None] * left + place[:, None] * right
@@ -134,21 +133,9 @@ def _faces(order: IntArray, breaks: BoolArray) -> list[IntArray]:
 
     Where no edge would be left, as between corners of a coarse mesh, every such edge is a face.
     """
-    following = np.roll(breaks, -1)
-    arcs = breaks & following
-    if arcs.all():
-        return [np.array([edge]) for edge in order]
-    faces: list[list[int]] = []
-    open_face = False
-    for edge in order:
-        if arcs[edge]:
-            open_face = False
-            continue
-        if breaks[edge] or not open_face:
-            faces.append([])
-        faces[-1].append(int(edge))
-        open_face = True
-    return [np.array(face) for face in faces]
+    arcs = breaks & np.roll(breaks, -1)
+    kept = order if arcs.all() else order[~arcs[order]]
+    return np.split(kept, np.flatnonzero(breaks[kept])[1:])  # every face begins at a break
 
 
 def _bend(last: int, first: int, count: int) -> IntArray:
@@ -163,20 +150,15 @@ def _corner(one: FloatArray, other: FloatArray, speed: float, next_speed: float)
     return np.linalg.solve(np.stack([one, other]), np.array([speed, next_speed]))
 
 
-def _node_mean(of_edges: FloatArray) -> FloatArray:
-    """Means over the two edges of each node of a closed boundary."""
-    return np.asarray(0.5 * (of_edges + np.roll(of_edges, 1, axis=0)))
-
-
 def _thickness(mesh: TriangleMesh, name: str, mask: BoolArray, loops: list[IntArray]) -> float:
     """The drawn thickness of a wall, mm."""
-    cavities = np.concatenate([mesh.points[loop] for loop in loops])
     if name == "rib":
         length = 0.0
         for loop in loops:
             steps = np.linalg.norm(mesh.points[np.roll(loop, -1)] - mesh.points[loop], axis=1)
             length += float(steps @ _beside(mesh, loop, mask))
         return float(2 * mesh.areas[mask].sum() / length)
+    cavities = mesh.points[np.concatenate(loops)]
     wall = shapely.MultiLineString(list(mesh.points[mesh.boundary(name)]))
     return float(wall.distance(shapely.MultiPoint(cavities)))
 

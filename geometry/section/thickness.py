@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pinnray.geometry.section.loop import STRAIGHT, Loop, cross
+from pinnray.geometry.section.loop import STRAIGHT, Loop, cross, turns
 from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
 
@@ -55,6 +55,12 @@ def inner_normals(loop: Loop, which: int, fractions: ArrayLike) -> FloatArray:
     along = loop.ends[which, 1] - loop.ends[which, 0]
     angle = np.arctan2(along[1], along[0]) + (2 * share - 1) * 2 * np.arctan(loop.bulges[which])
     return np.stack([-np.sin(angle), np.cos(angle)], axis=1)
+
+
+def corner_turns(loop: Loop) -> FloatArray:
+    """Turns of a curve at its corners, shape (n,), radians, positive to the left."""
+    normals = np.array([inner_normals(loop, which, [0.0, 1.0]) for which in range(len(loop.points))])
+    return turns(np.roll(normals[:, 1], 1, axis=0), normals[:, 0])
 
 
 def through(section: Section, points: ArrayLike, directions: ArrayLike) -> Crossing:
@@ -113,10 +119,8 @@ def _through(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
     step = max(1_000_000 // len(pieces.bulges), 1)  # pairs of a ray and a piece in memory
     found = [
         _first(pieces, start[first : first + step], ahead[first : first + step])
-        for first in range(0, len(start), step)
+        for first in range(0, max(len(start), 1), step)
     ]
-    if not found:
-        return Crossing(np.empty(0), np.empty(0, dtype=np.int64))
     return Crossing(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 

@@ -94,10 +94,8 @@ class FingerOptions(CheckedModel):
         """What the files that describe the finger say that pictures have taught of it."""
         from pinnray.geometry.finger.learned import read_learned
 
-        found = [
-            learned for file in self.files() if file.suffix == ".toml" and (learned := read_learned(file))
-        ]
-        return found[0] if found else None
+        tables = (read_learned(file) for file in self.files() if file.suffix == ".toml")
+        return next(filter(None, tables), None)
 
     def files(self) -> list[Path]:
         """The files that describe the finger."""
@@ -192,13 +190,6 @@ class MaterialOptions(Material):
 
         return of_preset(self.material, **given)
 
-    @property
-    def _usual(self) -> dict[str, Any]:
-        """The constants of the material that goes by a name."""
-        from pinnray.solvers.materials.presets import USUAL
-
-        return {name: getattr(self.made(), name) for name in USUAL if self.material}
-
 
 @Parameter(name="*", group=PHYSICS, negative="")
 class PhysicsOptions(MaterialOptions, Physics):
@@ -211,8 +202,10 @@ class PhysicsOptions(MaterialOptions, Physics):
     def values(self, preset: str | None = None, usual_load: LoadKind | None = None) -> dict[str, Any]:
         """What is not as by default, by the names of a study."""
         from pinnray.options.preset_jobs import job_defaults
+        from pinnray.solvers.materials.presets import USUAL
 
-        usual = {"load": usual_load or job_defaults(preset).load} | self._usual
+        usual: dict[str, Any] = {"load": usual_load or job_defaults(preset).load}
+        usual |= {name: getattr(self.made(), name) for name in USUAL if self.material}
         return usual | self.model_dump(exclude_unset=True, exclude={"material"})
 
 

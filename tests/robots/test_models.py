@@ -7,7 +7,7 @@ import pyvista
 from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.robots.chain import MM, Chain
-from pinnray.robots.mjcf import Damping, chain_mjcf, gripper_mjcf
+from pinnray.robots.mjcf import chain_mjcf, gripper_mjcf
 from pinnray.robots.simulation import chain_front
 from pinnray.robots.solid_files import write_solid
 from pinnray.robots.solid_mesh import SolidMesh
@@ -60,8 +60,7 @@ def test_the_chain_has_the_mass_of_the_finger_and_the_slopes_of_its_places(secti
 
 def test_mujoco_has_the_masses_springs_and_places_of_the_chain(front, chain, springs):
     mujoco = pytest.importorskip("mujoco")
-    damping = Damping(0.3, springs.frequencies[0])
-    model = mujoco.MjModel.from_xml_string(chain_mjcf("short", chain, springs, 2.0, SHORT.depth, damping))
+    model = mujoco.MjModel.from_xml_string(chain_mjcf("short", chain, springs, 2.0, SHORT.depth, 0.3))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     inertia = np.zeros((model.nv, model.nv))
@@ -96,9 +95,7 @@ def test_the_tetrahedra_fill_the_body_and_name_the_nodes_of_its_boundaries(secti
 def test_a_gripper_of_two_fingers_closes_on_its_object_in_its_own_time_step(tmp_path, chain, springs):
     """It is nearly at rest after a second, and both press alike; MuJoCo's own time step is twice as long."""
     mujoco = pytest.importorskip("mujoco")
-    (tmp_path / "chain.xml").write_text(
-        chain_mjcf("short", chain, springs, 2.0, SHORT.depth, Damping(0.3, springs.frequencies[0]))
-    )
+    (tmp_path / "chain.xml").write_text(chain_mjcf("short", chain, springs, 2.0, SHORT.depth, 0.3))
     place = np.array([SHORT.contact_abscissa, 0.0])
     scene = gripper_mjcf("gripper", "chain.xml", place, 6.0, SHORT.depth, 2.0)
     (tmp_path / "gripper.xml").write_text(scene)

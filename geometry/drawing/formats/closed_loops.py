@@ -1,13 +1,13 @@
 """Chains loose lines and arcs into closed curves by their ends, and sorts markers and contact from them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 
-from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, Mark, MarkerSize, Scale, place
+from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, MarkerSize, Scale, place
 from pinnray.geometry.drawing.formats.ends import JOIN, check_ends, check_extent, joined
 from pinnray.geometry.drawing.formats.pieces import Piece
 from pinnray.geometry.section.loop import STRAIGHT, Loop, cross
@@ -27,7 +27,7 @@ class Closed(NamedTuple):
 
 def assembled(
     pieces: Sequence[Piece],
-    marks: Sequence[Mark],
+    points: Mapping[str, Sequence[FloatArray]],
     scale: Scale,
     tolerance: float | None,
     note: str,
@@ -37,7 +37,7 @@ def assembled(
 
     Args:
         pieces: Lines and arcs; those called markers form circles, of arcs or short lines.
-        marks: Points; those called markers or contact count.
+        points: Points by label, (2,) each, mm; those called markers or contact count.
         scale: Unit of the file's coordinates.
         tolerance: Largest gap that is closed, mm; None means `JOIN`.
         note: How the file was read.
@@ -49,16 +49,15 @@ def assembled(
     check_extent(pieces, scale)  # in a wrong unit no marker would be a circle
     discs = _discs([piece for piece in pieces if piece.label == "markers"])
     size = MarkerSize.of(np.array([diameter for _, diameter in discs]))
-    contacts = [mark.centre for mark in marks if mark.label == "contact"]
+    contacts = points.get("contact", ())
     if len(contacts) > 1:
         raise UserError(f"two points are called contact, {place(contacts[0])} and {place(contacts[1])}")
     rest = [piece for piece in pieces if piece.label != "markers"]
     closed = closed_loops(rest, frozenset(LABELS) - {"markers"}, scale, tolerance)  # which may lie on top
-    points = [mark.centre for mark in marks if mark.label == "markers"]
     return Drawing(
         loops=closed.loops,
         note=note + closed.note + size.note,
-        markers=np.array([*points, *(centre for centre, _ in discs)]).reshape(-1, 2),
+        markers=np.array([*points.get("markers", ()), *(centre for centre, _ in discs)]).reshape(-1, 2),
         marker_diameter=size.diameter,
         contact=contacts[0] if contacts else None,
         **facts,
@@ -140,10 +139,7 @@ def _chained(loose: Sequence[Piece], reach: float) -> Closed:
     found = joined(loose, reach)
     check_ends(found, reach)
     pieces, nodes, places, gaps = found
-    at: dict[int, list[int]] = {}
-    for number, pair in enumerate(nodes):
-        for node in pair:
-            at.setdefault(int(node), []).append(number)
+    at = (nodes.argsort(axis=None, kind="stable") // 2).reshape(-1, 2).tolist()  # both pieces at each node
     left, loops = set(range(len(pieces))), []
     for first in range(len(pieces)):
         if first not in left:

@@ -31,13 +31,6 @@ class Scale(NamedTuple):
         return f"{self.name} ({self.origin})"
 
 
-class Mark(NamedTuple):
-    """A point of a file, such as a marker or the contact."""
-
-    label: str
-    centre: FloatArray  # (2,), mm
-
-
 @dataclass(frozen=True, eq=False)
 class MeshInFile:
     """A plane triangle mesh of a file: nodes (n, 2), mm, and triangles (t, 3)."""

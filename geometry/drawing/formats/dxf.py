@@ -13,7 +13,7 @@ from ezdxf import units as dxf_units
 from ezdxf.lldxf.const import DXFError
 
 from pinnray.geometry.drawing.formats.closed_loops import assembled
-from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Mark, Scale, label_of
+from pinnray.geometry.drawing.formats.drawing import UNITS, Drawing, Scale, label_of
 from pinnray.geometry.drawing.formats.dxf_blocks import Walk, sound
 from pinnray.geometry.drawing.formats.pieces import Piece, arcs_along, line
 from pinnray.runtime.arrays import FloatArray
@@ -42,15 +42,15 @@ def read_dxf(path: Path, units: str | None = None, tolerance: float | None = Non
     """
     document = _document(path)
     scale = _scale(document, path, units)
-    pieces, marks = list[Piece](), list[Mark]()
+    pieces, points = list[Piece](), dict[str, list[FloatArray]]()
     for entity, shown in Walk(document):
         layer = label_of(shown)
         with sound(entity, shown):
             if entity.dxftype() == "POINT":
-                marks.append(Mark(layer, _flat([entity.dxf.location])[0] * scale.length))
+                points.setdefault(layer, []).append(_flat([entity.dxf.location])[0] * scale.length)
             else:
                 pieces += _pieces(entity, layer, scale.length)
-    return assembled(pieces, marks, scale, tolerance, f"DXF, {scale}", unit=scale.length)
+    return assembled(pieces, points, scale, tolerance, f"DXF, {scale}", unit=scale.length)
 
 
 def _document(path: Path) -> Any:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any
 
 from ezdxf.lldxf.const import DXFError
 
@@ -12,11 +12,8 @@ MOST = 100_000
 """Largest number of entities in all insertions."""
 
 
-class Drawn(NamedTuple):
-    """An entity that is neither block nor polyline, and the layer on which it shows."""
-
-    entity: Any
-    layer: str
+Drawn = tuple[Any, str]
+"""An entity that is neither block nor polyline, and the layer on which it shows."""
 
 
 class Walk:
@@ -58,7 +55,7 @@ class Walk:
                     parts = list(entity.virtual_entities())
                 yield from self._shown(parts, layer, within)
             else:
-                yield Drawn(entity, layer)
+                yield entity, layer
 
     def _parts(self, insert: Any, layer: str, within: tuple[str, ...]) -> list[Any]:
         """The entities of all copies of a block that an insertion makes."""

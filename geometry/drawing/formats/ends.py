@@ -70,10 +70,16 @@ def _matches(nodes: IntArray, places: FloatArray, tolerance: float) -> tuple[Int
     ends = np.flatnonzero(np.bincount(nodes.ravel(), minlength=len(places)) == 1)
     if len(ends) < 2:
         return np.empty((0, 2), dtype=np.int64), np.empty(0)
-    apart, nearest = (found[:, 1] for found in cKDTree(places[ends]).query(places[ends], k=2))
+    apart, nearest = _nearest(places[ends])
     numbers = np.arange(len(ends))
     one = np.flatnonzero((nearest[nearest] == numbers) & (numbers < nearest) & (apart <= tolerance))
     return np.stack([ends[one], ends[nearest[one]]], axis=1), apart[one]
+
+
+def _nearest(points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Distance of each point from the nearest other one, mm, and the number of that one."""
+    apart, numbers = cKDTree(points).query(points, k=2)
+    return apart[:, 1], numbers[:, 1]
 
 
 def check_extent(pieces: Sequence[Piece], scale: Scale) -> None:
@@ -108,12 +114,10 @@ def check_ends(found: Joined, tolerance: float) -> None:
     loose = found.places[numbers[times == 1]]
     if not len(loose):
         return
-    apart = np.linalg.norm(loose[:, None] - loose, axis=2) + np.diag(np.full(len(loose), np.inf))
-    gaps = apart.min(axis=1)
+    gaps, nearest = _nearest(loose)
     one = int(gaps.argmin())
-    other = int(apart[one].argmin())
     remedy = f", or give tolerance = {1.1 * gaps.max():.2g}" if gaps.max() <= LARGEST_TOLERANCE else ""
     raise UserError(
         f"the boundary is open at {place(loose[one])}: a gap of {gaps[one]:.4g} mm to the next end at "
-        f"{place(loose[other])}; ends join within {tolerance:.4g} mm; close it{remedy}"
+        f"{place(loose[nearest[one]])}; ends join within {tolerance:.4g} mm; close it{remedy}"
     )

@@ -57,7 +57,7 @@ def read_svg(path: Path, units: str | None = None, tolerance: float | None = Non
         reason = "the value of an attribute is missing or no number"
     else:
         said = {"given": " (given)", "assumed": f" {ASSUMED}"}.get(scale.origin, "")
-        return assembled(pieces, [], scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
+        return assembled(pieces, {}, scale, tolerance, f"SVG, {scale.length:.6g} mm in a user unit{said}")
     raise UserError(f"it cannot be read as SVG: {reason}")
 
 

@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import count
 from math import inf
-from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from pinnray.geometry.drawing.formats.drawing import UNITS, Scale
@@ -26,15 +25,6 @@ MOST = 100_000
 """Largest number of elements with all copies."""
 
 
-class ViewBox(NamedTuple):
-    """Attribute `viewBox`."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-
-
 def drawn(root: ET.Element) -> ET.Element:
     """A copy of the tree without what is not drawn, with the elements that a `use` shows in its place.
 
@@ -46,7 +36,7 @@ def drawn(root: ET.Element) -> ET.Element:
     for name in ("width", "height"):
         copy.attrib.pop(name, None)
         if box:
-            copy.set(name, repr(getattr(box, name)))
+            copy.set(name, repr(box[name]))
     copy.extend(list(_copies(root, {element.get("id"): element for element in root.iter()}, count())))
     return copy
 
@@ -59,8 +49,12 @@ def tag_of(element: ET.Element) -> str:
     return "" if name.startswith("{") else name
 
 
-def view_box(element: ET.Element) -> ViewBox | None:
-    """The viewBox of an element; refused if it is not four numbers, which svgelements would pass over."""
+def view_box(element: ET.Element) -> dict[str, float] | None:
+    """Width and height of an element's viewBox.
+
+    Raises:
+        UserError: If it is not four numbers, which svgelements would pass over.
+    """
     if (given := element.get("viewBox")) is None:
         return None
     try:
@@ -69,7 +63,7 @@ def view_box(element: ET.Element) -> ViewBox | None:
         numbers = []
     if len(numbers) != 4 or not (0 < numbers[2] < inf and 0 < numbers[3] < inf):
         raise UserError(f"viewBox = {given!r} is not four numbers with width and height, such as 0 0 60 10")
-    return ViewBox(*numbers)
+    return {"width": numbers[2], "height": numbers[3]}
 
 
 def svg_scale(root: ET.Element, units: str | None) -> Scale:
@@ -93,7 +87,7 @@ def svg_scale(root: ET.Element, units: str | None) -> Scale:
         if not 0 < length < inf:
             raise UserError(f"{text!r} is no width or height; write for instance 60mm")
         guessed &= parts[2].lower() in ("", "px")
-        found.append(length / getattr(box, name) if box else LENGTHS[""])
+        found.append(length / box[name] if box else LENGTHS[""])
     return Scale(
         min(found) if found else LENGTHS[""], "user units", "assumed" if guessed or not box else "of the file"
     )

@@ -1,15 +1,10 @@
 """Predict a finger from a sweep."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from pinnray.options.shared import Repeated
-
-if TYPE_CHECKING:
-    from pinnray.runtime.arrays import FloatArray
-    from pinnray.studies.emulator.emulator import Emulator
 
 
 def command(sweep: Path, *, set: Repeated = ()) -> int:
@@ -24,20 +19,14 @@ def command(sweep: Path, *, set: Repeated = ()) -> int:
     """
     from pinnray.geometry.finger.presets import assignments
     from pinnray.runtime.stages import Stages
+    from pinnray.runtime.tables import terminal_table
+    from pinnray.solvers.finger_figures import QUANTITIES
     from pinnray.studies.emulator.store import emulator_of
 
     given = assignments(set)
     with Stages() as stages:
         emulator = emulator_of(sweep, stages)
-    print_table(emulator, emulator.predict([emulator.inputs.finger(given)]))
-    return 0
-
-
-def print_table(emulator: "Emulator", found: "dict[str, FloatArray]") -> None:
-    """Print the quantities of one finger."""
-    from pinnray.runtime.tables import terminal_table
-    from pinnray.solvers.finger_figures import QUANTITIES
-
+    found = emulator.predict([emulator.inputs.finger(given)])
     headings = ["quantity", "unit", "value", "95 % interval", "meaning"]
     rows = []
     for name, ((value,), (low,), (high,)) in found.items():
@@ -48,3 +37,4 @@ def print_table(emulator: "Emulator", found: "dict[str, FloatArray]") -> None:
     for column in shown.columns:
         column.no_wrap, column.overflow = column.header != "meaning", "fold"
     Console().print(shown)
+    return 0
