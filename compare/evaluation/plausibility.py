@@ -115,7 +115,8 @@ def _compared(
 
     At one place, where markers are not `apart`, their direction says nothing: finite strain changes it.
     """
-    own = _cosine(moved, expected) if apart else 1.0
+    sizes = float(np.linalg.norm(moved) * np.linalg.norm(expected))
+    own = float((moved * expected).sum()) / sizes if apart else 1.0
     ratio = float(np.linalg.norm(moved) / np.linalg.norm(expected))
     sized = f"the markers' displacements are {ratio:.3g} times those of fem for a stroke of {stroke:g} mm"
     if own > UNLIKE and not 1 / IMPOSSIBLE < ratio < IMPOSSIBLE:
@@ -182,9 +183,3 @@ def _expected(problem: Problem, points: FloatArray) -> FloatArray:
 def _length(problem: Problem) -> float:
     """Length of the finger, mm."""
     return float(np.ptp(problem.mesh.points, axis=0).max())
-
-
-def _cosine(one: FloatArray, other: FloatArray) -> float:
-    """Cosine of the angle between two arrays as vectors; 0 if one vanishes."""
-    sizes = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float((one * other).sum()) / sizes if sizes else 0.0
