@@ -96,8 +96,11 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
         )
     if not moved.any():
         return [*remarks, "the measurements say that no marker moved"]
+    linear = problem.material.model_copy(update={"law": "linear"})
+    load = problem.load.as_mean() if problem.load.kind == "cylinder" else problem.load
     try:
-        expected = _expected(problem, points)
+        fem = make_solver("fem", estimate=False)
+        expected = fem.solve(Problem(problem.mesh, linear, load)).displacement(points)
     except MissingLibraryError as error:
         return [*remarks, f"the measurements were not checked against fem: {error}"]
     stroke = float(np.abs(problem.load.values).max())
@@ -168,16 +171,6 @@ def _mixup_remarks(
         return []
     text = order_text(orders[mixed].order, [str(number) for number in numbers])
     return [f"the markers' {mixed} look mixed up: much likelier they are {text}; see how they are numbered"]
-
-
-def _expected(problem: Problem, points: FloatArray) -> FloatArray:
-    """Displacements of `fem` at points, shape (m, 2), mm; a cylinder is replaced by the mean load."""
-    load = problem.load
-    if load.kind == "cylinder":
-        load = load.as_mean()
-    linear = problem.material.model_copy(update={"law": "linear"})
-    fem = make_solver("fem", estimate=False)
-    return fem.solve(Problem(problem.mesh, linear, load)).displacement(points)
 
 
 def _length(problem: Problem) -> float:
