@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.tables import Cell
 from pinnray.solvers.solution import Solution, stroke_axes
-from pinnray.vision.rig.motion import Course, Motion
+from pinnray.vision.rig.motion import Motion
 from pinnray.vision.rig.recording import Recording
 
 LONGEST_STEP = 0.05
@@ -21,13 +21,13 @@ STEPS = 16
 """Steps of a frame in which the relaxation is followed."""
 
 
-def filmed_course(solution: Solution) -> Course | None:
-    """The nodal displacements of a solution on the way to its load; None for a linear one."""
+def filmed_course(solution: Solution) -> CubicSpline | None:
+    """A solution's nodal displacements, mm, by the share of the load; None for a linear one."""
     if not solution.states:
         return None
     nodes = solution.problem.mesh.at_nodes()
     states = np.array([state.displacement(nodes) for state in solution.states])
-    return Course(solution.history["load_fraction"], states)
+    return CubicSpline(solution.history["load_fraction"], states)
 
 
 def true_forces(

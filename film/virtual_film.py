@@ -92,17 +92,8 @@ def film_finger(
     board = rig.sheet()
     bench = Bench(mesh, finger, workspace, rig.paint, rig.irregular)
     solution, source = filmed_solution(problem, solver, stages)
-    course = filmed_course(solution)
-    recording = Recording(
-        bench=bench,
-        displacement=solution.displacement(mesh.at_nodes()),
-        camera=camera,
-        pose=pose,
-        exposure=exposure,
-        motion=motion,
-        seed=seed,
-        course=course,
-    )
+    displacement, course = solution.displacement(mesh.at_nodes()), filmed_course(solution)
+    recording = Recording(bench, displacement, camera, pose, exposure, motion, seed=seed, course=course)
     with replaced_folder(out) as folder:
         with stages.stage("film") as progress:
             record(recording, folder, source=source, codec=codec, progress=progress)
@@ -112,6 +103,5 @@ def film_finger(
             with stages.stage("boards") as progress:
                 poses = board_poses(board, camera, rig.boards, seed=seed)
                 photograph(board_scene(board), poses, recording, folder / "boards", progress=progress)
-        made: dict[str, object] = {"versions": package_versions(), "machine": machine()}
-        made |= {"options": dict(options), "rig": rig.model_dump(mode="json")}
-        write_run(folder, {"source": source, **made})
+        made_by = {"versions": package_versions(), "machine": machine(), "options": dict(options)}
+        write_run(folder, {"source": source, **made_by, "rig": rig.model_dump(mode="json")})

@@ -180,28 +180,17 @@ def clicked_points(
         remarks.append(f"not visible, for want of a point: marker {_listed(absent + 1)}")
     misfit = float(np.sqrt(((here - own) ** 2).sum() / max(2 * len(own) - 4, 1)))
     misfit = max(misfit, ROUNDING * float(np.ptp(own)))
-    noise, reason = _noise(rest, pressed, scales, misfit)
+    noise, reason = misfit, "the points at rest against the drawing"  # how well it was marked counts, too
+    repeats = [each.noise * scale for each, scale in zip((rest, pressed), scales, strict=True) if each.noise]
+    if repeats:
+        noise, reason = float(np.sqrt(np.mean(np.square(repeats)))), "the repeats"
     displacements, seen = np.zeros_like(markers), np.isin(np.arange(len(markers)), owner)
     displacements[owner] = there - here
-    return ClickedPoints(
-        observations=Observations(
-            points=markers,
-            displacements=displacements,
-            standard_deviations=np.full(markers.shape, np.sqrt(2) * noise),
-            visible=seen,
-            source=source,
-            simulated=False,
-            marker_radius=marker_radius,
-            pressed=HAND_HELD,
-        ),
-        remarks=tuple(remarks),
-        reordered=bool((np.diff(owner) < 0).any()),
-        scales=scales,
-        mirrored=mirrored,
-        misfit=misfit,
-        noise=noise,
-        reason=reason,
+    deviations, reordered = np.full(markers.shape, np.sqrt(2) * noise), bool((np.diff(owner) < 0).any())
+    observations = Observations(
+        markers, displacements, deviations, seen, source, marker_radius=marker_radius, pressed=HAND_HELD
     )
+    return ClickedPoints(observations, tuple(remarks), reordered, scales, mirrored, misfit, noise, reason)
 
 
 def _paired(rest: Clicks, pressed: Clicks, zoom: float) -> tuple[IntArray, IntArray, list[str], list[str]]:
@@ -310,17 +299,6 @@ def _stretch(less: FloatArray, more: FloatArray) -> tuple[float, float]:
 
 def _listed(names: Sequence[float] | FloatArray | IntArray) -> str:
     return ", ".join(f"{each:g}" for each in names)
-
-
-def _noise(rest: Clicks, pressed: Clicks, scales: Sequence[float], misfit: float) -> tuple[float, str]:
-    """Standard deviation of a clicked coordinate, mm, and where it comes from.
-
-    Without repeats it is the misfit at rest, which counts how well the finger was marked as well.
-    """
-    repeats = [each.noise * scale for each, scale in zip((rest, pressed), scales, strict=True) if each.noise]
-    if repeats:
-        return float(np.sqrt(np.mean(np.square(repeats)))), "the repeats"
-    return misfit, "the points at rest against the drawing"
 
 
 def _matched(places: FloatArray, markers: FloatArray, listed: IntArray | None) -> tuple[IntArray, bool]:

@@ -136,21 +136,20 @@ def measurements_of(
             place = f"({marker['x_mm']:g}, {marker['y_mm']:g}) mm"
             raise UserError(f"{table}, {number}: there is already a marker at {place}; keep one")
         markers.append(marker)
-    columns = {name: np.array([marker[name] for marker in markers]) for name in (*REQUIRED, *OPTIONAL)}
-    if not columns["visible"].any():
+    values = np.array([[marker[name] for name in (*REQUIRED, *OPTIONAL)] for marker in markers])
+    points, displacements, deviations, visible = np.split(values, [2, 4, 6], axis=1)
+    if not visible.any():
         raise UserError(f"{table}: none of the markers is visible; at least one is needed")
-    seen = columns["visible"] == 1
-    deviations = np.column_stack([columns["std_u_mm"], columns["std_v_mm"]])
     try:
         known = _unsaid(simulated, deviations)
         known |= {picture: Registration.parse(said) for picture, said in pictures.items()}
         force = None if weighed is None else parse_weighed(weighed)
         return Observations(
-            points=np.column_stack([columns["x_mm"], columns["y_mm"]]),
-            displacements=np.column_stack([columns["u_mm"], columns["v_mm"]]),
-            standard_deviations=deviations,
-            visible=seen,
-            source=source,
+            points,
+            displacements,
+            deviations,
+            visible[:, 0] == 1,
+            source,
             simulated=simulated,
             solid=solid,
             weighed=force,

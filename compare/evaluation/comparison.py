@@ -133,8 +133,7 @@ class Results:
         """
         import pandas as pd
 
-        known = {each.solver: each.figures for each in self.evaluations if each.figures is not None}
-        rows = {solver: figures.columns() for solver, figures in known.items()}
+        rows = {each.solver: each.figures.columns() for each in self.evaluations if each.figures is not None}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("solver")
 
 

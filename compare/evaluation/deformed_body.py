@@ -29,7 +29,6 @@ class DeformedBody:
 
     def __init__(self, mesh: TriangleMesh) -> None:
         self._mesh, self._space = mesh, LagrangeSpace(mesh, 2)
-        self._edges = mesh.boundary_edges
         # The middles of its edges cut a quadratic triangle into four.
         quarters = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
         self._quarters = self._space.cell_nodes[:, quarters].reshape(-1, 3)
@@ -49,7 +48,7 @@ class DeformedBody:
         Args:
             displacement: Of the mesh's nodes, shape (n, 2), mm.
         """
-        edges, points = self._edges, self._mesh.points
+        edges, points = self._mesh.boundary_edges, self._mesh.points
         lines = shapely.linestrings((points + displacement)[edges])
         one, other = shapely.STRtree(lines).query(lines, predicate="intersects")
         apart = (edges[one][:, :, None] != edges[other][:, None, :]).all(axis=(1, 2)) & (one < other)

@@ -56,13 +56,11 @@ def force_curves(evaluations: Sequence[Evaluation], load: Load) -> list[ForceCur
 
 def write_force_displacement(path: Path, curves: Sequence[ForceCurve], *, depth: float) -> None:
     """Write a row an equilibrium: stroke and forces along and across it, in N for a depth, mm."""
+    names = ("load_fraction_1", "stroke_mm", "force_N", "tangential_force_N")
     rows: list[dict[str, Cell]] = []
     for curve in curves:
-        for fraction, stroke, force, across in zip(
-            curve.fraction, curve.stroke, curve.force, curve.tangential_force, strict=True
-        ):
-            row: dict[str, Cell] = {"solver": curve.evaluation.solver, "law": curve.evaluation.law}
-            row |= {"converged": int(curve.evaluation.converged), "load_fraction_1": float(fraction)}
-            row |= {"stroke_mm": float(stroke), "force_N": float(force * depth)}
-            rows.append(row | {"tangential_force_N": float(across * depth)})
+        own, forces = curve.evaluation, (curve.force * depth, curve.tangential_force * depth)
+        known: dict[str, Cell] = {"solver": own.solver, "law": own.law, "converged": int(own.converged)}
+        numbers = np.column_stack([curve.fraction, curve.stroke, *forces]).tolist()
+        rows += [{**known, **dict(zip(names, row, strict=True))} for row in numbers]
     write_csv(path, rows)

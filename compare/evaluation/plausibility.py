@@ -96,8 +96,11 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
         )
     if not moved.any():
         return [*remarks, "the measurements say that no marker moved"]
+    linear = problem.material.model_copy(update={"law": "linear"})
+    load = problem.load.as_mean() if problem.load.kind == "cylinder" else problem.load
     try:
-        expected = _expected(problem, points)
+        fem = make_solver("fem", estimate=False)
+        expected = fem.solve(Problem(problem.mesh, linear, load)).displacement(points)
     except MissingLibraryError as error:
         return [*remarks, f"the measurements were not checked against fem: {error}"]
     stroke = float(np.abs(problem.load.values).max())
@@ -115,7 +118,8 @@ def _compared(
 
     At one place, where markers are not `apart`, their direction says nothing: finite strain changes it.
     """
-    own = _cosine(moved, expected) if apart else 1.0
+    sizes = float(np.linalg.norm(moved) * np.linalg.norm(expected))
+    own = float((moved * expected).sum()) / sizes if apart else 1.0
     ratio = float(np.linalg.norm(moved) / np.linalg.norm(expected))
     sized = f"the markers' displacements are {ratio:.3g} times those of fem for a stroke of {stroke:g} mm"
     if own > UNLIKE and not 1 / IMPOSSIBLE < ratio < IMPOSSIBLE:
@@ -169,22 +173,6 @@ def _mixup_remarks(
     return [f"the markers' {mixed} look mixed up: much likelier they are {text}; see how they are numbered"]
 
 
-def _expected(problem: Problem, points: FloatArray) -> FloatArray:
-    """Displacements of `fem` at points, shape (m, 2), mm; a cylinder is replaced by the mean load."""
-    load = problem.load
-    if load.kind == "cylinder":
-        load = load.as_mean()
-    linear = problem.material.model_copy(update={"law": "linear"})
-    fem = make_solver("fem", estimate=False)
-    return fem.solve(Problem(problem.mesh, linear, load)).displacement(points)
-
-
 def _length(problem: Problem) -> float:
     """Length of the finger, mm."""
     return float(np.ptp(problem.mesh.points, axis=0).max())
-
-
-def _cosine(one: FloatArray, other: FloatArray) -> float:
-    """Cosine of the angle between two arrays as vectors; 0 if one vanishes."""
-    sizes = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float((one * other).sum()) / sizes if sizes else 0.0

@@ -96,8 +96,7 @@ def field_extent(mesh: TriangleMesh, width: float) -> Extent:
 def prepare(axes: Axes, extent: Extent) -> None:
     """Axes without a frame that show `extent` at true proportions."""
     axes.set_axis_off()
-    axes.set_xlim(extent.left, extent.right)
-    axes.set_ylim(extent.bottom, extent.top)
+    axes.set(xlim=(extent.left, extent.right), ylim=(extent.bottom, extent.top))
     axes.set_aspect("equal", adjustable="box", anchor="W")
 
 

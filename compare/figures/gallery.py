@@ -74,12 +74,13 @@ def _force_displacement(comparison: Results, page: float) -> Illustration | None
 def _losses(comparison: Results, page: float) -> Illustration | None:
     if (figure := draw_losses(comparison, page)) is None:
         return None
+    given = f" {IN_SAMPLE}." if any(each.in_sample for each in comparison.evaluations) else ""
     return Illustration(
         figure,
         "Losses",
         f"As Fig. 7 of the paper. L_PDE is the mean energy density, whose least value is not zero: markers "
         f"cannot lower it at convergence, and the lower one is not the more accurate. A curve that still "
-        f"falls is a training that has not ended.{_given(comparison)}",
+        f"falls is a training that has not ended.{given}",
     )
 
 
@@ -130,8 +131,3 @@ def _absent(every: Sequence[Evaluation], drawn: Sequence[Evaluation]) -> str:
     names = {each.solver for each in drawn}
     absent = [each.label for each in every if each.solver not in names]
     return f" Left out: {', '.join(absent)}." if absent else ""
-
-
-def _given(comparison: Results) -> str:
-    """The meaning of the mark beside a solver's name, if there is one."""
-    return f" {IN_SAMPLE}." if any(evaluation.in_sample for evaluation in comparison.evaluations) else ""

@@ -22,9 +22,9 @@ from pinnray.comparison.pipeline.solving import ERRORS, solve_all
 from pinnray.comparison.report.comparison import Comparison
 from pinnray.comparison.report.tables import write_markers, write_summary, write_table_one
 from pinnray.geometry.drawing.drawn_finger import finger_lines
-from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.learned import write_learned
 from pinnray.geometry.observations import Observations
+from pinnray.runtime.atomic import write_text
 from pinnray.runtime.content_hash import file_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import package_versions
@@ -166,13 +166,15 @@ def _write(
 ) -> None:
     """Write every file of a comparison but its solutions; photographs are for the report."""
     # They need the libraries of pictures.
-    from pinnray.comparison.report.html_report import write_report
+    from pinnray.comparison.report.html_report import report_html
     from pinnray.comparison.report.output_files import write_vtu
 
     write_measurements(folder / "observations.csv", comparison.observations)
     comparison.scores.write(folder)
-    if job.learn is not None:
-        _write_learned(job.learn, job.design, comparison)
+    converged = [each.identified for each in comparison.evaluations if each.converged]
+    learned = [own.learned for own in converged if own and own.learned]
+    if job.learn is not None and learned:
+        write_learned(job.learn, learned[0], finger_lines(job.design))
     with stages.stage("fields"):
         for evaluation in comparison.shown_fields:
             write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
@@ -187,16 +189,8 @@ def _write(
         pictures = draw_all(figures, comparison, progress, job.picture_formats, job.picture_width)
     with stages.stage("report"):
         record = _provenance(folder, job, comparison, stages)
-        write_report(folder / "report.html", comparison, [*pictures, *photographs], record)
+        write_text(folder / "report.html", report_html(comparison, [*pictures, *photographs], record))
         write_run(folder, record)
-
-
-def _write_learned(path: Path, finger: Finger, comparison: Results) -> None:
-    """Write the design file of a finger with what the first solver has learned that identified it."""
-    converged = [each.identified for each in comparison.evaluations if each.converged]
-    found = [own.learned for own in converged if own and own.learned]
-    if found:
-        write_learned(path, found[0], finger_lines(finger))
 
 
 def _provenance(folder: Path, job: Job, comparison: Results, stages: Stages) -> dict[str, Any]:

@@ -174,10 +174,9 @@ def _answered(part: "_Part", report: Callable[..., None]) -> Outcome | UserError
             report(name)
 
     try:
-        outcome = part.outcome(stage, SharedWork())
+        return part.outcome(stage, SharedWork())
     except UserError as error:
         return UserError(str(error))
-    return outcome
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from pinnray.comparison.evaluation.comparison import Results
+from pinnray.runtime.atomic import write_text
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.notebook import fact_table
 from pinnray.runtime.text_files import as_path
@@ -55,7 +56,7 @@ class Comparison(Results):
     def report(self, path: str | Path) -> Path:
         """Write the report as one HTML file that holds its pictures, and return its path."""
         from pinnray.comparison.figures import draw_all
-        from pinnray.comparison.report.html_report import write_report
+        from pinnray.comparison.report.html_report import report_html
         from pinnray.runtime.machine import machine, package_versions
 
         facts: dict[str, object] = {"design_sha256": self.design.digest, "mesh_sha256": self.mesh.digest}
@@ -64,7 +65,7 @@ class Comparison(Results):
         if file.is_dir():
             raise UserError(f"the report {file} is a folder; name a file, such as report.html")
         with TemporaryDirectory() as folder:
-            write_report(file, self, draw_all(Path(folder), self), facts)
+            write_text(file, report_html(self, draw_all(Path(folder), self), facts))
         return file
 
     def _repr_html_(self) -> str:

@@ -5,7 +5,6 @@ Numbers have 16 bits: the range of a field, or of its difference, in 65,535 step
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from pinnray.comparison.evaluation.comparison import TRUTH, Results
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.figures.body import symmetric
-from pinnray.comparison.figures.fields import VIEWED, FieldQuantity, field_scale, triangle_values
+from pinnray.comparison.figures.fields import VIEWED, field_scale, triangle_values
 from pinnray.comparison.figures.overlay import contact_motion
 from pinnray.comparison.report import text
 from pinnray.comparison.report.numbers import seconds, share
@@ -23,7 +22,6 @@ from pinnray.comparison.report.page_body import packed_body
 from pinnray.comparison.report.summary import answers
 from pinnray.comparison.report.tables import printed_rows, table_one
 from pinnray.runtime.arrays import FloatArray
-from pinnray.runtime.atomic import write_text
 from pinnray.runtime.html import Packed, picture_urls, template_environment
 from pinnray.runtime.machine import program_version
 from pinnray.runtime.tables import distance, number
@@ -45,7 +43,8 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
     quantities = VIEWED[: BUDGET // size if size else 0]
     if not quantities or not reference.finite:
         return None
-    packed, fields = Packed(), {each.solver: _fields(each, quantities) for each in shown}
+    packed = Packed()
+    fields = {each.solver: np.array([triangle_values(of, each) for of in quantities]) for each in shown}
     manifest = {
         **packed_body(mesh, packed),
         "reference": reference.label,
@@ -66,15 +65,10 @@ def viewer(comparison: Results) -> dict[str, Any] | None:
     return {"manifest": manifest, "data": packed.text()}
 
 
-def _fields(evaluation: Evaluation, quantities: Sequence[FieldQuantity]) -> FloatArray:
-    """A field a row as it is drawn, shape (k, t)."""
-    return np.array([triangle_values(quantity, evaluation) for quantity in quantities])
-
-
 def _solver(
     evaluation: Evaluation, comparison: Results, fields: Mapping[str, FloatArray], packed: Packed
 ) -> dict[str, Any]:
-    """A solver's fields; of a solver that is not the reference, their differences from it."""
+    """A solver's fields, shape (k, t); of one that is not the reference, their differences from it."""
     mesh, name = comparison.mesh, comparison.reference.solver
     is_reference, own = evaluation is comparison.reference, fields[evaluation.solver]
     against = {"reference": fields[name]} | ({"truth": fields[TRUTH]} if TRUTH in fields else {})
@@ -120,13 +114,6 @@ def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
     )
     end = evaluation.node_displacement
     return [0.0, 1.0], np.stack([np.zeros_like(end), end]), word
-
-
-def write_report(
-    path: Path, comparison: Results, pictures: Sequence[Picture], provenance: Mapping[str, object]
-) -> None:
-    """Write the report as one HTML file, atomically; arguments as for `report_html`."""
-    write_text(path, report_html(comparison, pictures, provenance))
 
 
 def report_html(comparison: Results, pictures: Sequence[Picture], provenance: Mapping[str, object]) -> str:

@@ -28,3 +28,11 @@ def seconds(own: SolverScores) -> str:
     """Time of the solve, s, or a dash if it is not recorded."""
     value = own.seconds
     return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}" if isfinite(value) else NONE
+
+
+def truth_errors(own: SolverScores) -> list[str]:
+    """Distances from the simulated finger in displacement, stress and force; none if there is no such."""
+    if own.to_truth is None:
+        return []
+    found = own.to_truth
+    return [share(found.displacement.rel_l2), share(found.von_mises.rel_l2), error(own.force_to_truth_rel)]

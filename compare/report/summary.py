@@ -8,7 +8,7 @@ from math import hypot, isfinite, nan
 from typing import NamedTuple
 
 from pinnray.comparison.evaluation.scores import FigureScores, Scores, SolverScores
-from pinnray.comparison.report.numbers import at_markers, error, share
+from pinnray.comparison.report.numbers import at_markers, share, truth_errors
 from pinnray.runtime.tables import NONE, TextTable, number
 from pinnray.solvers.finger_figures import break_answer
 
@@ -151,7 +151,9 @@ def _trust(scores: Scores) -> RunAnswer | None:
     if scores[scores.reference].to_truth:
         title += " and from the truth, and error of the force"
         heads += TRUTH_HEADS
-    rows = [[scores.label(name), *_from_reference(name, scores), *_to_truth(listed[name])] for name in listed]
+    rows = [
+        [scores.label(name), *_from_reference(name, scores), *truth_errors(listed[name])] for name in listed
+    ]
     own = f"±: error of {reference}, as it estimates it." if scores[scores.reference].uncertainty else ""
     return RunAnswer(
         "May the network be trusted here?",
@@ -172,14 +174,6 @@ def _from_reference(name: str, scores: Scores) -> list[str]:
     if not own.uncertainty:
         return [NONE, NONE]
     return [f"± {share(own.uncertainty.rel_l2_displacement)}", f"± {share(own.uncertainty.rel_l2_von_mises)}"]
-
-
-def _to_truth(own: SolverScores) -> list[str]:
-    """Distances from the simulated finger in displacement, stress and force; none if there is no such."""
-    if own.to_truth is None:
-        return []
-    found = own.to_truth
-    return [share(found.displacement.rel_l2), share(found.von_mises.rel_l2), error(own.force_to_truth_rel)]
 
 
 def _verdict(solver: str, scores: Scores) -> str:
@@ -217,7 +211,7 @@ def _markers(scores: Scores) -> RunAnswer | None:
     listed = {scores.label(scores.reference): plain, **given}
     measures: dict[str, Callable[[SolverScores], float]] = {"at held-out markers": _held_out}
     heads = ["Solver", f"held-out {scores.measurements.source}\nmarkers, mm"]
-    rows = [[name, at_markers(_held_out(own)), *_to_truth(own)] for name, own in listed.items()]
+    rows = [[name, at_markers(_held_out(own)), *truth_errors(own)] for name, own in listed.items()]
     sentences = []
     if plain.to_truth:
         heads += TRUTH_HEADS
@@ -261,14 +255,14 @@ def _held_out(own: SolverScores) -> float:
 
 def _loads_found(scores: Scores) -> list[str]:
     """Places of the forces that solvers found from the markers, and what would narrow their intervals."""
-    found = {scores.label(name): own for name, own in scores.solvers.items() if own.identified}
+    found = {scores.label(name): own.identified for name, own in scores.solvers.items() if own.identified}
     places = []
     for name, own in found.items():
-        if own.identified and (place := own.identified.position) and isfinite(place.value):
+        if (place := own.position) and isfinite(place.value):
             middle, low, high = (number(each, 3) for each in (place.value, place.low, place.high))
             places.append(f"{middle} mm ({low} to {high} mm) by {name}")
     said = [f"The force acts at x = {_listed(places)}."] if places else []
-    advice = [own.identified.advice for own in found.values() if own.identified and own.identified.advice]
+    advice = [own.advice for own in found.values() if own.advice]
     return said + list(dict.fromkeys(advice))
 
 

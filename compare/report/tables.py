@@ -13,7 +13,7 @@ from rich.table import Table
 
 from pinnray.comparison.evaluation.comparison import Results
 from pinnray.comparison.evaluation.scores import MEANS, Means, Scores
-from pinnray.comparison.report.numbers import at_markers, error, seconds, share
+from pinnray.comparison.report.numbers import at_markers, seconds, share, truth_errors
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.finger.parameters import SYMBOLS
@@ -121,8 +121,7 @@ def write_markers(path: Path, comparison: Results) -> None:
             own, name = comparison.scores[each.solver], each.solver
             row |= {f"{name}_converged": each.converged, f"{name}_in_sample": each.in_sample}
             displacement = each.shown_displacement[marker].tolist()
-            for place, axis in enumerate("uv"):
-                row[f"{name}_{axis}_mm"] = displacement[place]
+            row |= dict(zip((f"{name}_u_mm", f"{name}_v_mm"), displacement, strict=True))
             for kind, errors in (("ae", own.markers), ("held_out_ae", own.held_out)):
                 for axis in "uv":
                     row[f"{name}_{kind}_{axis}_mm"] = getattr(errors, f"ae_{axis}")[marker] if errors else nan
@@ -182,11 +181,8 @@ def body_table(comparison: Results) -> Table:
     for name, own in scores.solvers.items():
         away = own.to_reference.rel_l2_displacement
         above = share(own.certificate.excess_beyond_rounding) if own.certificate else NONE
-        cells = [NONE if name == scores.reference else share(away), above]
-        if found := own.to_truth:
-            cells += [share(found.displacement.rel_l2), share(found.von_mises.rel_l2)]
-            cells.append(error(own.force_to_truth_rel))
-        rows.append((scores.label(name), own.converged, [*cells, seconds(own)]))
+        cells = [NONE if name == scores.reference else share(away), above, *truth_errors(own), seconds(own)]
+        rows.append((scores.label(name), own.converged, cells))
     headings = ["truth\ndispl.", "\nv. Mises", "\nforce"] if truth else []
     headings = ["from ref.", "above fem", *headings, "time\ns"]
     return _table("Over the whole body", headings, rows, "\n".join(lines))

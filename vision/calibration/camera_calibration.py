@@ -76,7 +76,21 @@ def calibrate_camera(
         UserError: If the sizes differ, fewer than 4 photographs show the board, or they do not determine the
             camera.
     """
-    views, size, left_out = _find_views(images, board)
+    views: dict[str, FloatArray] = {}
+    left_out: dict[str, str] = {}
+    size, first = (0, 0), ""
+    for name, image in images:
+        width, height = image.shape[::-1]
+        size, first = (size, first) if first else ((width, height), name)
+        if size != (width, height):
+            raise UserError(
+                f"photographs for one calibration must have one size: {first} has {size[0]}x{size[1]} "
+                f"pixels, {name} {width}x{height}; leave out those of the other size"
+            )
+        if (corners := board.find(image)) is None:
+            left_out[name] = f"no board of {board} was found"
+        else:
+            views[name] = corners
     return calibrate_views(views, board, size, k3=k3, left_out=left_out)
 
 
@@ -109,42 +123,21 @@ def calibrate_views(
         if name not in able
     }
     views, left_out = able, {**left_out, **weak}
-    _check_enough(views, left_out, board)
+    if len(views) < FEWEST_VIEWS:
+        missing = f"no board of {board} was found"
+        reasons = [f"{name}: {reason}" for name, reason in left_out.items() if reason != missing]
+        advice = f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
+        raise UserError(
+            f"{len(views)} of {len(views) + len(left_out)} photographs show the board of {board}; "
+            + "; ".join([advice if views or reasons else "count them", *reasons])
+        )
     corners = list(views.values())
     fitted = fit_camera(corners, board, size, k3=k3)
-    calibration = Calibration(
-        camera=fitted.camera,
-        board=board,
-        views=views,
-        residuals=dict(zip(views, fitted.residuals, strict=True)),
-        held_out_rms=held_out_rms(corners, board, fitted.camera, k3=k3),
-        coverage=_coverage(corners, size),
-        left_out=left_out,
-    )
+    residuals = dict(zip(views, fitted.residuals, strict=True))
+    held_out, coverage = held_out_rms(corners, board, fitted.camera, k3=k3), _coverage(corners, size)
+    calibration = Calibration(fitted.camera, board, views, residuals, held_out, coverage, left_out)
     _warn(calibration)
     return calibration
-
-
-def _find_views(
-    images: Iterable[tuple[str, GreyImage]], board: Board
-) -> tuple[dict[str, FloatArray], tuple[int, int], dict[str, str]]:
-    """The corners of a board by photograph, (width, height) of all, and why others show none, by name."""
-    views: dict[str, FloatArray] = {}
-    left_out: dict[str, str] = {}
-    size, first = (0, 0), ""
-    for name, image in images:
-        width, height = image.shape[::-1]
-        size, first = (size, first) if first else ((width, height), name)
-        if size != (width, height):
-            raise UserError(
-                f"photographs for one calibration must have one size: {first} has {size[0]}x{size[1]} "
-                f"pixels, {name} {width}x{height}; leave out those of the other size"
-            )
-        if (corners := board.find(image)) is None:
-            left_out[name] = f"no board of {board} was found"
-        else:
-            views[name] = corners
-    return views, size, left_out
 
 
 def _coverage(views: Sequence[FloatArray], size: tuple[int, int]) -> float:
@@ -154,18 +147,6 @@ def _coverage(views: Sequence[FloatArray], size: tuple[int, int]) -> float:
         seen = view[np.isfinite(view).all(axis=1)]
         cv2.fillConvexPoly(covered, cv2.convexHull(np.rint(seen).astype(np.int32)), [1])
     return float(covered.mean())
-
-
-def _check_enough(views: Mapping[str, FloatArray], left_out: Mapping[str, str], board: Board) -> None:
-    if len(views) >= FEWEST_VIEWS:
-        return
-    missing = f"no board of {board} was found"
-    weak = [f"{name}: {reason}" for name, reason in left_out.items() if reason != missing]
-    advice = f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
-    raise UserError(
-        f"{len(views)} of {len(views) + len(left_out)} photographs show the board of {board}; "
-        + "; ".join([advice if views or weak else "count them", *weak])
-    )
 
 
 def _warn(calibration: Calibration) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,14 +19,25 @@ PACKAGES = ("pinn-ray", "numpy", "scipy", "opencv-python-headless")
 """Those that make a calibration."""
 
 
-def save_camera(path: Path, camera: Camera) -> None:
-    """Write a camera atomically; `load_camera` restores it.
+def save_camera(path: Path, camera: Camera, more: Mapping[str, object] = MappingProxyType({})) -> None:
+    """Write a camera, and `more` entries after its own, atomically; `load_camera` restores it.
 
     Raises:
         UserError: If the suffix is not .json.
     """
     check_format(path)
-    write_json(path, _content(camera))
+    content: dict[str, object] = {
+        "image_width": camera.width,
+        "image_height": camera.height,
+        "fisheye_model": 0,
+        "camera_matrix": _entry(camera.matrix.tolist()),
+        "distortion_coefficients": _entry([camera.distortion]),
+    }
+    if camera.covariance is not None:
+        content["intrinsics"] = list(INTRINSICS)
+        content["intrinsics_standard_deviations"] = _entry([camera.standard_deviations or ()])
+        content["intrinsics_covariance"] = _entry(camera.covariance)
+    write_json(path, content | dict(more))
 
 
 def save_calibration(path: Path, calibration: Calibration) -> None:
@@ -35,24 +47,20 @@ def save_calibration(path: Path, calibration: Calibration) -> None:
         UserError: If the suffix is not .json.
     """
     board, errors = calibration.board, calibration.view_errors
-    check_format(path)
-    write_json(
-        path,
-        _content(calibration.camera)
-        | {
-            "avg_reprojection_error": calibration.rms,
-            "held_out_reprojection_error": calibration.held_out_rms,
-            "coverage": calibration.coverage,
-            "nframes": len(errors),
-            "image_names": list(errors),
-            "per_view_reprojection_errors": _entry([[error] for error in errors.values()]),
-            "board": type(board).__name__,
-            "board_width": board.columns,
-            "board_height": board.rows,
-            "square_size": board.square,
-            "versions": [f"{name} {package_version(name)}" for name in PACKAGES],
-        },
-    )
+    made = {
+        "avg_reprojection_error": calibration.rms,
+        "held_out_reprojection_error": calibration.held_out_rms,
+        "coverage": calibration.coverage,
+        "nframes": len(errors),
+        "image_names": list(errors),
+        "per_view_reprojection_errors": _entry([[error] for error in errors.values()]),
+        "board": type(board).__name__,
+        "board_width": board.columns,
+        "board_height": board.rows,
+        "square_size": board.square,
+        "versions": [f"{name} {package_version(name)}" for name in PACKAGES],
+    }
+    save_camera(path, calibration.camera, made)
 
 
 def load_camera(path: Path) -> Camera:
@@ -72,34 +80,19 @@ def load_camera(path: Path) -> Camera:
     coefficients = tuple(np.resize([*distortion, 0.0], 5).tolist())
     fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     size, covariance = len(INTRINSICS), None
+    if "intrinsics_covariance" in content:
+        rows = _matrix(content, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
+        covariance = tuple(map(tuple, rows.tolist()))
     try:
-        if "intrinsics_covariance" in content:
-            rows = _matrix(content, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
-            covariance = tuple(map(tuple, rows.tolist()))
         return Camera(width, height, fx, fy, cx, cy, coefficients, covariance)
     except UserError as error:
-        raise UserError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
+        raise UserError(f"{path}: {error}") from None
 
 
 def check_format(path: Path) -> None:
     """Raise `UserError` unless the suffix is .json."""
     if path.suffix.lower() != ".json":
         raise UserError(f"{path}: a camera is written as JSON; give a name that ends in .json")
-
-
-def _content(camera: Camera) -> dict[str, object]:
-    content: dict[str, object] = {
-        "image_width": camera.width,
-        "image_height": camera.height,
-        "fisheye_model": 0,
-        "camera_matrix": _entry(camera.matrix.tolist()),
-        "distortion_coefficients": _entry([camera.distortion]),
-    }
-    if camera.covariance is not None:
-        content["intrinsics"] = list(INTRINSICS)
-        content["intrinsics_standard_deviations"] = _entry([camera.standard_deviations or ()])
-        content["intrinsics_covariance"] = _entry(camera.covariance)
-    return content
 
 
 def _entry(rows: Sequence[Sequence[float]]) -> dict[str, object]:

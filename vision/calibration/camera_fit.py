@@ -59,15 +59,12 @@ def fit_camera(
     seen = [np.isfinite(view[:, 0]) for view in views]
     flags = (0 if k3 else cv2.CALIB_FIX_K3) | (0 if start is None else cv2.CALIB_USE_INTRINSIC_GUESS)
     first = Camera(*size, 1.0, 1.0, 0.0, 0.0) if start is None else start
+    places = [board.corners[each].astype(np.float32) for each in seen]
+    pixels = [view[each].astype(np.float32) for view, each in zip(views, seen, strict=True)]
+    guess = (first.matrix, np.array(first.distortion))
     try:
         _, matrix, distortion, rotations, shifts = cv2.calibrateCamera(
-            [board.corners[each].astype(np.float32) for each in seen],
-            [view[each].astype(np.float32) for view, each in zip(views, seen, strict=True)],
-            size,
-            first.matrix,
-            np.array(first.distortion),
-            flags=flags,
-            criteria=STOP,
+            places, pixels, size, *guess, flags=flags, criteria=STOP
         )
         values = [*np.asarray(matrix)[[0, 1, 0, 1], [0, 1, 2, 2]], *np.ravel(distortion)[:5]]
         camera = first.with_intrinsics(values)

@@ -78,27 +78,22 @@ class Board:
         Source: A. Duda, U. Frese, "Accurate detection and localization of checkerboard corners for
         calibration", BMVC 2018, as in OpenCV; then `pinnray.vision.calibration.corner_refinement`.
         """
-        shrink = max(1.0, max(image.shape) / LARGE)
+        size, flags = (self.columns, self.rows), cv2.CALIB_CB_ACCURACY
         for factor in SEARCHES:
-            if (guesses := self._guesses(image, factor * shrink)) is not None:
+            shrink = factor * max(1.0, max(image.shape) / LARGE)
+            width, height = (round(side / shrink) for side in image.shape[::-1])
+            small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+            found, corners = cv2.findChessboardCornersSB(small, size, flags=flags)
+            if found:
                 break
         else:
             return None
+        scale = np.divide(image.shape[::-1], small.shape[::-1])
+        guesses = (np.reshape(corners, (-1, 2)).astype(np.float64) + 0.5) * scale - 0.5
         refined = self.refine(image, guesses, EDGE * self.square)
         seen = np.isfinite(refined[:, 0]).reshape(self.rows, self.columns)
         # OpenCV adds rows to smaller boards.
         return refined if seen.any(axis=0).all() and seen.any(axis=1).all() else None
-
-    def _guesses(self, image: GreyImage, shrink: float) -> FloatArray | None:
-        """Corners that OpenCV finds in an image shrunk by a factor, shape (n, 2), pixels of the image."""
-        width, height = (round(side / shrink) for side in image.shape[::-1])
-        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-        size, flags = (self.columns, self.rows), cv2.CALIB_CB_ACCURACY
-        found, corners = cv2.findChessboardCornersSB(small, size, flags=flags)
-        if not found:
-            return None
-        scale = np.divide(image.shape[::-1], small.shape[::-1])
-        return np.asarray((np.reshape(corners, (-1, 2)).astype(np.float64) + 0.5) * scale - 0.5)
 
     def refine(self, image: GreyImage, corners: FloatArray, reach: float) -> FloatArray:
         """Refine corners to hundredths of a pixel, shape (n, 2) with NaN where one is not seen.

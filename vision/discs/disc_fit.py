@@ -5,7 +5,7 @@ once. Occlusions and neighbours get little weight, and the covariance follows fr
 Units: pixels, grey levels.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,10 +52,6 @@ class FittedDiscs:
     contrast: FloatArray
     seen: FloatArray
     found: BoolArray
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            getattr(self, field.name).setflags(write=False)
 
 
 def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = None) -> FittedDiscs:

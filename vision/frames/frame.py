@@ -6,7 +6,8 @@ sensor read them: a rotation in a file's metadata is ignored, in films and in ph
 """
 
 from collections.abc import Generator, Iterator
-from typing import NamedTuple, Self
+from contextlib import AbstractContextManager
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +50,7 @@ class CapturedImage(NamedTuple):
 ImageStream = Generator[CapturedImage, None, None]
 
 
-class Frames:
+class Frames(AbstractContextManager["Frames"]):
     """A sequence of frames of one size, to be iterated once and closed: a context manager.
 
     Attributes:
@@ -98,9 +99,6 @@ class Frames:
     def close(self) -> None:
         """Release the file or the camera."""
         self._images.close()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

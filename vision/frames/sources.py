@@ -35,9 +35,7 @@ FRAMES_OF_A_VIDEO = 40
 """Largest number of photographs from a video or from the pages of one picture, spread evenly."""
 
 
-def open_frames(
-    source: str | Path | int, *, rate: float | None = None, size: tuple[int, int] = LIVE_SIZE
-) -> Frames:
+def open_frames(source: str | Path | int, *, rate: float | None = None) -> Frames:
     """Frames of a video, of pictures, of a camera or of a pipe.
 
     Args:
@@ -45,8 +43,7 @@ def open_frames(
             natural order; the number of a camera, or its device; or "-", JPEG or PNG pictures one after
             another on standard input.
         rate: Frames a second, where the source does not say: of pictures and pipes, 30 if not given. A camera
-            is asked for it.
-        size: (width, height) that a camera is asked for, pixels.
+            is asked for it, and for `LIVE_SIZE`.
 
     Raises:
         UserError: If there is no such source or nothing in it can be read.
@@ -62,7 +59,7 @@ def open_frames(
         return Frames(name, images_of_pipe(read, name, usual), rate=usual, timed=rate is not None)
     camera = re.fullmatch(r"(?:/dev/video)?(\d+)", str(source))
     if camera and (isinstance(source, int) or not (path.is_file() or path.is_dir())):
-        return camera_frames(int(camera[1]), size=size, rate=rate)
+        return camera_frames(int(camera[1]), rate)
     if path.is_file() and not is_picture(path):
         return video_frames(path, rate)
     if not str(source) or not (path.is_file() or path.is_dir() or has_magic(str(source))):
@@ -73,8 +70,8 @@ def open_frames(
     return Frames(str(source), images, rate=usual, count=number, timed=rate is not None)
 
 
-def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = None) -> Frames:
-    """Frames of a camera as they come, by OpenCV; it is asked for a size, (width, height), and a rate.
+def camera_frames(index: int, rate: float | None = None) -> Frames:
+    """Frames of a camera as they come, by OpenCV; it is asked for `LIVE_SIZE` and a rate.
 
     PyAV opens Video4Linux devices, too, but refuses a camera without the requested format.
 
@@ -86,8 +83,8 @@ def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = Non
     if not capture.isOpened():
         raise UserError(f"camera {index} cannot be opened; is it connected, and not used by another program?")
     capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG"))  # over USB, raw images come slower
-    capture.set(cv2.CAP_PROP_FRAME_WIDTH, size[0])
-    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size[1])
+    capture.set(cv2.CAP_PROP_FRAME_WIDTH, LIVE_SIZE[0])
+    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, LIVE_SIZE[1])
     if rate is not None:
         capture.set(cv2.CAP_PROP_FPS, rate)
     rate = plausible_rate(capture.get(cv2.CAP_PROP_FPS), rate)

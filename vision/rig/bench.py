@@ -59,7 +59,10 @@ class Bench:
 
     def discs(self, displacement: FloatArray) -> list[Shape]:
         """The markers, deformed with the finger, for nodal displacements, shape (n, 2), mm."""
-        borders = np.split(self._moved(self._marker_borders, displacement), len(self.mesh.marker_nodes))
+        where = self._marker_borders
+        corners = displacement[self.mesh.triangles[where.cells]]
+        moved = where.points + np.einsum("nc,ncx->nx", where.barycentric, corners)
+        borders = np.split(moved, len(self.mesh.marker_nodes))
         return [Shape(closed(border), PAINTS[self.paint], self.workspace.marker_plane) for border in borders]
 
     def scene(self, displacement: FloatArray, occluders: Sequence[Shape] = ()) -> Scene:
@@ -112,11 +115,6 @@ class Bench:
             for number, centre in enumerate(self.mesh.markers)
         ]
         return self.mesh.locate(np.concatenate(borders))
-
-    def _moved(self, where: LocatedPoints, displacement: FloatArray) -> FloatArray:
-        """Points of the body after nodal displacements, shape (n, 2), mm."""
-        corners = displacement[self.mesh.triangles[where.cells]]
-        return np.asarray(where.points + np.einsum("nc,ncx->nx", where.barycentric, corners))
 
 
 def _frame(edges: FloatArray) -> FloatArray:

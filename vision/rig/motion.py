@@ -1,17 +1,10 @@
 """Motion of the finger, the camera and the light while the rig films."""
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pinnray.geometry.finger.parameters import CheckedModel, bounded
 from pinnray.runtime.arrays import FloatArray
-
-if TYPE_CHECKING:  # the options of the rig are motions, and `--help` has to be quick
-    from scipy.interpolate import CubicSpline
 
 
 class Motion(CheckedModel):
@@ -60,26 +53,3 @@ class Motion(CheckedModel):
     def travel(self, frame: int) -> float:
         """Growth of the share of the load while a frame is exposed."""
         return float(np.ptp(self.load(frame + np.array([0.0, self.shutter]))))
-
-
-@dataclass(frozen=True, eq=False)
-class Course:
-    """Nodal displacements at shares of the load, joined by a cubic spline.
-
-    Attributes:
-        shares: From 0 to 1, ascending, shape (k,).
-        displacements: Of the mesh's nodes, shape (k, n, 2), mm.
-    """
-
-    shares: FloatArray
-    displacements: FloatArray
-
-    def at(self, share: float) -> FloatArray:
-        """Displacements at a share of the load, shape (n, 2), mm."""
-        return np.asarray(self._spline(share))
-
-    @cached_property
-    def _spline(self) -> "CubicSpline":
-        from scipy.interpolate import CubicSpline
-
-        return CubicSpline(self.shares, self.displacements)

@@ -14,7 +14,7 @@ from pinnray.vision.calibration.camera import Camera, Pose
 from pinnray.vision.frames.frame import Image
 from pinnray.vision.rig.bench import Bench
 from pinnray.vision.rig.exposure import Exposure, Light
-from pinnray.vision.rig.motion import Course, Motion
+from pinnray.vision.rig.motion import Motion
 from pinnray.vision.rig.render import mean_light, noise_of, share_seen
 from pinnray.vision.rig.shapes import Shape, centroid
 
@@ -52,7 +52,7 @@ class Recording:
         camera, pose, exposure, motion: Of the film.
         occluders: Shapes in front of the finger in a frame.
         seed: Of the noise.
-        course: Displacements on the way to the whole load; None: in proportion to the load.
+        course: Displacements, shape (n, 2), mm, by the share of the load; None: in proportion to it.
     """
 
     bench: Bench
@@ -63,11 +63,11 @@ class Recording:
     motion: Motion = Motion()
     occluders: Callable[[int], Sequence[Shape]] = lambda frame: ()
     seed: int = 0
-    course: Course | None = None
+    course: Callable[[float], FloatArray] | None = None
 
     def displaced(self, load: float) -> FloatArray:
         """Displacement of the mesh's nodes under a share of the load, shape (n, 2), mm."""
-        return load * self.displacement if self.course is None else self.course.at(load)
+        return load * self.displacement if self.course is None else np.asarray(self.course(load))
 
     def load(self, number: int) -> float:
         """Mean share of the load while a frame is exposed."""

@@ -1,15 +1,15 @@
 """Files of a recording: the video, the truth, and the inputs of a tracker."""
 
-import csv
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from pinnray.runtime.atomic import atomic_path, write_json, write_text
+from pinnray.runtime.atomic import write_json, write_text
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.progress import Progress, silent
+from pinnray.runtime.tables import Cell, write_csv
 from pinnray.vision.calibration.camera import Pose
 from pinnray.vision.calibration.camera_file import save_camera
 from pinnray.vision.frames.frame import RIG_MARK, Image
@@ -52,18 +52,16 @@ def record(
     """
     check_codec(codec)
     count, rate = len(recording.motion), recording.motion.rate
-    with ExitStack() as stack:
-        write = _writer(recording, folder / FILES[codec], stack)
-        partial = stack.enter_context(atomic_path(folder / "truth.csv"))
-        file = stack.enter_context(partial.open("w", newline="", encoding="utf-8"))
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(TRUTH_COLUMNS)
+    rows: list[dict[str, Cell | None]] = []
+    with _writer(recording, folder / FILES[codec]) as write:
         for number, (image, truth) in enumerate(recording.frames()):
             write(image)
             markers = np.column_stack([truth.world, truth.pixels, truth.discs, truth.seen]).tolist()
-            known = (number, number / rate, truth.load)
-            table.writerows((*known, marker, *values) for marker, values in enumerate(markers, start=1))
+            for marker, values in enumerate(markers, start=1):
+                cells = (number, number / rate, truth.load, marker, *values)
+                rows.append(dict(zip(TRUTH_COLUMNS, cells, strict=True)))
             progress((number + 1) / count, f"{number + 1} of {count} frames")
+    write_csv(folder / "truth.csv", rows)
     write_measurements(folder / "observations_true.csv", recording.observations(source))
     of_discs = recording.observations(f"{source}; middles of the markers' discs", discs=True)
     write_measurements(folder / "observations_discs.csv", of_discs)
@@ -73,7 +71,18 @@ def record(
         workspace = bench.workspace.model_copy(update={"simulated": simulated})
         write_json(folder / name, workspace.model_dump(mode="json"))
     write_text(folder / "fiducials.svg", workspace_svg(bench.workspace, bench.finger))
-    write_json(folder / "truth.json", _settings(recording))
+    rotation, translation = recording.pose
+    settings = {
+        "design": bench.finger.definition(),
+        "mesh_sha256": bench.mesh.digest,
+        "paint": bench.paint,
+        "irregular": bench.irregular,
+        "pose": {"rotation": rotation.tolist(), "translation_mm": translation.tolist()},
+        "exposure": recording.exposure.model_dump(),
+        "motion": recording.motion.model_dump(),
+        "seed": recording.seed,
+    }
+    write_json(folder / "truth.json", settings)
 
 
 def check_codec(codec: str) -> None:
@@ -98,26 +107,14 @@ def photograph(
         progress((number + 1) / len(poses), f"{number + 1} of {len(poses)} photographs")
 
 
-def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Image], None]:
+@contextmanager
+def _writer(recording: Recording, place: Path) -> Iterator[Callable[[Image], None]]:
     """A function that appends a frame to the video or to the folder of pictures."""
     if place.suffix:
         size = (recording.camera.width, recording.camera.height)
-        return stack.enter_context(video_writer(place, size, recording.motion.rate, comment=RIG_MARK))
-    place.mkdir()
-    names = (place / f"{number:06d}.png" for number in range(len(recording.motion)))
-    return lambda image: write_picture(next(names), image, comment=RIG_MARK)
-
-
-def _settings(recording: Recording) -> dict[str, object]:
-    """Settings of the frames that are in no other file."""
-    bench, (rotation, translation) = recording.bench, recording.pose
-    return {
-        "design": bench.finger.definition(),
-        "mesh_sha256": bench.mesh.digest,
-        "paint": bench.paint,
-        "irregular": bench.irregular,
-        "pose": {"rotation": rotation.tolist(), "translation_mm": translation.tolist()},
-        "exposure": recording.exposure.model_dump(),
-        "motion": recording.motion.model_dump(),
-        "seed": recording.seed,
-    }
+        with video_writer(place, size, recording.motion.rate, comment=RIG_MARK) as write:
+            yield write
+    else:
+        place.mkdir()
+        names = (place / f"{number:06d}.png" for number in range(len(recording.motion)))
+        yield lambda image: write_picture(next(names), image, comment=RIG_MARK)

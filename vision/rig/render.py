@@ -6,7 +6,6 @@ Source: R. Levien, "Inside the fastest font renderer in the world", 2016.
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -86,15 +85,7 @@ def _on_pixels(canvas: Light, blur: float, cells: int) -> Light:
     return np.asarray(cv2.resize(soft, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
-class PixelCoverage(NamedTuple):
-    """A part of the grid, and the share of every cell of it that is covered, shape (rows, columns)."""
-
-    rows: slice
-    columns: slice
-    share: FloatArray
-
-
-def pixel_coverage(edges: FloatArray, size: tuple[int, int]) -> PixelCoverage:
+def pixel_coverage(edges: FloatArray, size: tuple[int, int]) -> tuple[slice, slice, FloatArray]:
     """Share of every cell of a grid that closed polygons cover.
 
     Args:
@@ -103,7 +94,8 @@ def pixel_coverage(edges: FloatArray, size: tuple[int, int]) -> PixelCoverage:
         size: Columns and rows of the grid.
 
     Returns:
-        The coverage in the polygons' bounding box; elsewhere it is zero.
+        Rows and columns of the polygons' bounding box, and the coverage there, shape (rows, columns);
+        elsewhere it is zero.
     """
     ends = edges.reshape(-1, 2)
     low = np.clip(np.floor(ends.min(axis=0, initial=np.inf)), 0, size).astype(np.int64)
@@ -119,7 +111,7 @@ def pixel_coverage(edges: FloatArray, size: tuple[int, int]) -> PixelCoverage:
     steps += np.bincount(place, rise[seen] * (1 - before), minlength=len(steps))
     steps += np.bincount(place + 1, rise[seen] * before, minlength=len(steps))
     share = np.abs(np.cumsum(steps[:-1].reshape(height, width + 1), axis=1)[:, :width])
-    return PixelCoverage(slice(top, top + height), slice(left, left + width), np.minimum(share, 1.0))
+    return slice(top, top + height), slice(left, left + width), np.minimum(share, 1.0)
 
 
 def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: Pose) -> float:
@@ -131,8 +123,8 @@ def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: P
     for occluder in occluders:
         hidden = np.zeros_like(left)
         beside = seen_edges(occluder, camera, pose) + 0.5 - (columns.start, rows.start)
-        where = pixel_coverage(beside, (hidden.shape[1], hidden.shape[0]))
-        hidden[where.rows, where.columns] = where.share
+        across, along, share = pixel_coverage(beside, (hidden.shape[1], hidden.shape[0]))
+        hidden[across, along] = share
         left = left * (1 - hidden)
     return float(left.sum() / whole)
 

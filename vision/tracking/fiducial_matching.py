@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.runtime.errors import UserError
 from pinnray.vision.tracking.workspace import Workspace
 
@@ -75,19 +75,17 @@ def identify_fiducials(pixels: FloatArray, radii: FloatArray, workspace: Workspa
 
 
 def _best(pixels: FloatArray, radii: FloatArray, workspace: Workspace, *, mirrored: bool) -> FiducialMatch:
+    """The best match of all sets of discs of about one size that may contain the fiducials."""
     best = FiducialMatch(np.full(len(workspace.fiducials), -1), np.inf)
-    for group in _groups(radii):
+    groups = {tuple((radii <= SAME_SIZE * radius) & (SAME_SIZE * radii >= radius)) for radius in radii}
+    for group in sorted(groups):
+        if not 4 <= sum(group) <= MOST_DISCS:
+            continue
         discs = np.nonzero(group)[0]
         for match in _matches(pixels[discs], radii[discs], workspace, mirrored=mirrored):
             if (match.found, -match.residual) > (best.found, -best.residual):
                 best = match._replace(discs=np.where(match.discs >= 0, discs[match.discs], -1))
     return best
-
-
-def _groups(radii: FloatArray) -> list[BoolArray]:
-    """Sets of discs of about one size that may contain the fiducials."""
-    groups = {tuple((radii <= SAME_SIZE * radius) & (SAME_SIZE * radii >= radius)) for radius in radii}
-    return [np.array(group) for group in sorted(groups) if 4 <= sum(group) <= MOST_DISCS]
 
 
 def _matches(

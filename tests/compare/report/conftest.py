@@ -11,7 +11,7 @@ from playwright.sync_api import Browser
 from pinnray.comparison.evaluation.evaluation import Evaluation
 from pinnray.comparison.figures import Picture
 from pinnray.comparison.figures.gallery import draw
-from pinnray.comparison.report.html_report import write_report
+from pinnray.comparison.report.html_report import report_html
 from tests.compare.report.browser import chromium
 
 TITLES = {"marker_errors": "Errors at the markers", "von_mises": "Von Mises stress"}
@@ -48,5 +48,6 @@ def written(estimated, pinn, followed, evaluate, truth, compared, tmp_path_facto
         drawing = draw(comparison, name)
         picture = drawing.figure.save(folder / f"{name}.png")
         pictures.append(Picture(picture, drawing.title, drawing.caption))
-    write_report(folder / "report.html", comparison, pictures, {"seed": 17})
-    return folder / "report.html"
+    page = folder / "report.html"
+    page.write_text(report_html(comparison, pictures, {"seed": 17}), encoding="utf-8")
+    return page
