@@ -19,6 +19,7 @@ from pinnray.geometry.finger.finger import Finger
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.geometry.observations import Observations
 from pinnray.runtime.atomic import write_text
+from pinnray.runtime.content_hash import sources_digest
 from pinnray.runtime.errors import UserError
 from pinnray.runtime.machine import cores
 from pinnray.runtime.output_folder import SOLUTIONS, TRAINING, take_training
@@ -246,7 +247,7 @@ class _Part:
         job, traits = self.job, Traits.of(solver)
         given = self.observations if traits.assimilates else None
         own = replace(self.problem, material=with_law(job.material, solver), observations=given)
-        key = solution_key(solver, own, self.observations.points)
+        key = solution_key(solver, own, self.observations.points, sources_digest(__name__))
         file = Path(SOLUTIONS) / f"{solver.name}.npz"
         with stage(solver.name) as progress:
             for place in (self.folder, job.out) if job.resume else ():
