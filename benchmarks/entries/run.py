@@ -20,7 +20,7 @@ from pinnray.solvers.registry import make_solver
 from pinnray.studies.benchmark.benchmark import ENTRIES, Benchmark, BenchmarkJob, run_benchmark
 from pinnray.studies.benchmark.entry import load_entries
 from pinnray.studies.benchmark.page import broken_table, summary_table
-from pinnray.studies.benchmark.picture import draw_front
+from pinnray.studies.benchmark.picture import draw_accuracy
 from pinnray.studies.benchmark.problems import SETS, problem_set
 
 FOLDER, PAGE = DOCS / "benchmark", DOCS / "benchmark.md"
@@ -86,7 +86,7 @@ def page() -> Table:
         entries.sort(key=lambda each: order.index(each.label) if each.label in order else len(order))
         found = Benchmark(problems, entries)
         if entries:
-            draw_front(found).save(DOCS / "pictures" / f"benchmark-{which}.png")
+            draw_accuracy(found).save(DOCS / "pictures" / f"benchmark-{which}.png")
         for name, table in {"entries": summary_table(found), "broken claims": broken_table(found)}.items():
             headings = [heading.replace("-\n", "").replace("\n", " ") for heading in table.headings]
             shown = markdown(headings, table.rows, left=3) if table.rows else "None.\n"

@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.identification.body import Body, PressedBody
-from pinnray.solvers.identification.front_contact import Cylinder, FrontContact, Stage
+from pinnray.solvers.identification.front_contact import Cylinder, FrontContact, WayPoint
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
 
@@ -63,7 +63,7 @@ class CylinderModel(ResponseModel):
         weights = np.array([np.interp(self._points[:, 0], points[order, 0], unit) for unit in units]).T
         shared = len(points) / len(weights) * weights  # of a force on more points
 
-        def carried(stage: Stage, *, final: bool) -> Stage:
+        def carried(stage: WayPoint, *, final: bool) -> WayPoint:
             state, *slopes = finer(np.stack([stage.state, *stage.slopes]))
             return replace(
                 stage,
@@ -90,7 +90,7 @@ class CylinderModel(ResponseModel):
         hypothesis, by = self.unknowns.hypothesis(values), self.unknowns.slopes(values)
         way = [self._rest(hypothesis, by)]
 
-        def reached(share: float, near: Stage | None, halvings: int) -> bool:
+        def reached(share: float, near: WayPoint | None, halvings: int) -> bool:
             if near is not None and near.final:
                 way.append(near.moved(step))
                 return True
@@ -106,7 +106,7 @@ class CylinderModel(ResponseModel):
             return halvings > 0 and reached(middle, None, halvings - 1) and reached(share, None, halvings - 1)
 
         equal = np.arange(1, self.unknowns.stages + 1) / self.unknowns.stages
-        known_or_none: list[Stage | None] = [*known] or [None] * len(equal)
+        known_or_none: list[WayPoint | None] = [*known] or [None] * len(equal)
         shares = [each.share for each in known] or equal.tolist()
         if not all(reached(share, near, HALVINGS) for share, near in zip(shares, known_or_none, strict=True)):
             return None
@@ -124,16 +124,16 @@ class CylinderModel(ResponseModel):
         """Displacements (p, m, 2) of the front by states (p, *shape)."""
         return np.asarray((self._rows @ states.reshape(len(states), -1).T).T.reshape(len(states), -1, 2))
 
-    def _rest(self, hypothesis: Hypothesis, by: HypothesisSlopes) -> Stage:
+    def _rest(self, hypothesis: Hypothesis, by: HypothesisSlopes) -> WayPoint:
         cylinder, count = self._cylinder(hypothesis, 0.0), len(self._points)
         still = np.zeros((len(by.friction), count, 2))
         state, slopes = np.zeros(self.body.shape), np.zeros((len(still), *self.body.shape))
         touches, slips = np.zeros(count, dtype=np.bool_), np.zeros(count)
         places = cylinder.places(self._points)
         place_slopes = -by.centre @ cylinder.place_slopes(self._points).T
-        return Stage(0.0, state, still[0], places, touches, slips, slopes, still, place_slopes)
+        return WayPoint(0.0, state, still[0], places, touches, slips, slopes, still, place_slopes)
 
-    def _ahead(self, way: list[Stage], share: float) -> Stage:
+    def _ahead(self, way: list[WayPoint], share: float) -> WayPoint:
         """The last stage or, from the second one on, the state on the line through the last two."""
         last = way[-1]
         if len(way) < 3:
@@ -143,13 +143,13 @@ class CylinderModel(ResponseModel):
 
     def _settled(
         self,
-        guess: Stage,
-        before: Stage,
+        guess: WayPoint,
+        before: WayPoint,
         share: float,
         hypothesis: Hypothesis,
         by: HypothesisSlopes,
         tolerance: float,
-    ) -> Stage | None:
+    ) -> WayPoint | None:
         """The equilibrium at a share of the travel by Newton's method; None where it does not settle."""
         body, cylinder = self.body, self._cylinder(hypothesis, share)
         base = body.feet.any(axis=0)
@@ -206,10 +206,10 @@ class CylinderModel(ResponseModel):
         points = self._moved(state)
         place_slopes = np.einsum("pmi,mi->pm", moved, cylinder.place_slopes(points))
         places = cylinder.places(points)
-        return Stage(share, state, forces, places, touches, slips, slopes, force_slopes, place_slopes)
+        return WayPoint(share, state, forces, places, touches, slips, slopes, force_slopes, place_slopes)
 
     def _pressed(
-        self, values: FloatArray, hypothesis: Hypothesis, by: HypothesisSlopes, way: list[Stage]
+        self, values: FloatArray, hypothesis: Hypothesis, by: HypothesisSlopes, way: list[WayPoint]
     ) -> Response:
         last, into = way[-1], self.unknowns.directions[0]
         force, force_slopes = last.forces.sum(axis=0), last.force_slopes.sum(axis=1)

@@ -55,7 +55,7 @@ class Pressed(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class WayPoint:
     """An equilibrium on the way, with derivatives by p unknowns; the front has m points."""
 
     share: float  # Of the travel
@@ -69,7 +69,7 @@ class Stage:
     place_slopes: FloatArray  # Shape (p, m)
     final: bool = False  # Whether it is only moved to first order, not solved again
 
-    def moved(self, step: FloatArray) -> "Stage":
+    def moved(self, step: FloatArray) -> "WayPoint":
         """The stage after a step of the unknowns, shape (p,), to first order."""
         return replace(
             self,

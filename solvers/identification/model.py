@@ -31,7 +31,7 @@ from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
-from pinnray.solvers.identification.front_contact import Stage
+from pinnray.solvers.identification.front_contact import WayPoint
 from pinnray.solvers.identification.unknowns import Doubt, Hypothesis, Unknowns
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import stroke_axes
@@ -62,7 +62,7 @@ class Response:
     force_slopes: FloatArray  # Shape (p, 2)
     place: float  # Abscissa on the drawn front at which it acts, mm
     place_slopes: FloatArray  # Shape (p,)
-    way: tuple[Stage, ...] = ()  # Of a cylinder, from its first stage to this equilibrium
+    way: tuple[WayPoint, ...] = ()  # Of a cylinder, from its first stage to this equilibrium
 
 
 class ResponseModel:

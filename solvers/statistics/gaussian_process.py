@@ -24,7 +24,7 @@ from pinnray.solvers.solver import (
     check_problem,
     silent,
 )
-from pinnray.solvers.statistics.posterior import MarkerData, Posterior
+from pinnray.solvers.statistics.posterior import FramedMarkers, Posterior
 
 MIN_MARKERS = 3
 """Minimum number of markers that determines the two hyperparameters of a kernel."""
@@ -74,7 +74,7 @@ class GaussianProcessSolver(FieldSettings):
         pictures, deviations = FreePictures.of(observations), standard_deviations(observations)
 
         def conditioned(framed: FramedData) -> Posterior:
-            return Posterior.of(MarkerData(pictures.points, framed.observed, deviations, framed.frames))
+            return Posterior.of(FramedMarkers(pictures.points, framed.observed, deviations, framed.frames))
 
         z = pictures.found(lambda framed: conditioned(framed).frames[0])
         posterior = conditioned(pictures.about(z))

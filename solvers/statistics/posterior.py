@@ -25,7 +25,7 @@ START, RANGES = (10.0, 30.0), ((1e-4, 1e6), (1.0, 1000.0))
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerData:
+class FramedMarkers:
     """Observations at m markers."""
 
     points: FloatArray  # Shape (m, 2), mm
@@ -33,24 +33,26 @@ class MarkerData:
     deviations: FloatArray  # Standard deviations of e, shape (m, 2), mm
     frames: FloatArray  # -S, errors by unit changes of the pictures' frames, shape (p, m, 2), mm
 
-    def without(self, marker: int) -> "MarkerData":
+    def without(self, marker: int) -> "FramedMarkers":
         """The other markers' data."""
         kept = np.arange(len(self.points)) != marker
-        return MarkerData(self.points[kept], self.observed[kept], self.deviations[kept], self.frames[:, kept])
+        return FramedMarkers(
+            self.points[kept], self.observed[kept], self.deviations[kept], self.frames[:, kept]
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
     """The processes given the markers: a displacement field with standard deviations."""
 
-    data: MarkerData
+    data: FramedMarkers
     variances: FloatArray  # Of the processes u and v a priori, shape (2,), mm²
     lengths: FloatArray  # Of their kernels, shape (2,), mm
     cholesky: FloatArray  # Cholesky factor of the covariance of d, shape (2 m, 2 m)
     coefficients: FloatArray  # Inverse covariance of d times d, shape (m, 2), 1/mm
 
     @classmethod
-    def of(cls, data: MarkerData) -> "Posterior":
+    def of(cls, data: FramedMarkers) -> "Posterior":
         """The processes of the largest marginal likelihood with the frames as they are, conditioned."""
         with threadpool_limits(1, user_api="blas"):  # on small matrices its threads wait for one another
             variances, lengths = np.exp([_most_likely(data, axis) for axis in (0, 1)]).T
@@ -112,7 +114,7 @@ class Posterior:
 
 
 def _covariance(
-    data: MarkerData, variances: FloatArray, lengths: FloatArray, points: FloatArray
+    data: FramedMarkers, variances: FloatArray, lengths: FloatArray, points: FloatArray
 ) -> FloatArray:
     """Prior covariance between n points and the markers, mm²: (2 n, 2 m), u and v by turns."""
     kernels = np.stack([correlation(points, data.points, length) for length in lengths])
@@ -120,7 +122,7 @@ def _covariance(
     return np.asarray(covariance.reshape(2 * len(points), 2 * len(data.points)))
 
 
-def _most_likely(data: MarkerData, axis: int) -> FloatArray:
+def _most_likely(data: FramedMarkers, axis: int) -> FloatArray:
     """Logarithms of variance, mm², and length, mm, of the largest marginal likelihood of a component.
 
     An end of the search range is a valid result: constant over the finger, or the markers alone.

@@ -14,7 +14,7 @@ from pinnray.runtime.processes.pool import Pool, known_to_children
 from pinnray.runtime.stages import Stages
 from pinnray.solvers.registry import MissingLibraryError, make_solver
 from pinnray.solvers.solver import Progress, Solver, check_name
-from pinnray.studies.benchmark.entry import Entry, EntryRow, label_of, load_entries
+from pinnray.studies.benchmark.entry import Entry, EntryRow, entry_label, load_entries
 from pinnray.studies.benchmark.problems import ProblemSet, problem_set
 from pinnray.studies.benchmark.scores import BenchmarkTask, score
 from pinnray.studies.sweep.measurement import Measurement
@@ -85,7 +85,7 @@ def run_benchmark(job: BenchmarkJob, stages: Stages | None = None) -> Benchmark:
         UserError: If the benchmark cannot be run, or the folder holds something else.
     """
     stages, problems = stages or Stages(quiet=True), problem_set(job.which)
-    labels = [label_of(solver) for solver in job.solvers]
+    labels = [entry_label(solver) for solver in job.solvers]
     for solver in job.solvers:
         check_name(solver.name)
     if not labels or len(set(labels)) < len(labels):

@@ -91,7 +91,7 @@ def load_entries(folder: Path, problems: ProblemSet) -> tuple[list[Entry], list[
     return fitting, [remark] if left_out else []
 
 
-def label_of(solver: Any) -> str:
+def entry_label(solver: Any) -> str:
     """The name of a solver, with its preset if it has one."""
     preset = solver.settings().get("preset")
     return " ".join(filter(None, [solver.name, preset]))

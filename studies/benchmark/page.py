@@ -11,7 +11,7 @@ from pinnray.runtime.atomic import write_text
 from pinnray.runtime.tables import NONE, TextTable, number, percent
 from pinnray.studies.benchmark.benchmark import ENTRIES, Benchmark
 from pinnray.studies.benchmark.entry import Entry
-from pinnray.studies.benchmark.picture import draw_front
+from pinnray.studies.benchmark.picture import draw_accuracy
 from pinnray.studies.benchmark.problems import BenchmarkProblem
 from pinnray.studies.benchmark.references import Reference
 from pinnray.studies.sweep.page import write_page
@@ -51,7 +51,7 @@ def write_benchmark(found: Benchmark, folder: Path, record: Mapping[str, Any]) -
         "Solvers on the benchmark",
         sentences(found),
         [broken_table(found), summary_table(found), *tables],
-        {"front": (draw_front(found), caption)},
+        {"front": (draw_accuracy(found), caption)},
         f"{FIGURES}, {ENTRIES}/*.json (an entry each, to send in). Started {record['started']}.",
     )
     return [*pages, folder / FIGURES]

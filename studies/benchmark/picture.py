@@ -24,7 +24,7 @@ BESIDE = 12.0
 """Distance of points below which they have one label, pt."""
 
 
-def draw_front(found: Benchmark, page: float = WIDTH) -> Figure:
+def draw_accuracy(found: Benchmark, page: float = WIDTH) -> Figure:
     """Median errors of each entry over its median time; a column of panels for each law."""
     labels, medians = [each.label for each in found.entries], found.medians()
     foot = 0.6 + LEGEND_LINE * -(-len(labels) // COLUMNS)
