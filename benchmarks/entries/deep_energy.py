@@ -118,6 +118,9 @@ class Network(torch.nn.Module):
         for inputs, outputs in pairwise(widths):
             layers += [torch.nn.Linear(inputs, outputs, dtype=torch.float64), torch.nn.Tanh()]
             torch.nn.init.xavier_normal_(layers[-2].weight)
+        if solver.features:  # whose first displacements would turn the material inside out
+            torch.nn.init.zeros_(layers[-2].weight)
+            torch.nn.init.zeros_(layers[-2].bias)
         self._layers = torch.nn.Sequential(*layers[:-1])
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:
