@@ -1,14 +1,15 @@
 """The entries of docs/benchmark.md, run here, and the page's table and picture from all files of entries.
 
-- `entries`: each entry on the small set, an hour; `--rows` chooses some by words in their names.
-- `full-entries`: the same on the full set.
+- `full-entries`: each entry on the full set, which holds the small one, two hours; `--rows` chooses some by words
+  in their names.
+- `entries`: the same on the small set alone, for what takes minutes a problem.
 - `page`: only the page.
 """
 
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from shutil import copy
 from typing import Any
 
 from rich.table import Table
@@ -17,7 +18,7 @@ from benchmarks.tables import DOCS, fill, markdown
 from pinnray.runtime.stages import Stages
 from pinnray.runtime.tables import terminal_table
 from pinnray.solvers.registry import make_solver
-from pinnray.studies.benchmark.benchmark import ENTRIES, Benchmark, BenchmarkJob, run_benchmark
+from pinnray.studies.benchmark.benchmark import Benchmark, BenchmarkJob, run_benchmark
 from pinnray.studies.benchmark.entry import load_entries
 from pinnray.studies.benchmark.page import broken_table, summary_table
 from pinnray.studies.benchmark.picture import draw_accuracy
@@ -73,7 +74,10 @@ def run(which: str, rows: str = "", time_limit: float = 600.0) -> Table:
         job = BenchmarkJob(solvers=[made(name)], out=out, which=which, time_limit=time_limit, notes=notes)
         with Stages() as stages:
             (entry,) = run_benchmark(job, stages).entries
-        copy(out / ENTRIES / entry.file_name, FOLDER)
+        for each in SETS if which == "full" else [which]:
+            part = problem_set(each)
+            rows_of = [row for row in entry.rows if row.problem in {every.name for every in part.problems}]
+            replace(entry, problems=part.described, rows=rows_of).save(FOLDER)
     return page()
 
 

@@ -23,7 +23,7 @@ def load_conditions(problem: Problem) -> tuple[FloatArray, FloatArray, FloatArra
     """
     values = problem.load.values[:, None]
     if problem.load.kind == "cylinder":
-        return np.zeros((1, 2)), np.zeros((0, 1)), np.zeros((2, 0))
+        return problem.mesh.points[:1], np.zeros((0, 1)), np.zeros((2, 0))  # a point that windows reach
     if problem.load.kind != "patch":
         points, weights = contact_functional(problem)
         return points, weights[None], values

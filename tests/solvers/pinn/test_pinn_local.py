@@ -1,6 +1,7 @@
 """`pinn-local`: windows that sum to one, graded points, and its distance from finite elements."""
 
 import resource
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.pinn.finite_basis import newton
 from pinnray.solvers.pinn.finite_basis.energy import NetworkEnergy
 from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from pinnray.solvers.pinn.finite_basis.load_conditions import load_conditions
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from pinnray.solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
@@ -50,6 +52,14 @@ def basis(coarse_mesh, spacing) -> FiniteBasis:
         constraint=HardConstraint.of(coarse_mesh, 5.0),
         rng=np.random.default_rng(0),
     )
+
+
+def test_the_placeholder_of_a_cylinder_lies_in_the_body(coarse_mesh):
+    """At the origin, outside of a finger that is drawn elsewhere, no window reached it."""
+    moved = replace(coarse_mesh, points=coarse_mesh.points + 200)
+    points, weights, _ = load_conditions(Problem(moved, load=Load(kind="cylinder")))
+    assert weights.shape == (0, len(points))
+    assert (points[:, None] == moved.points).all(axis=2).any(axis=1).all()
 
 
 def test_singular_points_are_the_cells_corners_and_the_bases_ends(coarse_mesh):
