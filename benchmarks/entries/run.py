@@ -1,7 +1,7 @@
 """The entries of docs/benchmark.md, run here, and the page's table and picture from all files of entries.
 
-- `full-entries`: each entry on the full set, which holds the small one, two hours; `--rows` chooses some by words
-  in their names.
+- `full-entries`: each entry on the full set, which holds the small one, two hours; `--rows` chooses some by
+  words in their names.
 - `entries`: the same on the small set alone, for what takes minutes a problem.
 - `page`: only the page.
 """
