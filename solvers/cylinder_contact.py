@@ -7,10 +7,9 @@ Structures 42 (1992) 97-116. In three dimensions the axis is along z, and k of a
 level's share of the depth.
 
 With friction a node slips by s along the cylinder since the last equilibrium, and the nodal friction is
-τ - k s where it sticks, and else of the length μ λ. That this is of the multiplier, not of the force, keeps
-the tangent symmetric; as λ settles they become one (T. A. Laursen, J. C. Simo, Computer Methods in Applied
-Mechanics and Engineering 108 (1993) 133-146). Which nodes stick is settled between Newton's iterations, with
-the multipliers: within them, nodes far from sticking would make it leap to and fro.
+-b s / max(|s|, ε): a node sticks until it slips by ε, `CREEP` of the travel. The bound b is μ λ of the
+multiplier, not of the force, which keeps the tangent symmetric; as λ settles they become one (T. A. Laursen,
+J. C. Simo, Computer Methods in Applied Mechanics and Engineering 108 (1993) 133-146).
 """
 
 from dataclasses import dataclass, field, replace
@@ -26,6 +25,9 @@ from pinnray.solvers.solution import Contact, ContactPoints
 FRICTION_STEP = 0.2
 """Travel of a cylinder with friction in one step over its radius; within a step slip has one direction."""
 
+CREEP = 1e-3
+"""Slip in a step up to which a node sticks, over the travel; less costs iterations and changes no digit."""
+
 CONTACT_AT_END = (
     "the contact reaches an end of the front face, beyond which none is looked for; "
     "press nearer to its middle or take a smaller stroke or radius"
@@ -36,9 +38,8 @@ CONTACT_AT_END = (
 class Friction:
     """Friction at the nodes of the front: t = 1 component along the cylinder and, of a solid, 2 with z."""
 
-    forces: FloatArray  # Multipliers τ: in equilibrium friction on the finger, shape (l m, t), N/mm
+    bounds: FloatArray  # Largest friction b, shape (l m,), N/mm
     places: FloatArray  # On the cylinder at the last equilibrium, from which slip counts, (l m, t), mm
-    sticks: BoolArray  # Whether a node sticks, shape (l m,); else it slips under τ, or does not touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +127,7 @@ class CylinderContact:
             return None
         places, before = self.places(equilibrium), equilibrium.friction
         if before is None:
-            return Friction(np.zeros_like(places), places, np.zeros(len(places), dtype=np.bool_))
+            return Friction(np.zeros(len(places)), places)
         return replace(before, places=places)
 
     def places(self, state: ContactState) -> FloatArray:
@@ -135,36 +136,29 @@ class CylinderContact:
         around = self.radius * np.arctan2(away[:, 0], -away[:, 1])
         return np.column_stack([around, *state.nodal[self.nodes, 2:].T])
 
+    def slips(self, state: ContactState) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Slip s, shape (l m, t), mm, its size or ε if that is more, and whether it is less, (l m,) each."""
+        assert state.friction is not None
+        slip = self.places(state) - state.friction.places
+        size, creep = np.linalg.norm(slip, axis=1), CREEP * float(np.linalg.norm(self.travel))
+        return slip, np.maximum(size, creep), size < creep
+
     def frictions(self, state: ContactState) -> FloatArray:
         """Friction on the finger along the cylinder and, of a solid, along z, (l m, t), N/mm."""
         assert state.friction is not None
-        slip = self.places(state) - state.friction.places
-        sticking = (state.friction.sticks * self._stiffness)[:, None]
-        return np.asarray(state.friction.forces - sticking * slip)
+        slip, size, _ = self.slips(state)
+        return np.asarray(-(state.friction.bounds / size)[:, None] * slip)
 
     def settled(self, state: StateT) -> tuple[StateT, float]:
-        """The state with its forces as multipliers, and how far off the old ones were: gap or slip, mm.
-
-        A node that sticks slips if that takes more than friction gives. One that slips sticks if friction
-        does not oppose its slip.
-        """
+        """The state with its forces as multipliers, and how far off the old ones were, in gaps, mm."""
         contact = self.forces(state)
         gap, _ = self.gaps(state)
         off = float(max(np.abs(gap[contact > 0]).max(initial=0.0), -gap.min()))
         if (old := state.friction) is None:
             return replace(state, contact=contact), off
-        bound, needed = self.coefficient * contact, self.frictions(state)
-        slip = self.places(state) - old.places
-        size = np.linalg.norm(needed, axis=1)
-        held = (old.forces * slip).sum(axis=1) > 0
-        sticks = (contact > 0) & np.where(old.sticks, size <= bound, held)
-        trial = needed - (~old.sticks * self._stiffness)[:, None] * slip
-        length = np.linalg.norm(trial, axis=1, keepdims=True)
-        cut = np.divide(bound[:, None], length, out=np.zeros_like(length), where=length > 0) * trial
-        forces = np.where(sticks[:, None], np.where(old.sticks[:, None], needed, old.forces), cut)
-        change = np.linalg.norm(forces - old.forces, axis=1) / self._stiffness
-        off = max(off, float(change.max())) if np.array_equal(sticks, old.sticks) else np.inf
-        return replace(state, contact=contact, friction=Friction(forces, old.places, sticks)), off
+        bounds = self.coefficient * contact
+        off = max(off, float((np.abs(bounds - old.bounds) / self._stiffness).max()))
+        return replace(state, contact=contact, friction=replace(old, bounds=bounds)), off
 
     def gradient(self, state: ContactState) -> FloatArray:
         """Residual force - q n less friction, shape (l m, 2) or, with friction on a solid, (l m, 3), N/mm.
@@ -183,8 +177,8 @@ class CylinderContact:
         """Derivative of the gradient by its components, (l m, 2, 2) or (l m, 3, 3).
 
         Blocks k n n^T - q (I - n n^T) / r of the pressure, without the last term for tension; r = g + radius.
-        Friction f along t adds f radius (t n^T + n t^T) / r^2 and, where a node sticks, k J^T J with the
-        derivative J of its place.
+        Friction f along t adds f radius (t n^T + n t^T) / r^2 and, with the derivative J of a node's place,
+        b J^T J / ε where it sticks, and else b J^T (I - s s^T / |s|^2) J / |s|.
         """
         (gap, normal), force = self.gaps(state), self.forces(state)
         distance = gap + self.radius
@@ -199,8 +193,11 @@ class CylinderContact:
         slopes = np.zeros((len(normal), count, count + 1))
         slopes[:, 0, :2] = (self.radius / distance)[:, None] * _turned(normal)
         slopes[:, 1:, 2:] = np.eye(count - 1)
-        sticking = state.friction.sticks * self._stiffness
-        blocks = np.einsum("m,mti,mtj->mij", sticking, slopes, slopes)
+        slip, size, sticks = self.slips(state)
+        along = np.where(sticks[:, None], 0.0, slip / size[:, None])
+        turned = np.eye(count) - np.einsum("mt,ms->mts", along, along)
+        rate = (state.friction.bounds / size)[:, None, None] * turned
+        blocks = np.einsum("mti,mts,msj->mij", slopes, rate, slopes)
         tied = np.einsum("mi,mj->mij", _turned(normal), normal)
         bend = friction[:, 0] * self.radius / distance**2
         blocks[:, :2, :2] += pressing + bend[:, None, None] * (tied + tied.transpose(0, 2, 1))
@@ -290,8 +287,8 @@ class ContactRegion:
         gap, normal = contact.gaps(state)
         along, levels = np.zeros(len(gap)), len(contact.shares)
         sticks = np.zeros(len(gap), dtype=np.bool_)
-        if (rubbed := state.friction) is not None:
-            along, sticks = rubbed.forces[:, 0], rubbed.sticks
+        if state.friction is not None:
+            along, sticks = contact.frictions(state)[:, 0], contact.slips(state)[2]
         total = state.contact @ normal + along @ _turned(normal)
         nodal, force = state.nodal, state.contact.reshape(levels, -1).sum(axis=0)
         friction, sticks = along.reshape(levels, -1).sum(axis=0), sticks.reshape(levels, -1).any(axis=0)

@@ -220,6 +220,14 @@ _TRUTHS = (
         slope=0.0,
         solid=True,
     ),
+    Truth(
+        "3d-rubbing",
+        f"neo-Hookean finger in three dimensions, of which the side face is seen, {_ROUGH.format(10, 0.5)}",
+        radius=10.0,
+        friction=0.5,
+        slope=0.0,
+        solid=True,
+    ),
     Truth("wide", f"neo-Hookean, {_ROUGH.format(25, 0.9)}", radius=25.0, friction=0.9, slope=0.0),
     Truth(
         "limit",

@@ -20,7 +20,8 @@ from pinnray.solvers.solution import Solution
 from pinnray.solvers.solver import Cost, FieldSettings, Progress, check_problem, silent
 
 STEPS = LoadSteps(first_step=1.0, max_step=1.0, min_step=0.01, max_iterations=20)
-"""In small ones the friction of a solid hardly settles."""
+RUBBING = replace(STEPS, first_step=0.05, max_step=0.2)
+"""Steps with friction, which depends on the way."""
 REMARK = "the field is that of the side face; its discretisation error was not estimated"
 
 
@@ -96,7 +97,8 @@ class Fem3dSolver(FieldSettings):
         way = None
         if not (linear or problem.load.friction or self.stops):  # friction depends on the way
             way = FemNonlinearSolver().path(problem, space.section, rough=True)
-        path = LoadPath(problem, space, steps=replace(STEPS, stops=self.stops))
+        steps = RUBBING if problem.load.friction else STEPS
+        path = LoadPath(problem, space, steps=replace(steps, stops=self.stops))
         whole = followed(path, way, progress)
         last, history, regions = path.points[-1], whole.history(), whole.regions()
         region = regions[-1]
