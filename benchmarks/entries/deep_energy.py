@@ -118,9 +118,8 @@ class Network(torch.nn.Module):
         for inputs, outputs in pairwise(widths):
             layers += [torch.nn.Linear(inputs, outputs, dtype=torch.float64), torch.nn.Tanh()]
             torch.nn.init.xavier_normal_(layers[-2].weight)
-        if solver.features:  # whose first displacements would turn the material inside out
-            torch.nn.init.zeros_(layers[-2].weight)
-            torch.nn.init.zeros_(layers[-2].bias)
+        for part in layers[-2].parameters() if solver.features else ():
+            torch.nn.init.zeros_(part)  # else the first displacements turn the material inside out
         self._layers = torch.nn.Sequential(*layers[:-1])
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:

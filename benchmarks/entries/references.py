@@ -31,8 +31,8 @@ POINTS = MeshSettings(size=2.0)
 """Of the mesh with one element across each wall whose quadrature points are the fixed points."""
 FINE, COARSE = 0.06, 0.085
 """Elements of a reference, and those that tell its error, mm."""
-GRADED = {"linear": (0.0005, 0.001), "finite strain": (0.002, 0.02)}
-"""Elements at corners and at the contact's ends, mm; twice as large on the coarser mesh."""
+LINEAR, FINITE = (0.0005, 0.001), (0.002, 0.02)
+"""Elements at corners and at the contact's ends by law, mm; twice as large on the coarser mesh."""
 
 
 def main(rows: str = "") -> Table:
@@ -44,8 +44,7 @@ def main(rows: str = "") -> Table:
             save(made, problem.reference_file)
             bounds = (f"{made.bounds[name]:.1e}" for name in MEASURES)
             cells.append((problem.name, str(len(made.points)), *bounds))
-    headings = ("problem", "points", *MEASURES)
-    return terminal_table("Bounds of the references' errors", headings, cells, left=["problem"])
+    return terminal_table("Bounds of errors", ("problem", "points", *MEASURES), cells, left=["problem"])
 
 
 def make_reference(problem: BenchmarkProblem) -> Reference:
@@ -66,11 +65,8 @@ def make_reference(problem: BenchmarkProblem) -> Reference:
 
 def _graded(problem: BenchmarkProblem, size: float, times: float) -> Solution:
     """The solution on elements that are graded to corners and contact, with its smoothed gradient."""
-    corner, contact = GRADED["linear" if problem.linear else "finite strain"]
-    grading = times * problem.grading
-    settings = MeshSettings(
-        size=size, coarsening=1.5, corner_size=grading * corner, contact_size=grading * contact
-    )
+    corner, contact = times * problem.grading * np.array(LINEAR if problem.linear else FINITE)
+    settings = MeshSettings(size=size, coarsening=1.5, corner_size=corner, contact_size=contact)
     solver = make_solver("fem", estimate=False) if problem.linear else make_solver("fem-nonlinear")
     solution = solver.solve(problem.made(settings))
     if not solution.status.converged:
@@ -93,11 +89,8 @@ def _touched(solution: Solution) -> FloatArray:
 def save(reference: Reference, file: Path) -> None:
     """Write it compressed; fields and points in whole steps of their range."""
     exact, arrays = reference.exact, {}
-    for name, values in {
-        "points": reference.points,
-        "u": exact.displacement,
-        "von_mises": exact.von_mises,
-    }.items():
+    fields = {"points": reference.points, "u": exact.displacement, "von_mises": exact.von_mises}
+    for name, values in fields.items():
         arrays[name], arrays[f"{name}_range"] = packed(values)
     arrays["numbers"] = [exact.force, exact.energy, *(reference.bounds[name] for name in MEASURES)]
     arrays["weights"], arrays["away"] = reference.weights.astype(np.float32), np.packbits(reference.away)

@@ -75,8 +75,7 @@ def run(which: str, rows: str = "", time_limit: float = 600.0) -> Table:
         job = BenchmarkJob(solvers=[made(name)], out=out, which=which, time_limit=time_limit, notes=notes)
         with Stages() as stages:
             (entry,) = run_benchmark(job, stages).entries
-        for each in SETS if which == "full" else [which]:
-            part = problem_set(each)
+        for part in map(problem_set, SETS if which == "full" else [which]):
             rows_of = [row for row in entry.rows if row.problem in {every.name for every in part.problems}]
             replace(entry, problems=part.described, rows=rows_of).save(FOLDER)
     return page()
