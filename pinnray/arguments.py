@@ -7,7 +7,12 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from pinnray.geometry.cache import drawn_finger
-from pinnray.geometry.drawing.description import Description, description_beside, load_description
+from pinnray.geometry.drawing.description import (
+    DRAWINGS,
+    Description,
+    description_beside,
+    load_description,
+)
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.finger.finger import Finger
@@ -23,10 +28,6 @@ from pinnray.solvers.material import Material
 from pinnray.solvers.materials.presets import of_preset
 from pinnray.solvers.registry import PRESETS
 from pinnray.solvers.solver import Solver
-
-DRAWINGS = (".step", ".stp", ".dxf", ".svg", ".msh")
-"""Endings of the files that are read as drawings."""
-
 
 MATERIAL = tuple(Material.model_fields)
 

@@ -17,6 +17,9 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Coordinates = tuple[Number, Number]
 Points = Annotated[tuple[Coordinates, ...], Field(min_length=1)]
 
+DRAWINGS = (".step", ".stp", ".dxf", ".svg", ".msh")
+"""Endings of the files that are read as drawings."""
+
 EXPECTED = {
     "clamp": "write clamp = [[0, 0], [0, -30]], or several such pairs",
     "contact": "write contact = [35, 0]",

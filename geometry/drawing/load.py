@@ -11,7 +11,12 @@ import numpy as np
 
 from pinnray.geometry.drawing import proposal
 from pinnray.geometry.drawing.checks import body, check_contact, check_markers
-from pinnray.geometry.drawing.description import Description, description_beside, load_description
+from pinnray.geometry.drawing.description import (
+    DRAWINGS,
+    Description,
+    description_beside,
+    load_description,
+)
 from pinnray.geometry.drawing.drawn_finger import DrawnFinger
 from pinnray.geometry.drawing.formats.closed_loops import straightened
 from pinnray.geometry.drawing.formats.drawing import LABELS, Drawing, place
@@ -22,8 +27,6 @@ from pinnray.geometry.section.section import Section
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.content_hash import file_digest
 from pinnray.runtime.errors import UserError
-
-SUFFIXES = (".step", ".stp", ".dxf", ".svg", ".msh")
 
 
 class ContactPlace(NamedTuple):
@@ -75,8 +78,8 @@ def read_drawing(
         depth_known: Whether the depth is given, so that a solid need not be extruded.
     """
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise UserError(f"cannot read {path.name} as a drawing; there are {', '.join(SUFFIXES)}")
+    if suffix not in DRAWINGS:
+        raise UserError(f"cannot read {path.name} as a drawing; there are {', '.join(DRAWINGS)}")
     if not path.is_file():
         raise UserError(f"there is no drawing {path}")
     if plane is not None and suffix not in (".step", ".stp"):
