@@ -1,4 +1,4 @@
-"""What would narrow the interval of an identified force, against the posterior with that measurement."""
+"""Advice on what narrows the interval of an identified force, against the posterior with that measurement."""
 
 from dataclasses import replace
 
