@@ -1,4 +1,4 @@
-"""The references of `pinnray benchmark`: finite elements graded to the corners and the contact; half an hour.
+"""The references of `pinnray benchmark`: finite elements graded to the corners and the contact; an hour.
 
 Their stress is that of the smoothed gradient, nearer to the truth than the elements' own. The difference
 between two meshes bounds their error: it falls at least in proportion to the elements.
