@@ -7,7 +7,7 @@ import numpy as np
 
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.cylinder_contact import touching_centre
+from pinnray.solvers.contact.cylinder import touching_centre
 from pinnray.solvers.problem import Load, Problem
 from pinnray.solvers.registry import make_solver
 from pinnray.solvers.solution import Solution

@@ -7,7 +7,7 @@ import felupe
 import numpy as np
 
 from benchmarks.entries.linear_system import solved_directly
-from pinnray.solvers.cylinder_contact import touching_centre
+from pinnray.solvers.contact.cylinder import touching_centre
 from pinnray.solvers.energy_and_force import energy_and_force
 from pinnray.solvers.lagrange import LagrangeField, LagrangeSpace
 from pinnray.solvers.problem import Problem

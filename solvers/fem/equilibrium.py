@@ -16,7 +16,7 @@ import ufl
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
-from pinnray.solvers.cylinder_contact import ContactState, CylinderContact
+from pinnray.solvers.contact.nodal_contact import ContactState, CylinderContact
 from pinnray.solvers.elasticity import deformation_jacobian, energy_density_of
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_conditions

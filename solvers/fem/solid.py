@@ -10,7 +10,7 @@ import numpy as np
 from pinnray.geometry.mesh.point_location import LocatedPoints
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.cylinder_contact import contact_of
+from pinnray.solvers.contact.contact_region import contact_of
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps, check_stops
 from pinnray.solvers.fem.finite_strain.nested_path import followed

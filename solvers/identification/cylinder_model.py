@@ -12,10 +12,12 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
+from pinnray.solvers.contact.cylinder import Cylinder
+from pinnray.solvers.contact.front_contact import FrontContact
 from pinnray.solvers.identification.body import Body, PressedBody
-from pinnray.solvers.identification.front_contact import Cylinder, FrontContact, WayPoint
 from pinnray.solvers.identification.model import Response, ResponseModel
 from pinnray.solvers.identification.unknowns import Hypothesis, HypothesisSlopes, Unknowns
+from pinnray.solvers.identification.way_point import WayPoint
 
 NEAR = 0.04
 """Gap over the radius from which on a point is not asked whether it touches in a Newton iteration."""
@@ -39,11 +41,11 @@ class CylinderModel(ResponseModel):
 
     def _held(self, response: Response) -> FloatArray:
         """What touches is held along the normal, and what sticks altogether."""
-        cylinder, stage = self._cylinder(response.hypothesis, 1.0), response.way[-1]
-        normal = (self._moved(response.state) - cylinder.centre) / cylinder.radius
-        along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-        sticks = stage.touches & (stage.slips == 0)
-        ways = np.concatenate([_along(normal, stage.touches), _along(along, sticks)])
+        cylinder, forces = self._cylinder(response.hypothesis, 1.0), response.way[-1].forces
+        axes = cylinder.axes(self._moved(response.state))
+        q, t = (forces * axes).sum(axis=2)
+        sticks = np.abs(t) < (1 - 1e-6) * cylinder.friction * q  # a point that slips has all of it
+        ways = np.concatenate([_along(axes[0], q > 0), _along(axes[1], sticks)])
         return np.asarray((ways @ self._rows).reshape(-1, *self.body.shape))
 
     def extrapolated(self, about: Response, values: FloatArray) -> Response:
@@ -70,8 +72,6 @@ class CylinderModel(ResponseModel):
                 state=state,
                 forces=shared @ stage.forces,
                 places=weights @ stage.places,
-                touches=weights @ stage.touches > 0.5,
-                slips=np.round(weights @ stage.slips),
                 slopes=np.array(slopes),
                 force_slopes=shared @ stage.force_slopes,
                 place_slopes=stage.place_slopes @ weights.T,
@@ -128,10 +128,9 @@ class CylinderModel(ResponseModel):
         cylinder, count = self._cylinder(hypothesis, 0.0), len(self._points)
         still = np.zeros((len(by.friction), count, 2))
         state, slopes = np.zeros(self.body.shape), np.zeros((len(still), *self.body.shape))
-        touches, slips = np.zeros(count, dtype=np.bool_), np.zeros(count)
         places = cylinder.places(self._points)
         place_slopes = -by.centre @ cylinder.place_slopes(self._points).T
-        return WayPoint(0.0, state, still[0], places, touches, slips, slopes, still, place_slopes)
+        return WayPoint(0.0, state, still[0], places, slopes, still, place_slopes)
 
     def _ahead(self, way: list[WayPoint], share: float) -> WayPoint:
         """The last stage or, from the second one on, the state on the line through the last two."""
@@ -154,28 +153,28 @@ class CylinderModel(ResponseModel):
         body, cylinder = self.body, self._cylinder(hypothesis, share)
         base = body.feet.any(axis=0)
         state = np.where(base, share * np.tensordot(hypothesis.feet, body.feet, axes=1), guess.state)
-        forces, touches, slips = guess.forces, guess.touches, guess.slips
+        forces = guess.forces
         longest = FARTHEST * (share - before.share) * float(np.linalg.norm(hypothesis.travel))
         for _ in range(ITERATIONS):
             linearised = body.linearised(state, hypothesis.lame, hypothesis.changes)
             if linearised is None:
                 return None
             points = self._moved(state)
-            near = touches | (cylinder.gaps(points) < NEAR * cylinder.radius)
+            near = forces.any(axis=1) | (cylinder.gaps(points) < NEAR * cylinder.radius)
             rows = self._rows[np.repeat(near, 2)]
             asked = np.concatenate([rows.toarray().reshape(-1, *body.shape), linearised.force[None]])
             answers = linearised.solve(asked)
             answers, free = answers[:-1], state - answers[-1]
             compliance = rows @ answers.reshape(len(answers), -1).T
-            contact = FrontContact(cylinder, compliance, points[near], forces[near], before.places[near])
+            contact = FrontContact(cylinder, compliance, before.places[near])
             loose = self._moved(free)[near]
-            pressed = contact.pressed(loose, touches[near], slips[near])
+            pressed = contact.forces(loose, forces[near])
             if pressed is None:
                 return None
-            forces, touches, slips = np.zeros_like(forces), np.zeros_like(touches), np.zeros_like(slips)
-            forces[near], touches[near], slips[near] = pressed.forces, pressed.touches, pressed.slips
-            load = (pressed.forces.ravel() @ rows).reshape(body.shape)
-            step = free + np.tensordot(pressed.forces.ravel(), answers, axes=1) - state
+            forces = np.zeros_like(forces)
+            forces[near] = pressed
+            load = (pressed.ravel() @ rows).reshape(body.shape)
+            step = free + np.tensordot(pressed.ravel(), answers, axes=1) - state
             if np.abs(step).max() > longest:
                 return None
             length = 1.0
@@ -196,17 +195,17 @@ class CylinderModel(ResponseModel):
             right -= np.tensordot(slope, part, axes=1)
         slopes = linearised.solve(right) + share * np.tensordot(by.feet, body.feet, axes=1)
         centre = by.centre + share * by.travel
-        moved = self._moves(slopes)
+        moved = self._moves(slopes)[:, near] - centre[:, None]
         force_slopes = np.zeros((len(slopes), *forces.shape))
         force_slopes[:, near] = contact.slopes(
-            pressed, moved[:, near], centre, by.friction, before.place_slopes[:, near]
+            loose, pressed, moved, by.friction, before.place_slopes[:, near]
         )
         slopes += np.tensordot(force_slopes[:, near].reshape(len(slopes), -1), answers, axes=1)
         moved = self._moves(slopes) - centre[:, None]
         points = self._moved(state)
         place_slopes = np.einsum("pmi,mi->pm", moved, cylinder.place_slopes(points))
         places = cylinder.places(points)
-        return WayPoint(share, state, forces, places, touches, slips, slopes, force_slopes, place_slopes)
+        return WayPoint(share, state, forces, places, slopes, force_slopes, place_slopes)
 
     def _pressed(
         self, values: FloatArray, hypothesis: Hypothesis, by: HypothesisSlopes, way: list[WayPoint]

@@ -31,8 +31,8 @@ from pinnray.solvers.assimilation.picture_frames import pictures_of
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
 from pinnray.solvers.identification.body import Body, Linearised
 from pinnray.solvers.identification.boundary import Clamp, RigidMotion
-from pinnray.solvers.identification.front_contact import WayPoint
 from pinnray.solvers.identification.unknowns import Doubt, Hypothesis, Unknowns
+from pinnray.solvers.identification.way_point import WayPoint
 from pinnray.solvers.problem import Problem
 from pinnray.solvers.solution import stroke_axes
 from pinnray.solvers.solver import NoSolutionError

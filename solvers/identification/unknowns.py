@@ -15,7 +15,7 @@ from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Parameter, Prior
 from pinnray.solvers.assimilation.picture_frames import picture_parameters, pictures_of
-from pinnray.solvers.cylinder_contact import FRICTION_STEP, touching_centre
+from pinnray.solvers.contact.cylinder import FRICTION_STEP, touching_centre
 from pinnray.solvers.elasticity import Lame, LawName, lame_derivatives
 from pinnray.solvers.identification.boundary import Feet, FrontTraction
 from pinnray.solvers.problem import Material, Problem, contact_ends

@@ -11,7 +11,7 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.finger.design import Design
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.cylinder_contact import CylinderContact
+from pinnray.solvers.contact.nodal_contact import CylinderContact
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Load, Material, Problem

@@ -11,11 +11,12 @@ from benchmarks.verification.cases.hertz import FINEST, INDENTATION, RADIUS, blo
 from benchmarks.verification.meshes import mapped_mesh
 from benchmarks.verification.record import Case, Row, about, at_most
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.cylinder_contact import ContactPoints, ContactRegion  # type: ignore[attr-defined]
+from pinnray.solvers.contact.contact_region import ContactRegion
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.problem import Load, Material, Problem
+from pinnray.solvers.solution import ContactPoints
 from pinnray.solvers.solver import silent
 
 COEFFICIENT = 0.3

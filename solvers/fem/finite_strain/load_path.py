@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.cylinder_contact import ContactRegion
+from pinnray.solvers.contact.contact_region import ContactRegion
 from pinnray.solvers.extrusion import NodalSpace
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium, LoadState

@@ -8,7 +8,7 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.runtime.arrays import FloatArray
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.cylinder_contact import ContactRegion
+from pinnray.solvers.contact.contact_region import ContactRegion
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath
 from pinnray.solvers.problem import Problem

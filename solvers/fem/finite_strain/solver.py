@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pinnray.runtime.errors import UserError
-from pinnray.solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
+from pinnray.solvers.contact.contact_region import CONTACT_AT_END, ContactRegion, contact_of
 from pinnray.solvers.fem.boundary_conditions import DisplacementConstraints
 from pinnray.solvers.fem.error_estimate import ErrorEstimator, locking_advice
 from pinnray.solvers.fem.finite_strain.load_path import LoadPath, LoadSteps, check_stops

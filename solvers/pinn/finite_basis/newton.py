@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from pinnray.runtime.arrays import FloatArray
-from pinnray.solvers.cylinder_contact import ContactRegion
+from pinnray.solvers.contact.contact_region import ContactRegion
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION
 from pinnray.solvers.pinn.finite_basis.network import FiniteBasisField

@@ -1,6 +1,6 @@
 """A rigid cylinder pressed on a finite-basis network at finite strain, by an augmented Lagrangian.
 
-The gaps are collocated at the nodes of quadratic elements on the front face: `solvers.cylinder_contact`. A
+The gaps are collocated at the nodes of quadratic elements on the front face: `solvers.contact`. A
 node that touches is a pair of springs of the linearised network: along the normal, of the compliance 1 / k,
 and along the cylinder, of the negative compliance -(g + radius) / q, as the force q turns with the normal.
 """
@@ -14,7 +14,8 @@ from scipy.sparse import csr_matrix
 
 from pinnray.runtime.arrays import FloatArray, IntArray
 from pinnray.solvers.constrained_elimination import ConstrainedElimination
-from pinnray.solvers.cylinder_contact import ContactRegion, ContactState, CylinderContact
+from pinnray.solvers.contact.contact_region import ContactRegion
+from pinnray.solvers.contact.nodal_contact import ContactState, CylinderContact
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import REGULARISATION

@@ -14,7 +14,7 @@ from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.marker_forces import MarkerFit
 from pinnray.solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
 from pinnray.solvers.assimilation.picture_frames import FreePictures
-from pinnray.solvers.cylinder_contact import CONTACT_AT_END
+from pinnray.solvers.contact.contact_region import CONTACT_AT_END
 from pinnray.solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from pinnray.solvers.pinn.finite_basis.energy import LAWS, NetworkEnergy
 from pinnray.solvers.pinn.finite_basis.hard_constraint import HardConstraint

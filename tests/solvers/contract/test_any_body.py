@@ -169,7 +169,7 @@ def test_a_rigid_patch_moves_a_curved_front_as_a_whole(body):
 @pytest.mark.slow
 def test_a_cylinder_starts_where_it_touches_a_curved_front_from_outside():
     """At R + r from the centre of a ring of radius R, on its top and beside it."""
-    from pinnray.solvers.cylinder_contact import CylinderContact
+    from pinnray.solvers.contact.nodal_contact import CylinderContact
     from pinnray.solvers.lagrange import LagrangeSpace
 
     mesh = body_mesh("ring", 0.4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from pinnray.solvers.cylinder_contact import ContactState, CylinderContact
+from pinnray.solvers.contact.nodal_contact import ContactState, CylinderContact
 from pinnray.solvers.extrusion import ExtrudedSpace
 from pinnray.solvers.fem.equilibrium import DiscreteEquilibrium
 from pinnray.solvers.fem.finite_strain.load_path import PENETRATION

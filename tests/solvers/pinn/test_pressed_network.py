@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pinnray.solvers.cylinder_contact import CylinderContact
+from pinnray.solvers.contact.nodal_contact import CylinderContact
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.lagrange import LagrangeSpace
 from pinnray.solvers.pinn.finite_basis import pressed_network

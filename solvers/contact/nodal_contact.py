@@ -18,20 +18,12 @@ from typing import TypeVar
 import numpy as np
 
 from pinnray.runtime.arrays import BoolArray, FloatArray, IntArray
+from pinnray.solvers.contact.cylinder import FRICTION_STEP, Cylinder, touching_centre
 from pinnray.solvers.extrusion import NodalSpace
-from pinnray.solvers.problem import Problem, contact_ends, front_points
-from pinnray.solvers.solution import Contact, ContactPoints
-
-FRICTION_STEP = 0.2
-"""Travel of a cylinder with friction in one step over its radius; within a step slip has one direction."""
+from pinnray.solvers.problem import Problem
 
 CREEP = 1e-3
 """Slip in a step up to which a node sticks, over the travel; a tenth of it changes forces by 5 in 10,000."""
-
-CONTACT_AT_END = (
-    "the contact reaches an end of the front face, beyond which none is looked for; "
-    "press nearer to its middle or take a smaller stroke or radius"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +94,14 @@ class CylinderContact:
         share = FRICTION_STEP if self.coefficient else 0.5
         return float(share * self.radius / np.linalg.norm(self.travel))
 
+    def cylinder(self, state: ContactState) -> Cylinder:
+        """The cylinder at a stage."""
+        return Cylinder(self.radius, self.centre + state.fraction * self.travel, self.coefficient)
+
     def gaps(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Distances g from the cylinder, shape (l m,), mm, and its outer normals n there, shape (l m, 2)."""
-        away = self._moved(state.nodal) - self.centre - state.fraction * self.travel
-        distance = np.linalg.norm(away, axis=1)
-        return distance - self.radius, away / distance[:, None]
+        cylinder, points = self.cylinder(state), self.moved(state.nodal)
+        return cylinder.gaps(points), cylinder.axes(points)[0]
 
     def forces(self, state: ContactState) -> FloatArray:
         """Forces q along the outer normals, shape (l m,), N/mm, tension where held; λ is `state.contact`."""
@@ -132,8 +127,7 @@ class CylinderContact:
 
     def places(self, state: ContactState) -> FloatArray:
         """Places on the cylinder: along it from its lowest line and, of a solid, z, shape (l m, t), mm."""
-        away = self._moved(state.nodal) - self.centre - state.fraction * self.travel
-        around = self.radius * np.arctan2(away[:, 0], -away[:, 1])
+        around = self.cylinder(state).places(self.moved(state.nodal))
         return np.column_stack([around, *state.nodal[self.nodes, 2:].T])
 
     def slips(self, state: ContactState) -> tuple[FloatArray, FloatArray, BoolArray]:
@@ -165,12 +159,11 @@ class CylinderContact:
 
         Without friction it is the derivative of Σ (q^2 - λ^2) / 2 k.
         """
-        gap, normal = self.gaps(state)
-        pressing = -self.forces(state)[:, None] * normal
+        pressing = -self.forces(state)[:, None] * self.gaps(state)[1]
         if state.friction is None:
             return pressing
         force = self.frictions(state)
-        around = (self.radius / (gap + self.radius) * force[:, 0])[:, None] * _turned(normal)
+        around = force[:, :1] * self.cylinder(state).place_slopes(self.moved(state.nodal))
         return np.column_stack([pressing - around, *-force[:, 1:].T])
 
     def tangent(self, state: ContactState) -> FloatArray:
@@ -191,29 +184,28 @@ class CylinderContact:
         friction = self.frictions(state)
         count = friction.shape[1]
         slopes = np.zeros((len(normal), count, count + 1))
-        slopes[:, 0, :2] = (self.radius / distance)[:, None] * _turned(normal)
+        slopes[:, 0, :2] = self.cylinder(state).place_slopes(self.moved(state.nodal))
         slopes[:, 1:, 2:] = np.eye(count - 1)
         slip, size, sticks = self.slips(state)
         along = np.where(sticks[:, None], 0.0, slip / size[:, None])
         turned = np.eye(count) - np.einsum("mt,ms->mts", along, along)
         rate = (state.friction.bounds / size)[:, None, None] * turned
         blocks = np.einsum("mti,mts,msj->mij", slopes, rate, slopes)
-        tied = np.einsum("mi,mj->mij", _turned(normal), normal)
-        bend = friction[:, 0] * self.radius / distance**2
-        blocks[:, :2, :2] += pressing + bend[:, None, None] * (tied + tied.transpose(0, 2, 1))
+        bend = np.einsum("m,mi,mj->mij", friction[:, 0] / distance, slopes[:, 0, :2], normal)
+        blocks[:, :2, :2] += pressing + bend + bend.transpose(0, 2, 1)
         return np.asarray(blocks)
 
     @property
     def _stiffness(self) -> FloatArray:
         return np.repeat(self.stiffness * self.shares, len(self.positions))
 
-    def _moved(self, nodal: FloatArray) -> FloatArray:
+    def moved(self, nodal: FloatArray) -> FloatArray:
         """Positions of the deformed nodes in the plane, shape (l m, 2), mm."""
         return np.tile(self.positions, (len(self.shares), 1)) + nodal[self.nodes, :2]
 
     def front(self, nodal: FloatArray) -> FloatArray:
         """The deformed front, meant over the depth, shape (m, 2), mm."""
-        return np.tensordot(self.shares, self._moved(nodal).reshape(len(self.shares), -1, 2), axes=1)
+        return np.tensordot(self.shares, self.moved(nodal).reshape(len(self.shares), -1, 2), axes=1)
 
     def lengths(self, nodal: FloatArray) -> FloatArray:
         """Weights of the m places in an integral along the deformed front, shape (m,), mm."""
@@ -227,104 +219,3 @@ class CylinderContact:
 def _holds(state: ContactState) -> BoolArray:
     """The nodes that stay on the cylinder even by tension, shape (l m,)."""
     return np.asarray(state.held & (state.contact > 0))
-
-
-def _turned(normal: FloatArray) -> FloatArray:
-    """The directions along the cylinder, counterclockwise, shape (m, 2)."""
-    return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-
-
-def touching_centre(problem: Problem, middle: float | None = None) -> FloatArray:
-    """Centre of the cylinder, shape (2,), mm: as low above an abscissa as the front lets it.
-
-    By default it is that of the contact's middle, mm.
-    """
-    radius = float(problem.load.radius or 0)
-    middle = float(np.mean(contact_ends(problem))) if middle is None else middle
-    front = problem.mesh.points[np.unique(problem.mesh.boundary("front"))]
-    under = np.concatenate([front_points(problem.mesh, np.array([middle])), front])
-    under = under[np.abs(under[:, 0] - middle) < radius]
-    heights = under[:, 1] + np.sqrt(radius**2 - (under[:, 0] - middle) ** 2)
-    return np.array([middle, heights.max()])
-
-
-@dataclass(frozen=True)
-class ContactRegion:
-    """The contact region and its pressure."""
-
-    start: float  # Abscissa of the end nearer to the base before the load, mm
-    end: float  # Abscissa of the other end, mm
-    parts: int  # Number of separate intervals between them
-    width: float  # Deformed length of front face in contact, mm
-    penetration: float  # Largest depth of a node within the cylinder, mm
-    friction: float  # Sum of friction along the cylinder, counterclockwise around it, N/mm
-    sticking: float  # Deformed length of what sticks, mm
-    force: tuple[float, float]  # Integral of pressure and friction, N/mm
-    at_end: bool  # Whether the region reaches an end of the front face
-    points: ContactPoints
-
-    def stats(self) -> dict[str, float | int]:
-        """Columns of a solution's `stats`."""
-        rubbed = {"contact_friction_N_per_mm": self.friction, "contact_sticking_mm": self.sticking}
-        return {
-            "contact_start_mm": self.start,
-            "contact_end_mm": self.end,
-            "contact_parts": self.parts,
-            "contact_width_mm": self.width,
-            "contact_pressure_MPa": float(self.points.pressure.max()),
-            "penetration_mm": self.penetration,
-            **(rubbed if self.points.friction.any() else {}),
-        }
-
-    @classmethod
-    def of(cls, contact: CylinderContact, state: ContactState) -> "ContactRegion | None":
-        """The region in equilibrium; None where the cylinder does not touch the finger.
-
-        Its ends lie half way between a point that touches and the next one that does not. In three
-        dimensions a point touches if it does so anywhere along z, and slips if it does so wherever it
-        touches; pressure and friction are means over the depth.
-        """
-        gap, normal = contact.gaps(state)
-        along, levels = np.zeros(len(gap)), len(contact.shares)
-        sticks = np.zeros(len(gap), dtype=np.bool_)
-        if state.friction is not None:
-            along, sticks = contact.frictions(state)[:, 0], contact.slips(state)[2]
-        total = state.contact @ normal + along @ _turned(normal)
-        nodal, force = state.nodal, state.contact.reshape(levels, -1).sum(axis=0)
-        friction, sticks = along.reshape(levels, -1).sum(axis=0), sticks.reshape(levels, -1).any(axis=0)
-        touching = np.flatnonzero(force > 0)
-        if not len(touching):
-            return None
-        first, last = int(touching[0]), int(touching[-1])
-        x = contact.positions[:, 0]
-        between = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
-        moved = contact.front(nodal)
-        halves = 0.5 * np.linalg.norm(np.diff(moved, axis=0), axis=1)
-        shares = np.append(halves, 0.0) + np.insert(halves, 0, 0.0)
-        lengths = contact.lengths(nodal)[touching]
-        points = ContactPoints(
-            x=x[touching],
-            pressure=force[touching] / lengths,
-            friction=friction[touching] / lengths,
-            slips=~sticks[touching],
-        )
-        return cls(
-            start=float(between[first]),
-            end=float(between[last + 1]),
-            parts=int(np.count_nonzero(np.diff(touching) > 1)) + 1,
-            width=float(shares[touching].sum()),
-            penetration=float(max(0.0, -gap.min())),
-            friction=float(friction.sum()),
-            sticking=float(shares[touching][~points.slips].sum()),
-            force=(float(total[0]), float(total[1])),
-            at_end=first == 0 or last == len(x) - 1,
-            points=points,
-        )
-
-
-def contact_of(problem: Problem, position: float | None, region: ContactRegion | None) -> Contact | None:
-    """The contact of a solution by the abscissa of its force, mm; None without force or contact region."""
-    if position is None or (problem.load.kind == "cylinder" and region is None):
-        return None
-    start, end = contact_ends(problem) if region is None else (region.start, region.end)
-    return Contact(position, start, end, None if region is None else region.points)
