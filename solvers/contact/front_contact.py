@@ -21,8 +21,9 @@ from pinnray.solvers.contact.cylinder import Cylinder
 
 ITERATIONS, SETTLED = 30, 1e-9
 """Newton iterations for the forces, and the step of a force over the largest one that ends them."""
-PUSH = 10.0
-"""k times the mean compliance of a point by itself; with a tenth or thrice as much more searches fail."""
+PUSHES = (1.0, 10.0, 0.1)
+"""k times the mean trace of a point's own compliance, in turn: of 1,040 problems on the way of fits the first
+does not solve 8 and all together 2, of 400 random ones, which start without forces, 16 and 7."""
 
 
 class Balance(NamedTuple):
@@ -45,11 +46,12 @@ class FrontContact(NamedTuple):
     def forces(self, free: FloatArray, start: FloatArray) -> FloatArray | None:
         """Forces (m, 2), N/mm, for places Y (m, 2), mm, without them; None where none are found.
 
-        The search starts from forces (m, 2), and again from none.
+        The search starts from forces (m, 2).
         """
-        for forces in (start, np.zeros_like(start)):
+        for push in PUSHES:
+            forces = start
             for _ in range(ITERATIONS):
-                balance = self.balance(free, forces)
+                balance = self.balance(free, forces, push)
                 try:
                     step = np.linalg.solve(balance.by_force, -balance.missed.ravel()).reshape(-1, 2)
                 except np.linalg.LinAlgError:
@@ -59,8 +61,8 @@ class FrontContact(NamedTuple):
                     return forces
         return None
 
-    def balance(self, free: FloatArray, forces: FloatArray) -> Balance:
-        """What forces (m, 2), N/mm, miss for places Y (m, 2), mm, without them."""
+    def balance(self, free: FloatArray, forces: FloatArray, push: float = 1.0) -> Balance:
+        """What forces (m, 2), N/mm, miss for places Y (m, 2), mm, without them; see `PUSHES`."""
         count, μ = len(forces), self.cylinder.friction
         points = free + (self.compliance @ forces.ravel()).reshape(-1, 2)
         (normal, along), gap = self.cylinder.axes(points), self.cylinder.gaps(points)
@@ -68,7 +70,7 @@ class FrontContact(NamedTuple):
         q, t = (forces * normal).sum(axis=1), (forces * along).sum(axis=1)
         turned = along / (gap + self.cylinder.radius)[:, None]
         q_moved, t_moved = t[:, None] * turned, -q[:, None] * turned
-        k = PUSH * count / np.trace(self.compliance)
+        k = push * count / np.trace(self.compliance)
         touches, tried = q - k * gap > 0, t - k * slip
         sticks = touches & (np.abs(tried) <= μ * q)
         way = np.sign(tried) * (touches & ~sticks)
