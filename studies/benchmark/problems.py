@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ class BenchmarkProblem:
     name: str
     definition: Mapping[str, Any]  #: Of the finger
     physics: Mapping[str, Any]  #: Words of `Physics`: law, load, stroke and so on
-    grading: float = 1.0  #: How many times larger the reference's elements are at corners and contact
+    elements: Mapping[str, float] = field(default_factory=dict)  #: Of its reference, where not the usual ones
 
     @property
     def finger(self) -> Finger:
@@ -103,7 +103,9 @@ def problem_set(name: str) -> ProblemSet:
         raise UserError(f"no set of problems is called {name!r}; there are {' and '.join(SETS)}")
     content = json.loads(PROBLEMS.read_text(encoding="utf-8"))
     problems = [
-        BenchmarkProblem(each["name"], content["fingers"][each["finger"]], each["physics"], each["grading"])
+        BenchmarkProblem(
+            each["name"], content["fingers"][each["finger"]], each["physics"], each.get("elements", {})
+        )
         for each in content["problems"]
         if each["small"] or name == "full"
     ]
