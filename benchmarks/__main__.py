@@ -23,7 +23,6 @@ BENCHMARKS = {
 }
 """Names, and functions that return a table; the modules' docstrings have descriptions and times."""
 
-SHORT = ("page",)
 ROWED = ("entries", "full-entries", "references", "stress", "reliability")
 
 
@@ -38,14 +37,14 @@ def show(table: RenderableType, console: Console | None = None) -> None:
 def main() -> int:
     """Entry of `python -m benchmarks [NAME ...] [--rows WORDS]`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(BENCHMARKS)}; default: page")
+    parser.add_argument("names", nargs="*", default=["page"], metavar="NAME", help=", ".join(BENCHMARKS))
     parser.add_argument("--rows", default="", help=f"words in the names of the rows of {' and '.join(ROWED)}")
     arguments = parser.parse_args()
     for name in arguments.names:
         if name not in BENCHMARKS:
             names = ", ".join(BENCHMARKS)
             parser.error(f"no benchmark {name!r}; there are {names}; docs/evidence/tried.md has former ones")
-    for name in arguments.names or SHORT:
+    for name in arguments.names:
         options = {"rows": arguments.rows} if arguments.rows and name in ROWED else {}
         module, _, function = BENCHMARKS[name].partition(":")
         try:

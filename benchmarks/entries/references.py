@@ -40,11 +40,10 @@ COARSER = {"size": 1.42, "corner_size": 2.0, "contact_size": 2.0}
 def main(rows: str = "") -> Table:
     """Make the references of the problems whose names hold a text, and keep them."""
     cells = []
-    for problem in problem_set("full").problems:
-        if rows in problem.name:
-            made = make_reference(problem)
-            save(made, problem.reference_file)
-            cells.append((problem.name, *(f"{made.bounds[name]:.1e}" for name in MEASURES)))
+    for problem in (each for each in problem_set("full").problems if rows in each.name):
+        made = make_reference(problem)
+        save(made, problem.reference_file)
+        cells.append((problem.name, *(f"{made.bounds[name]:.1e}" for name in MEASURES)))
     return terminal_table("Bounds of errors", ("problem", *MEASURES), cells, left=["problem"])
 
 
@@ -60,8 +59,8 @@ def make_reference(problem: BenchmarkProblem) -> Reference:
     singular = np.concatenate([singular_points(fine.problem.mesh), _touched(fine)])
     away = cKDTree(singular).query(points)[0] > mean_thickness(fine.problem.mesh)
     reference = Reference(points, rule.weights, away, Sampled.of(fine, points))
-    errors = reference.errors(Sampled.of(coarse, points))
-    return replace(reference, bounds={name: abs(value) for name, value in errors.items()})
+    errors = reference.errors(Sampled.of(coarse, points)).items()
+    return replace(reference, bounds={name: abs(value) for name, value in errors})
 
 
 def _solved(problem: BenchmarkProblem, times: Mapping[str, float]) -> Solution:
