@@ -48,11 +48,6 @@ class CylinderModel(ResponseModel):
         ways = np.concatenate([_along(axes[0], q > 0), _along(axes[1], sticks)])
         return np.asarray((ways @ self._rows).reshape(-1, *self.body.shape))
 
-    def extrapolated(self, about: Response, values: FloatArray) -> Response:
-        """See `ResponseModel`; the force, too, is of first order."""
-        force = about.force + (values - about.values) @ about.force_slopes
-        return replace(super().extrapolated(about, values), force=force)
-
     def carried(
         self, response: Response, points: FloatArray, finer: Callable[[FloatArray], FloatArray]
     ) -> Response:
@@ -216,27 +211,20 @@ class CylinderModel(ResponseModel):
         total = float(force @ into) or 1.0
         weights = last.forces @ into / total
         weight_slopes = (last.force_slopes @ into - np.outer(force_slopes @ into, weights)) / total
-        displacements = self._moved(last.state) - self._points
-        moved = self._moves(last.slopes)
-        contact, place = weights @ displacements, weights @ self._points
-        contact_slopes = weight_slopes @ displacements + np.einsum("m,pmi->pi", weights, moved)
-        place_slopes = weight_slopes @ self._points
-        softness, there = (hypothesis.softness, by.softness), (place + contact, place_slopes + contact_slopes)
-        motion = self._clamp.motion(softness, (force, force_slopes), there)
+        there, moved = self._moved(last.state), self._moves(last.slopes)
+        there_slopes = weight_slopes @ there + np.einsum("m,pmi->pi", weights, moved)
+        softness, x = (hypothesis.softness, by.softness), self._points[:, 0]
+        motion = self._clamp.motion(softness, (force, force_slopes), (weights @ there, there_slopes))
         return Response(
             values.copy(),
             hypothesis,
             last.state,
             last.slopes,
             motion,
-            contact,
-            contact_slopes,
-            float(force @ into),
-            force_slopes @ into,
             force,
             force_slopes,
-            float(place[0]),
-            place_slopes[:, 0],
+            float(weights @ x),
+            weight_slopes @ x,
             tuple(way),
         )
 

@@ -141,8 +141,9 @@ class Fit(NamedTuple):
         ):
             name, unit = parameter.name, parameter.unit
             if name == INDENTATION:
-                name, unit, value = "normal_force", "N/mm", response.normal
-                slopes = response.normal_slopes * found.slopes
+                into = self.model.unknowns.directions[0]
+                name, unit, value = "normal_force", "N/mm", float(response.force @ into)
+                slopes = response.force_slopes @ into * found.slopes
                 deviation = float(np.sqrt(slopes @ found.covariance @ slopes))
                 low, high = value - found.quantile * deviation, value + found.quantile * deviation
             listed.append(FoundParameter(name, unit, value, deviation, low, high, share))

@@ -54,10 +54,6 @@ class Response:
     state: FloatArray  # c
     slopes: FloatArray  # c', shape (p, *shape)
     motion: RigidMotion  # Of the clamp
-    contact: FloatArray  # Mean displacement of the contact, shape (2,), mm
-    contact_slopes: FloatArray  # Shape (p, 2)
-    normal: float  # Normal force, N/mm
-    normal_slopes: FloatArray  # Shape (p,)
     force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
     force_slopes: FloatArray  # Shape (p, 2)
     place: float  # Abscissa on the drawn front at which it acts, mm
@@ -136,17 +132,14 @@ class ResponseModel:
     def extrapolated(self, about: Response, values: FloatArray) -> Response:
         """The response at values of the unknowns, shape (p,), to first order about another one."""
         step = values - about.values
-        normal = about.normal + float(step @ about.normal_slopes)
-        hypothesis = self.unknowns.hypothesis(values, normal)
+        force = about.force + step @ about.force_slopes
         return replace(
             about,
             values=values.copy(),
-            hypothesis=hypothesis,
+            hypothesis=self.unknowns.hypothesis(values, float(force @ self.unknowns.directions[0])),
             state=about.state + np.tensordot(step, about.slopes, axes=1),
             motion=about.motion.extrapolated(step),
-            contact=about.contact + step @ about.contact_slopes,
-            normal=normal,
-            force=hypothesis.force,
+            force=force,
             place=about.place + float(step @ about.place_slopes),
         )
 
@@ -189,11 +182,11 @@ class ResponseModel:
         self, values: FloatArray, tolerance: float, iterations: int, slopes: FloatArray | None
     ) -> Response | None:
         """The response by Newton's method from the last one, extrapolated along its derivatives."""
-        state, normal = np.zeros(self.body.shape), 0.0
-        if self._last is not None:
-            there = values - self._last.values
-            state = self._last.state + np.tensordot(there, self._last.slopes, axes=1)
-            normal = self._last.normal + float(there @ self._last.normal_slopes)
+        state, normal, by_normal = np.zeros(self.body.shape), 0.0, np.zeros(len(values))
+        if (last := self._last) is not None:
+            there, by_normal = values - last.values, last.force_slopes @ self.unknowns.directions[0]
+            state = last.state + np.tensordot(there, last.slopes, axes=1)
+            normal = float(last.force @ self.unknowns.directions[0] + there @ by_normal)
         hypothesis = self.unknowns.hypothesis(values)
         feet = self.body.feet
         state = np.where(feet.any(axis=0), np.tensordot(hypothesis.feet, feet, axes=1), state)
@@ -229,7 +222,6 @@ class ResponseModel:
             if size < tolerance:
                 if self.body.admissible(state + step, hypothesis.changes):
                     state = state + step
-                by_normal = np.zeros(len(values)) if self._last is None else self._last.normal_slopes
                 if slopes is None:
                     slopes, by_normal = self._slopes(values, normal, state, linearised, traction, push)
                 return self._response(values, (normal, by_normal), state, slopes, traction)
@@ -285,25 +277,19 @@ class ResponseModel:
         hypothesis, slope = self.unknowns.hypothesis(values, normal[0]), self.unknowns.slopes(values, *normal)
         force = hypothesis.force
         inner = tuple(range(1, slopes.ndim))
-        contact, by_position, by_width = np.asarray(np.tensordot(traction[:3], state, axes=state.ndim))
-        contact_slopes: FloatArray = np.tensordot(slopes, traction[0], axes=(inner, inner))
-        contact_slopes += np.outer(slope.position, by_position) + np.outer(slope.width, by_width)
         front = self.unknowns.traction
-        places = front.weights(hypothesis.position, hypothesis.width) @ front.points
-        place_slopes: FloatArray = contact_slopes + np.outer(slope.position, places[1])
-        place_slopes += np.outer(slope.width, places[2])
-        motion = self._clamp.motion(
-            (hypothesis.softness, slope.softness), (force, slope.force), (places[0] + contact, place_slopes)
-        )
+        places = front.weights(hypothesis.position, hypothesis.width)[:3] @ front.points
+        place, by_position, by_width = places + np.tensordot(traction[:3], state, axes=state.ndim)
+        place_slopes: FloatArray = np.tensordot(slopes, traction[0], axes=(inner, inner))
+        place_slopes += np.outer(slope.position, by_position) + np.outer(slope.width, by_width)
+        softness = hypothesis.softness, slope.softness
+        motion = self._clamp.motion(softness, (force, slope.force), (place, place_slopes))
         return Response(
             values.copy(),
             hypothesis,
             state,
             slopes,
             motion,
-            contact,
-            contact_slopes,
-            *normal,
             force,
             slope.force,
             hypothesis.position + hypothesis.eccentricity,

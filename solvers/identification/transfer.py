@@ -54,7 +54,7 @@ def _response(model: ResponseModel, start: Response, share: float, shift: float)
     What grows with the normal force follows it, to a millionth, by iteration; a cylinder has that share of
     its travel, on a way of its own.
     """
-    names = model.unknowns.names
+    names, into = model.unknowns.names, model.unknowns.directions[0]
     values = start.values.copy()
     values[names.index("travel" if start.way else INDENTATION)] *= share
     growing = np.isin(names, ("shear_force", *model.unknowns.feet.names))
@@ -66,7 +66,7 @@ def _response(model: ResponseModel, start: Response, share: float, shift: float)
         response = model.response(np.where(growing, scale * values, values), EXACT)
         if response is None:
             break
-        before, scale = scale, response.normal / start.normal
+        before, scale = scale, float(response.force @ into / (start.force @ into))
         if start.way or abs(scale - before) < 1e-6:
             return response
     raise NoSolutionError("no equilibrium of the identified finger was found at the other load")

@@ -9,9 +9,9 @@ from pinnray.geometry.cache import finger_mesh
 from pinnray.geometry.mesh.settings import MeshSettings
 from pinnray.solvers.fem.finite_strain.solver import FemNonlinearSolver
 from pinnray.solvers.fem.identification import FemIdSolver
+from pinnray.solvers.identification import search
 from pinnray.solvers.identification.law_fits import LawFits
 from pinnray.solvers.identification.model import ResponseModel
-from pinnray.solvers.pinn.identification import solver as pinn_id
 from pinnray.solvers.pinn.identification.network_body import NetworkBody
 from pinnray.solvers.pinn.identification.solver import PinnIdSolver
 from pinnray.solvers.problem import Load, Material, Problem
@@ -76,18 +76,13 @@ def test_where_the_network_finds_no_equilibrium_the_status_says_so(problem, monk
 
 @pytest.mark.release
 def test_where_first_order_does_not_settle_the_network_seeks_the_unknowns(problem, found, monkeypatch):
-    """With derivatives that are twice as large as they are; the search has its own."""
-    carried, asked, fit = pinn_id._projected, [], LawFits.fit
-
-    def off(*arguments):
-        response = carried(*arguments)
-        return replace(response, slopes=2.0 * response.slopes)
+    asked, fit = [], LawFits.fit
 
     def counted(self, law, measurement, near, *rest, **options):
-        asked.append(type(self._model(law).body))
+        asked.append(type(self.model(law).body))
         return fit(self, law, measurement, near, *rest, **options)
 
-    monkeypatch.setattr(pinn_id, "_projected", off)
+    monkeypatch.setattr(search, "POLISHES", 0)
     monkeypatch.setattr(LawFits, "fit", counted)
     sought = PinnIdSolver(**SETTINGS).solve(problem)
     assert asked[-1] is NetworkBody

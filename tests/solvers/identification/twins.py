@@ -38,6 +38,13 @@ def marked(model):
     return MarkerModel(model, MarkerData.of(model.unknowns.problem, observed, None))
 
 
+def contact_of(model, response):
+    """Mean displacement of the contact, shape (2,), mm."""
+    there, front = response.hypothesis, model.unknowns.traction
+    rows = model.body.traction_rows(front.points, front.weights(there.position, there.width))
+    return np.tensordot(rows[0], response.state, axes=response.state.ndim)
+
+
 def values_of(unknowns, changed=VALUES):
     drawn = {parameter.name: parameter.start for parameter in unknowns.parameters(1.0)}
     return np.array([(drawn | changed)[name] for name in unknowns.names])
