@@ -45,6 +45,9 @@ def test_derivatives_are_those_of_differences(pressed, friction):
     """Of state, force and place, along the whole way with its friction; 3e-5 is what differences leave."""
     pressed.restart(None)
     found = pressed.response(values_of(pressed.unknowns, {"friction": friction}), EXACT)
+    axes = pressed._cylinder(found.hypothesis, 1.0).axes(pressed._moved(found.state))
+    q, t = (found.way[-1].forces * axes).sum(axis=2)
+    assert (np.abs(t) < 0.999 * friction * q).any() == (friction > 1)  # what sticks
     for number, parameter in enumerate(pressed.unknowns.parameters(1.0)):
         step = 1e-4 * max(abs(found.values[number]), 1.0) * np.eye(len(NAMES))[number]
         if parameter.name == "base_compliance":
