@@ -57,8 +57,9 @@ class FrontContact(NamedTuple):
                 except np.linalg.LinAlgError:
                     break
                 forces = forces + step
-                if np.abs(step).max(initial=0.0) <= SETTLED * np.abs(forces).max(initial=0.0):
-                    return forces
+                least = SETTLED * np.abs(forces).max(initial=0.0)
+                if np.abs(step).max(initial=0.0) <= least:
+                    return np.where(np.abs(forces).max(axis=1, keepdims=True) > least, forces, 0.0)
         return None
 
     def balance(self, free: FloatArray, forces: FloatArray, push: float = 1.0) -> Balance:
