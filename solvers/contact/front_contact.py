@@ -71,7 +71,7 @@ class FrontContact(NamedTuple):
         q, t = (forces * normal).sum(axis=1), (forces * along).sum(axis=1)
         turned = along / (gap + self.cylinder.radius)[:, None]
         q_moved, t_moved = t[:, None] * turned, -q[:, None] * turned
-        k = push * count / np.trace(self.compliance)
+        k = push * count / (np.trace(self.compliance) or 1.0)
         touches, tried = q - k * gap > 0, t - k * slip
         sticks = touches & (np.abs(tried) <= μ * q)
         way = np.sign(tried) * (touches & ~sticks)
