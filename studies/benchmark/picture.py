@@ -34,7 +34,7 @@ def draw_accuracy(found: Benchmark, page: float = WIDTH) -> Figure:
     looks = {label: LOOKS.get(label.split()[0]) or Look(MUTED, next(marks)) for label in labels}
     with figure(height, page) as drawn:
         write_heading(drawn, "Accuracy over cost", f"{len(found.problems.problems)} problems")
-        spaces = {**room, "hspace": 0.12, "wspace": 0.06}
+        spaces = {**room, "hspace": 0.12, "wspace": 0.1}
         grid, numbered = drawn.subplots(len(SHOWN), 2, sharex=True, sharey="row", gridspec_kw=spaces), []
         for (name, words), row in zip(SHOWN.items(), grid, strict=True):
             row[0].set_ylabel(words)
