@@ -30,7 +30,6 @@ from pinnray.solvers.identification.unknowns import (
     INDENTATION,
     LAW_ODDS,
     SHARE,
-    Unknowns,
 )
 from pinnray.solvers.problem import Problem
 
@@ -70,14 +69,61 @@ class FoundParameter(NamedTuple):
     resolution: float
 
 
-class PosteriorSpread(NamedTuple):
-    """What an estimate of p standardised values z rests on."""
+class ForcePosterior(NamedTuple):
+    """A response whose p standardised unknowns z are known so well, and its force."""
 
+    model: ResponseModel
+    response: Response
     prior: Prior
     covariance: FloatArray  # Of z, shape (p, p)
     inflation: float  # φ
     quantile: float  # Half an interval over the standard deviation
     slopes: FloatArray  # Derivatives of the values by z, shape (p,)
+
+    @property
+    def errors(self) -> FloatArray:
+        """Independent errors in the values, columns of shape (p, p), of one standard deviation each.
+
+        They are widened where Student's interval is wider than the normal one.
+        """
+        wider = self.quantile / NORMAL
+        return np.asarray(wider * self.slopes[:, None] * np.linalg.cholesky(self.covariance))
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Abscissa on the drawn front at which the force acts, and its standard deviation, mm."""
+        # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
+        couple = 0.25 * mean_thickness(self.model.unknowns.problem.mesh)
+        around = np.linalg.norm(self.response.place_slopes @ self.errors)
+        return self.response.place, float(np.hypot(around, couple))
+
+    def component(self, direction: FloatArray) -> tuple[float, float]:
+        """Component of the indenter's force in a direction, (2,), and its standard deviation, N/mm."""
+        component, doubt = float(self.response.force @ direction), self.model.doubt
+        spread = np.linalg.norm(self.response.force_slopes @ direction @ self.errors)
+        return component, float(np.hypot(spread, np.hypot(doubt.force, doubt.corners) * component))
+
+    def variances(self, direction: FloatArray) -> dict[str, float]:
+        """Variance of that component, (N/mm)^2, by what it comes from: of `SOURCES`.
+
+        With the estimate's error C A^T e - C R^T p, for unit errors e of the observations and p of the prior,
+        it is the sum of independent parts; of unknowns that are known together each has its share. Where φ
+        is above one, all but 1 / φ^2 of the observations' is misfit.
+        """
+        slopes, wider = self.response.force_slopes @ direction * self.slopes, self.quantile / NORMAL
+        spread = wider * self.covariance @ slopes
+        shares = spread * (self.prior.precision @ spread)
+        noise = max(wider * float(spread @ slopes) - float(shares.sum()), 0.0)
+        misfit, value = 1 - 1 / self.inflation**2, float(self.response.force @ direction)
+        parts, doubt = dict.fromkeys(SOURCES, 0.0), self.model.doubt
+        parts["third dimension"], parts["corners"] = (doubt.force * value) ** 2, (doubt.corners * value) ** 2
+        parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
+        for name, part in zip(self.model.unknowns.names, shares.tolist(), strict=True):
+            contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
+            frame = name.startswith(("pressed", "drawn"))
+            finger = "modulus" if name == "young" else "finger"
+            parts["contact" if contact else "frames" if frame else finger] += part
+        return parts
 
 
 class Fit(NamedTuple):
@@ -121,14 +167,11 @@ class Fit(NamedTuple):
         return self.log_evidence + float(np.log(odds))
 
     @property
-    def standard_errors(self) -> FloatArray:
-        """Independent errors in the values, columns of shape (p, p), of one standard deviation each.
-
-        They are widened where Student's interval is wider than the normal one.
-        """
-        found = self.estimate
-        wider = found.quantile / NORMAL
-        return np.asarray(wider * found.slopes[:, None] * np.linalg.cholesky(found.covariance))
+    def posterior(self) -> ForcePosterior:
+        """The force and how well it is known."""
+        known, model = self.estimate, self.model
+        own = known.prior, known.covariance, known.inflation, known.quantile, known.slopes
+        return ForcePosterior(model, self.response, *own)
 
     @property
     def parameters(self) -> list[FoundParameter]:
@@ -149,27 +192,9 @@ class Fit(NamedTuple):
             listed.append(FoundParameter(name, unit, value, deviation, low, high, share))
         return listed
 
-    @property
-    def place(self) -> tuple[float, float] | None:
-        """Abscissa on the drawn front at which the force acts, and its standard deviation, mm; if unknown."""
-        unknowns = self.model.unknowns
-        if "position" not in unknowns.names:
-            return None
-        return place_of(unknowns, self.response, self.standard_errors)
-
-    def component(self, direction: FloatArray) -> tuple[float, float]:
-        """Component of the indenter's force in a direction, (2,), and its standard deviation, N/mm."""
-        return component_of(self.model, self.response, self.standard_errors, direction)
-
-    def variances(self, direction: FloatArray) -> dict[str, float]:
-        """Variance of that component, (N/mm)^2, by what it comes from; see `variance_parts`."""
-        found = self.estimate
-        parts = PosteriorSpread(found.prior, found.covariance, found.inflation, found.quantile, found.slopes)
-        return variance_parts(self.model, self.response, parts, direction)
-
     def snapshots(self, problem: Problem) -> tuple[Snapshot, list[Snapshot]]:
         """The finger, and that `STEP` times each of the independent standard errors away, to first order."""
-        found, *steps = (self._snapshot(problem, each) for each in (0.0, *(STEP * self.standard_errors).T))
+        found, *steps = (self._snapshot(problem, each) for each in (0.0, *(STEP * self.posterior.errors).T))
         return found, steps
 
     def _snapshot(self, problem: Problem, error: FloatArray | float) -> Snapshot:
@@ -194,55 +219,9 @@ class Fit(NamedTuple):
         return self.model.unknowns.learned(found.parameters, found.z, wider * found.covariance)
 
 
-def variance_parts(
-    model: ResponseModel, response: Response, found: PosteriorSpread, direction: FloatArray
-) -> dict[str, float]:
-    """Variance of the force's component in a direction, (2,), (N/mm)^2, by what it comes from: of `SOURCES`.
-
-    With the estimate's error C A^T e - C R^T p, for unit errors e of the observations and p of the prior, it
-    is the sum of independent parts; of unknowns that are known together each has its share. Where φ is above
-    one, all but 1 / φ^2 of the observations' is misfit.
-    """
-    slopes, wider = response.force_slopes @ direction * found.slopes, found.quantile / NORMAL
-    spread = wider * found.covariance @ slopes
-    shares = spread * (found.prior.precision @ spread)
-    noise = max(wider * float(spread @ slopes) - float(shares.sum()), 0.0)
-    misfit, value = 1 - 1 / found.inflation**2, float(response.force @ direction)
-    parts = dict.fromkeys(SOURCES, 0.0)
-    parts["third dimension"] = (model.doubt.force * value) ** 2
-    parts["corners"] = (model.doubt.corners * value) ** 2
-    parts["markers"], parts["misfit"] = noise * (1 - misfit), noise * misfit
-    for name, part in zip(model.unknowns.names, shares.tolist(), strict=True):
-        contact = name in (*CONTACT, *CYLINDER, SHARE, INDENTATION)
-        frame = name.startswith(("pressed", "drawn"))
-        finger = "modulus" if name == "young" else "finger"
-        parts["contact" if contact else "frames" if frame else finger] += part
-    return parts
-
-
 def split_phrase(variances: Mapping[str, float]) -> str:
     """What a variance comes from in words, by names of `SOURCES`, the largest first."""
     whole = sum(variances.values()) or 1.0
     ordered = sorted(variances, key=variances.__getitem__, reverse=True)
     told = [name for name in ordered if variances[name] >= LEAST_SHARE * whole]
     return ", ".join(f"{100 * variances[name] / whole:.0f} % {SOURCES[name]}" for name in told)
-
-
-def component_of(
-    model: ResponseModel, response: Response, errors: FloatArray, direction: FloatArray
-) -> tuple[float, float]:
-    """Component of the force in a direction, (2,), and its standard deviation, N/mm.
-
-    It is of a response whose unknowns have independent errors, shape (p, k).
-    """
-    component = float(response.force @ direction)
-    spread = response.force_slopes @ direction @ errors
-    doubt = np.hypot(model.doubt.force, model.doubt.corners) * component
-    return component, float(np.hypot(np.linalg.norm(spread), doubt))
-
-
-def place_of(unknowns: Unknowns, response: Response, errors: FloatArray) -> tuple[float, float]:
-    """As `component_of`, the abscissa on the drawn front at which the force acts, mm."""
-    # A tangential force of half of the normal one, on a face that is half a wall from the wall's middle.
-    couple = 0.25 * mean_thickness(unknowns.problem.mesh)
-    return response.place, float(np.hypot(np.linalg.norm(response.place_slopes @ errors), couple))

@@ -35,7 +35,7 @@ def narrowing_phrase(fit: Fit, direction: FloatArray, others: float) -> str:
 
     `others` is the variance that the fit does not have, (N/mm)^2.
     """
-    whole = sum(fit.variances(direction).values()) + others
+    whole = sum(fit.posterior.variances(direction).values()) + others
     tried = sorted(_tried(fit, direction), key=lambda remedy: remedy.variance)
     left = [(each.name, float(np.sqrt((each.variance + others) / whole))) for each in tried]
     worth = [f"{name} (to {100 * part:.0f} %)" for name, part in left if part < WORTH]
@@ -45,7 +45,7 @@ def narrowing_phrase(fit: Fit, direction: FloatArray, others: float) -> str:
 
 
 def _tried(fit: Fit, direction: FloatArray) -> Iterator[Remedy]:
-    found, unknowns, parts = fit.estimate, fit.model.unknowns, fit.variances(direction)
+    found, unknowns, parts = fit.estimate, fit.model.unknowns, fit.posterior.variances(direction)
     names, whole = np.array(unknowns.names), sum(parts.values())
     wider = (found.quantile / NORMAL) ** 2
     slopes = fit.response.force_slopes @ direction * found.slopes
@@ -68,7 +68,7 @@ def _tried(fit: Fit, direction: FloatArray) -> Iterator[Remedy]:
     if (walls := np.isin(names, WALLS)).any():
         yield Remedy("walls that are measured", known(walls))
     points, moves = _places(fit)
-    gained = moves @ (fit.response.force_slopes @ direction @ fit.standard_errors)
+    gained = moves @ (fit.response.force_slopes @ direction @ fit.posterior.errors)
     inner = np.eye(2) + np.einsum("mip,mjp->mij", moves, moves)
     less = np.einsum("mi,mi->m", gained, np.linalg.solve(inner, gained[..., None])[..., 0])
     if len(points):

@@ -62,17 +62,18 @@ class Identified:
     @cached_property
     def force(self) -> IdentifiedForce:
         """The force and its place: the mean over the laws, with an interval that holds their scatter."""
-        places = [place for fit in self.fits if (place := fit.place)]
         stroke, side = stroke_axes(self.best.model.unknowns.problem.load)
-        components = [fit.component(stroke) for fit in self.fits]
-        force, across = self._mean(components), self._mean([fit.component(side) for fit in self.fits])
+        known = [fit.posterior for fit in self.fits]
+        components = [each.component(stroke) for each in known]
+        force, across = self._mean(components), self._mean([each.component(side) for each in known])
         found = np.array([value for value, _ in components]) - force.value
-        parts = self.best.variances(stroke) | {"law": float(self.probabilities @ found**2)}
+        parts = known[0].variances(stroke) | {"law": float(self.probabilities @ found**2)}
         whole = sum(parts.values()) or 1.0
         shares = {name: parts[name] / whole for name in sorted(parts, key=parts.__getitem__, reverse=True)}
         narrower = narrowing_phrase(self.best, stroke, parts["law"])
         advice = f"The variance of the force comes from: {split_phrase(parts)}. {narrower}"
-        position = self._mean(places) if places else None
+        sought = "position" in self.best.model.unknowns.names
+        position = self._mean([each.place for each in known]) if sought else None
         return IdentifiedForce(force, across, position, shares, advice, self.best.contact, self.best.learned)
 
     def _cylinder(self) -> float | None:

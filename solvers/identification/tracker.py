@@ -25,7 +25,7 @@ from pinnray.runtime.arrays import BoolArray, FloatArray
 from pinnray.runtime.errors import UserError
 from pinnray.solvers.assimilation.estimation import Prior, inflation_of, quantile_of, values_of
 from pinnray.solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
-from pinnray.solvers.identification.fit import NORMAL, PosteriorSpread, component_of, place_of, variance_parts
+from pinnray.solvers.identification.fit import NORMAL, ForcePosterior
 from pinnray.solvers.identification.model import MarkerData, MarkerModel, Response, ResponseModel
 from pinnray.solvers.identification.unknowns import CONTACT, SHARE
 from pinnray.solvers.solution import Estimated, stroke_axes
@@ -55,7 +55,7 @@ class ForceReading:
     evaluations: int  # Equilibria that were computed
     seconds: float
     status: str  # Remarks in words; empty if there are none
-    # Of the force, (N/mm)^2, by what it comes from; see `variance_parts`
+    # Of the force, (N/mm)^2, by what it comes from; see `ForcePosterior`
     variances: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -72,7 +72,7 @@ class _Found(NamedTuple):
     """Estimate of z, shape (p,), and what it rests on."""
 
     z: FloatArray
-    posterior: PosteriorSpread
+    posterior: ForcePosterior  # With the response at the last equilibrium
 
 
 class ForceTracker:
@@ -183,7 +183,8 @@ class ForceTracker:
             if abs(inflation / used - 1) < 1e-3:
                 break
         covariance, (_, scales) = np.linalg.inv(rows.T @ rows), values_of(self._parameters, z)
-        return _Found(z, PosteriorSpread(prior, covariance, used, quantile_of(used, freedom), scales))
+        own = prior, covariance, used, quantile_of(used, freedom), scales
+        return _Found(z, ForcePosterior(self._model, self._last.response, *own))
 
     def _linearised(self, z: FloatArray) -> _Linearised | None:
         """The markers about the equilibrium at z; None if there is none.
@@ -212,23 +213,21 @@ class ForceTracker:
         self._known = Prior(mean, precision)
 
     def _reading(self, found: _Found, status: str) -> ForceReading:
-        values, derivatives = values_of(self._parameters, found.z)
-        posterior = found.posterior
-        errors = posterior.quantile / NORMAL * derivatives[:, None] * np.linalg.cholesky(posterior.covariance)
+        values, _ = values_of(self._parameters, found.z)
         response = self._model.extrapolated(self._last.response, values)
-        stroke, side = stroke_axes(self._unknowns.problem.load)
-        force, across = (
-            _estimated(*component_of(self._model, response, errors, self._stiffness * axis))
-            for axis in (stroke, side)
+        posterior, axes = (
+            found.posterior._replace(response=response),
+            stroke_axes(self._unknowns.problem.load),
         )
-        place, around = place_of(self._unknowns, response, errors)
+        stroke, side = (self._stiffness * axis for axis in axes)
+        place, around = posterior.place
         ends = np.clip(place + NORMAL * around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
         return replace(
             self._unknown(status),
-            force=force,
-            tangential_force=across,
+            force=_estimated(*posterior.component(stroke)),
+            tangential_force=_estimated(*posterior.component(side)),
             position=Estimated(place, float(ends[0]), float(ends[1])),
-            variances=variance_parts(self._model, response, posterior, self._stiffness * stroke),
+            variances=posterior.variances(stroke),
             inflation=found.posterior.inflation,
         )
 

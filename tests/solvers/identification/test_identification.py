@@ -130,7 +130,7 @@ def test_the_force_of_a_finger_with_a_depth_is_known_to_the_difference_of_the_pl
     for finger in (None, Design()):
         own = replace(problem, finger=finger)
         identifier = Identifier(FemIdSolver(degree=1), own, lambda unknowns: FemBody(unknowns, 1))
-        forces[finger is None] = identifier.identify(observed).best.component(np.array([0.0, -1.0]))
+        forces[finger is None] = identifier.identify(observed).best.posterior.component(np.array([0.0, -1.0]))
     (size, deviation), plane = forces[False], forces[True]
     assert size == pytest.approx(plane[0])
     told, known = 0.5 * problem.material.poisson**2 * size, RESOLVED.force * size

@@ -31,7 +31,7 @@ def variance_with(fit, point):
     covariance = np.linalg.inv(np.linalg.inv(found.covariance) + rows.T @ rows)
     slopes = fit.response.force_slopes @ STROKE * found.slopes
     less = slopes @ (found.covariance - covariance) @ slopes
-    return sum(fit.variances(STROKE).values()) - (found.quantile / NORMAL) ** 2 * less
+    return sum(fit.posterior.variances(STROKE).values()) - (found.quantile / NORMAL) ** 2 * less
 
 
 def test_another_marker_leaves_the_variance_of_the_posterior_with_it(fit):
@@ -42,7 +42,7 @@ def test_another_marker_leaves_the_variance_of_the_posterior_with_it(fit):
     assert remedy.variance == pytest.approx(min(variances), rel=1e-3)  # of steps and of a small disc
     best = points[int(np.argmin(variances))]
     assert remedy.name == "another marker, at ({:.0f}, {:.0f}) mm".format(*best)
-    assert remedy.variance < 0.9 * sum(fit.variances(STROKE).values())
+    assert remedy.variance < 0.9 * sum(fit.posterior.variances(STROKE).values())
 
 
 def test_known_walls_leave_the_variance_of_the_posterior_without_them(fit):
@@ -53,5 +53,5 @@ def test_known_walls_leave_the_variance_of_the_posterior_without_them(fit):
     covariance = np.linalg.inv(np.linalg.inv(found.covariance)[np.ix_(kept, kept)])
     slopes = fit.response.force_slopes @ STROKE * found.slopes
     wider = (found.quantile / NORMAL) ** 2
-    whole = sum(fit.variances(STROKE).values()) - wider * slopes @ found.covariance @ slopes
+    whole = sum(fit.posterior.variances(STROKE).values()) - wider * slopes @ found.covariance @ slopes
     assert remedy.variance == pytest.approx(whole + wider * slopes[kept] @ covariance @ slopes[kept])

@@ -33,7 +33,7 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     share = dict(zip(LAW_ODDS, np.exp(logs - np.logaddexp(*logs)), strict=True))
     np.testing.assert_allclose(found.probabilities, [share[fit.law] for fit in found.fits])
     even = Identified(found.fits, np.array([0.25, 0.75]))
-    forces, deviations = np.array([fit.component(np.array([0.0, -1.0])) for fit in found.fits]).T
+    forces, deviations = np.array([fit.posterior.component(np.array([0.0, -1.0])) for fit in found.fits]).T
     force = even.force
     mean = 0.25 * forces[0] + 0.75 * forces[1]
     variance = np.array([0.25, 0.75]) @ (deviations**2 + (forces - mean) ** 2)
@@ -45,7 +45,7 @@ def test_the_force_is_the_mean_over_the_laws_by_their_odds(identified):
     joint = found.best.estimate.slopes[which]
     spread = joint @ found.best.estimate.covariance[np.ix_(which, which)] @ joint
     wall = 0.25 * mean_thickness(problem.mesh)
-    assert found.best.place == pytest.approx((places[0], np.hypot(np.sqrt(spread), wall)))
+    assert found.best.posterior.place == pytest.approx((places[0], np.hypot(np.sqrt(spread), wall)))
     assert force.position.value == pytest.approx(0.25 * places[0] + 0.75 * places[1])
     assert force.position.low < min(places) < max(places) < force.position.high
 
@@ -60,7 +60,10 @@ def test_the_variance_of_the_force_is_the_sum_of_what_it_comes_from(identified):
             FemIdSolver(degree=1, law="given"), problem, lambda unknowns: FemBody(unknowns, 1)
         )
         found = identifier.identify(observed)
-        (value, deviation), parts = found.best.component(stroke), found.best.variances(stroke)
+        (value, deviation), parts = (
+            found.best.posterior.component(stroke),
+            found.best.posterior.variances(stroke),
+        )
         assert value == pytest.approx(-found.best.response.hypothesis.force[1])
         assert sum(parts.values()) == pytest.approx(deviation**2)
         assert all(part >= 0 for part in parts.values())
