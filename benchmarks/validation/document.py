@@ -71,7 +71,7 @@ def reflowed(text: str) -> str:
     """Markdown with its paragraphs broken anew, because numbers are shorter than their names."""
     paragraphs = (
         each if each[0] in "#|!-" else fill(each, 110, break_long_words=False, break_on_hyphens=False)
-        for each in text.strip().split("\n\n")
+        for each in text.strip().replace("\n\n\n", "\n\n").split("\n\n")
     )
     return "\n\n".join(paragraphs) + "\n"
 
