@@ -1,4 +1,4 @@
-"""Where a cylinder touches the front face in equilibrium, with pressure and friction there."""
+"""The region where a cylinder touches the front face in equilibrium, with pressure and friction there."""
 
 from dataclasses import dataclass
 
